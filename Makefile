@@ -2,7 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all test-gpu fuzz lint words bench install clean docs browser
+# `tests` is also a folder
+.PHONY: demo check test tests test-all test-gpu fuzz lint words bench install clean docs browser
 
 install: .venv/installed
 
@@ -53,7 +54,17 @@ browser: .venv/installed
 # two processes, each with files of its own: Python traces kernels on one core, whatever Dr.Jit does with the others
 PARALLEL := -n 2 --dist loadfile
 
-test: .venv/installed browser lint
+# formulas, tables, shader text, files and scenes, two cases of each test: what one runs while editing
+UNIT := tests/bridge tests/documents tests/emit tests/energy tests/measure tests/models tests/ops tests/optics \
+	tests/render/test_scene_build.py tests/render/test_scene_read.py tests/test_errors.py tests/test_imports.py
+check: .venv/installed
+	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow and not browser' --cases 2 $(UNIT)
+
+# lint and types run beside the tests
+test: .venv/installed browser
+	@$(MAKE) --no-print-directory --keep-going --jobs 2 lint tests
+
+tests: .venv/installed
 	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow'
 
 test-all: .venv/installed browser lint
@@ -80,6 +91,7 @@ bench: .venv/installed
 
 docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
+	$(BIN)/python docs/make_options.py
 
 clean:
 	rm -rf .venv out build dist

@@ -45,7 +45,7 @@ def measured(surface: str, facet: str, rays: int, patches: int = 16, bounces: st
         theta_i=LIGHTS,
         theta_r=VIEWS,
         phi=AZIMUTHS,
-        rays=rays,
+        samples=rays,
         patches=patches,
         bounces=bounces,
     )

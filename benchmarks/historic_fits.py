@@ -49,7 +49,7 @@ def main() -> None:
                 continue
             printed, metric = go.material(name, fit=fit), METRICS[paper]
             started = time.perf_counter()
-            found = go.fit(data, printed, metric=metric).material
+            found = go.fit(data, printed, loss=metric).material
             times.append(time.perf_counter() - started)
             ratios[fit].append(error(found, data, metric) / error(printed, data, metric))
     table = Table(title="error of Gonio's fit over that of the printed numbers")

@@ -43,13 +43,13 @@ def serve() -> None:
     import gonio as go
     from gonio.viewer import server, stage
 
-    application = server.Application(stage.of_models([go.Conductor(alpha=0.3)]), server.Door("127.0.0.1"))
+    application = server.Application(stage.of_models([go.Conductor(alpha=0.3)]), server.AccessControl("127.0.0.1"))
     one = server.Server(application, "127.0.0.1", 0, quiet=True)
 
     def say() -> None:
         while not one.started:
             time.sleep(0.01)
-        print(json.dumps([one.port, application.door.token]), flush=True)
+        print(json.dumps([one.port, application.access.token]), flush=True)
         sys.stdin.read()
         one.should_exit = True
 

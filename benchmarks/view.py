@@ -94,7 +94,7 @@ def reference_figures(what: stage.Stage) -> Iterator[Figure]:
 @contextlib.contextmanager
 def serving(what: stage.Stage) -> Iterator[str]:
     """The address of a server in a thread."""
-    one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
+    one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
     while not one.started:

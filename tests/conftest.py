@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,12 +52,43 @@ SCENE = {
 }
 
 
+BROWSERS = {"chrome", "chromium", "page", "live", "homework_page"}  # fixtures that start one
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--cases N`: at most N cases of each test, evenly spaced; `make check` takes 2."""
+    parser.addoption("--cases", type=int, default=0, metavar="N", help="run at most N cases of each test")
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark `shared` every test that asks for the folder of data: `-m shared` selects these and only these."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark tests by what they need and, of families of cases, those beyond the sample `slow`.
+
+    shared   every test that asks for the folder of data: `-m shared` selects these and only these
+    browser  every test that starts one
+    slow     cases beyond `sample(n)` or `--cases n`
+    """
+    families: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if "shared" in getattr(item, "fixturenames", ()):
+        fixtures = {*getattr(item, "fixturenames", ())}
+        if "shared" in fixtures:
             item.add_marker("shared")
+        if fixtures & BROWSERS:
+            item.add_marker("browser")
+        if not item.get_closest_marker("slow"):
+            families.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in families.values():
+        sample = cases[0].get_closest_marker("sample")
+        limits = [sample.args[0] if sample else len(cases), config.getoption("--cases") or len(cases)]
+        for item in set(cases) - set(_spread(cases, min(limits))):
+            item.add_marker("slow")
+
+
+def _spread(cases: list[pytest.Item], count: int) -> list[pytest.Item]:
+    """`count` of the cases, evenly spaced, the first and the last among them."""
+    if count >= len(cases):
+        return cases
+    return [cases[round(k * (len(cases) - 1) / max(count - 1, 1))] for k in range(count)]
 
 
 @pytest.fixture(scope="session")
@@ -69,15 +102,25 @@ def shared() -> Path:
     return folder
 
 
+CACHE = Path(__file__).parents[1] / ".cache"
+DAYS_KEPT = 3
+
+
 @pytest.fixture(scope="session", autouse=True)
-def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """One folder of tables for a run and all its workers, apart from the user's."""
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
-    folder.mkdir(exist_ok=True)
+def cache_folder() -> Iterator[Path]:
+    """One folder of tables for all runs and their workers, apart from the user's.
+
+    A table's name contains the hash of the code that made it, so a table of other code is never read.
+    """
+    CACHE.mkdir(exist_ok=True)
+    oldest = time.time() - DAYS_KEPT * 86400
+    for file in CACHE.iterdir():
+        with contextlib.suppress(OSError):  # another worker was first
+            if file.is_file() and file.stat().st_mtime < oldest:
+                file.unlink()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GONIO_CACHE", str(folder))
-        yield folder
+        patch.setenv("GONIO_CACHE", str(CACHE))
+        yield CACHE
 
 
 @pytest.fixture

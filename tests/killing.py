@@ -74,7 +74,7 @@ KINDS = {
         "--vary",
         "shapes.*.material.albedo=.2,.4,.6,.8",
     ],
-    "bake": ["bake", "ggx", "-o", "{out}", "--size", "{size}"],
+    "bake": ["bake", "ggx", "-o", "{out}", "--resolution", "{size}"],
 }
 
 

@@ -15,8 +15,16 @@ from gonio.pictures import images
 
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "bake": go.bake,
+    "capture": go.capture,
     "compare": go.compare,
+    "compensation": go.compensation,
+    "compress": go.compress,
+    "convert": go.convert,
     "emit": emit,
+    "explain": go.explain,
+    "fit": go.fit,
+    "info": go.info,
+    "measure": go.measure,
     "plot": go.plot,
     "render": render,
     "study": go.study,
@@ -25,9 +33,16 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
 CREW = {"workers", "cluster"}  # in a program: with go.cluster(...)
-ONLY_TYPED = {"verify": {"at", "github"}, "emit": {"output", "bundle"}}
+ONLY_TYPED = {
+    "verify": {"at", "github"},
+    "emit": {"output"},
+    "fit": {"data", "scene", "spp", "output"},  # the scene is for go.fit_picture
+    "capture": {"next_", "output"},  # methods of what is returned
+    "compensation": {"model"},
+}
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
+OTHER_DEFAULTS |= {"convert exposure", "capture free", "fit free", "fit model"}
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))
@@ -78,17 +93,17 @@ def test_a_study_is_shown_and_saved(tmp_path: Path, scene: Path) -> None:
 
 
 def test_a_trial_takes_the_command_lines_options(tmp_path: Path) -> None:
-    report = go.verify("lambert", quick=True, law="reciprocity", sweep="albedo=0.1,0.5", report=tmp_path / "r")
+    report = go.verify("lambert", quick=True, law="reciprocity", vary="albedo=0.1,0.5", output=tmp_path / "r")
     assert len(report.cards) == 2 and report.passed and (tmp_path / "r/report.html").is_file()
     assert "reciprocity" in report._repr_html_() and "<pre>" in report._repr_html_()
     with pytest.raises(InputError, match="quick and deep"):
         go.verify("lambert", quick=True, deep=True)
     with pytest.raises(InputError, match="sweep of a Python object"):
-        go.verify(go.Lambert(), sweep="albedo=0.1,0.5")
+        go.verify(go.Lambert(), vary="albedo=0.1,0.5")
 
 
 def test_tables_and_albedos_are_shown_in_notebooks() -> None:
-    shown = go.bake("ggx", size=4, lut=["E"])._repr_html_()
+    shown = go.bake("ggx", resolution=4, lut=["E"])._repr_html_()
     assert "4 roughness x 4 mu" in shown and "smith-correlated" in shown
     albedo = go.albedo(go.Lambert(0.3), mu=[0.2, 1.0])
     assert albedo._repr_html_().count("<td>0.3  0.3  0.3</td>") == 2
@@ -98,9 +113,22 @@ def test_tables_and_albedos_are_shown_in_notebooks() -> None:
 
 def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    baked = go.bake("ggx", size=4, lut=["E"])
+    baked = go.bake("ggx", resolution=4, lut=["E"])
     assert baked.arrays["E"].shape == (4, 4) and list(tmp_path.iterdir()) == []
-    assert go.bake("conductor(preset=Au)", size=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
+    assert go.bake("conductor(preset=Au)", resolution=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
     for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "without parameters")):
         with pytest.raises(InputError, match=message):
             go.bake(target)
+
+
+def test_what_the_command_line_tells_is_there_in_python(tmp_path: Path) -> None:
+    assert go.explain("ggx").text().startswith("ggx (")
+    assert go.explain("conductor").as_dict()["name"] == "conductor" and "families" in str(go.explain()).lower()
+    images.write(tmp_path / "a.exr", np.full((4, 4, 3), 4.0, np.float32))
+    with pytest.warns(GonioWarning, match="clip"):
+        picture = go.convert(tmp_path / "a.exr", tmp_path / "a.png")
+    assert picture.as_dict() == {"output": str(tmp_path / "a.png"), "exposure": 0.0, "notice": picture.notices[0]}
+    (tmp_path / "m.json").write_text('{"type": "lambert", "albedo": 0.5}')
+    assert list(go.info(tmp_path / "m.json")) == ["path", "materials"]
+    with pytest.raises(InputError):
+        go.info(tmp_path / "a.png")

@@ -106,7 +106,7 @@ def test_directions_and_random_numbers_that_are_none_are_refused() -> None:
         GOLD.sample([0.0, 0.0, 0.0], [0.5, 0.5, 0.5])
     with pytest.raises(InputError, match="length nan"):
         GOLD.eval(W, [NAN, 0.0, 1.0])
-    with pytest.raises(InputError, match=r"outside of \[0, 1\]"):
+    with pytest.raises(InputError, match=r"outside \[0, 1\]"):
         GOLD.sample(W, np.full((2, 3), NAN))
     with pytest.raises(InputError, match="complex"):
         GOLD.eval(W + 0j, W)

@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import gonio as go
 import numpy as np
@@ -28,6 +29,9 @@ from gonio.transport import passes
 from gonio.transport.polarizer import PolarizedRender
 from gonio.work import crew, facts, parts
 from gonio.work.cluster import Cluster
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
 
 pytest.importorskip("distributed")
 
@@ -93,16 +97,17 @@ def test_a_picture_has_the_same_bits(
 def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_path: Path) -> None:
     vary = {"shapes.0.material.p": [4, 16]}
     alone = go.study(scene, vary, spp=3)
-    table = go.bake("ggx", size=12, seed=1)
+    table = go.bake("ggx", resolution=12, seed=1)
     parts.Parts("none").clear()
     os.environ["GONIO_CACHE"] += "-anew"
     with crew.working(two):
         together = go.study(scene, vary, spp=3)
-        other = go.bake("ggx", size=12, seed=1)
+        other = go.bake("ggx", resolution=12, seed=1)
     assert together._repr_png_() == alone._repr_png_()
     assert all(np.array_equal(table.arrays[name], other.arrays[name]) for name in table.arrays)
 
 
+@pytest.mark.slow
 def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
     two: Cluster, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -197,7 +202,11 @@ def test_another_version_is_refused_by_name(two: Cluster, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(
     ("given", "what"),
-    [({}, "an address or a number"), ({"workers": 0}, "0 workers"), ({"address": "tcp://127.0.0.1:1"}, "no scheduler")],
+    [({}, "an address or a number"), ({"workers": 0}, "0 workers"), ({"address": "tcp://127.0.0.1:1"}, "no scheduler")]
+    + [
+        ({"address": text}, "is no address")
+        for text in ("nonsense", "", "a b:1", "htp://a:1", "tcp://a:0", "tcp://a:99999")
+    ],
 )
 def test_a_cluster_that_cannot_be_is_one_clear_error(
     given: dict[str, object], what: str, monkeypatch: pytest.MonkeyPatch
@@ -207,6 +216,52 @@ def test_a_cluster_that_cannot_be_is_one_clear_error(
     monkeypatch.setattr(cluster, "ANSWER", 0.5)
     with pytest.raises(go.GonioError, match=what), Cluster(**given):  # type: ignore[arg-type]
         pass
+
+
+@pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\n"])
+def test_what_answers_and_is_no_scheduler_is_one_error(greeting: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gonio.work import reachable
+
+    monkeypatch.setattr(reachable, "CONNECT", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=lambda: server.accept()[0].send(greeting), daemon=True).start()
+        start = time.monotonic()
+        with pytest.raises(MachineError, match="no scheduler answers: ") as caught:
+            Cluster(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        assert time.monotonic() - start < 5.0 and len(str(caught.value).splitlines()) == 2
+
+
+@pytest.fixture
+def scheduler() -> Iterator[LocalCluster]:
+    """A scheduler that no worker has joined."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=0, processes=False, dashboard_address=None, silence_logs=50) as local:
+        yield local
+
+
+def test_a_scheduler_without_workers_is_waited_for_and_told(scheduler: LocalCluster, scene: Path) -> None:
+    with (
+        Cluster(scheduler.scheduler_address, wait=0.5),
+        pytest.warns(GonioWarning, match="no worker has joined .* yet: waiting for one, 0.5 s at most"),
+        pytest.raises(MachineError, match=r"no worker has joined the scheduler within 0\.5 s") as caught,
+    ):
+        go.render(scene, spp=2, size=(24, 16))
+    assert caught.value.code == 3
+
+
+def test_one_worker_is_a_cluster_and_of_another_version_refused(
+    scheduler: LocalCluster, scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gonio.work import worker
+
+    scheduler.scale(1)
+    with Cluster(scheduler.scheduler_address) as cluster:
+        assert cluster.remote
+        other = {**worker.about(), "version": "gonio 9.9"}
+        monkeypatch.setattr(worker, "about_or_why", lambda: other)
+        with pytest.raises(MachineError, match=r"worker .* has version gonio 9\.9"):
+            go.render(scene, spp=2, size=(24, 16))
 
 
 @pytest.mark.slow

@@ -181,6 +181,7 @@ _QUICK = {(first, *order) for first in _IMPORTS for others in [[n for n in _IMPO
           for order in (others, others[::-1])}  # fmt: skip
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "order",
     [

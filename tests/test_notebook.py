@@ -11,6 +11,7 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_lab_sheet_runs_from_top_to_bottom() -> None:
     assert len(pictures_of("lab-sheet.ipynb")) >= 11

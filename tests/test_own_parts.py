@@ -253,16 +253,17 @@ def test_other_processes_know_it_by_its_file(here: Path) -> None:
 # --------------------------------------------------------------------------- verbs
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "command",
     [
         "plot conductor -p preset=Au -p ndf=parts.py:OwnTail -o a.png",
         "emit mine.py:OwnMetal -o a.glsl",
         "emit dielectric(ndf=parts.py:OwnTail,masking=parts.py:OwnGrooves) --lang wgsl -o a.wgsl",
-        "bake ggx --masking parts.py:OwnGrooves --size 4 --lut E -o tables",
-        "bake parts.py:OwnTail --size 4 --lut E -o tables",
+        "bake ggx --masking parts.py:OwnGrooves --resolution 4 --lut E -o tables",
+        "bake parts.py:OwnTail --resolution 4 --lut E -o tables",
         "explain mine.py:OwnMetal",
-        "view kulla-conty(base=conductor(ndf=parts.py:OwnTail,preset=Au)) --export k.html",
+        "view kulla-conty(base=conductor(ndf=parts.py:OwnTail,preset=Au)) -o k.html",
         "render conductor(ndf=parts.py:OwnTail,preset=Au) --spp 1 --size 8x8 -o a.exr",
     ],
 )
@@ -296,7 +297,7 @@ def test_the_command_that_shows_a_failure_again_can_be_run(here: Path) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    ["emit sub/mine.py:OwnPower", "verify sub/mine.py:OwnPower --quick", "view sub/mine.py:OwnPower --export p"],
+    ["emit sub/mine.py:OwnPower", "verify sub/mine.py:OwnPower --quick", "view sub/mine.py:OwnPower -o p"],
 )
 def test_a_power_by_two_stars_is_one_message(here: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio(*command.split()) == 2

@@ -34,7 +34,7 @@ def _sent(number: int, module: str, *arguments: str) -> subprocess.CompletedProc
 @pytest.mark.parametrize("number", ENDING)
 @pytest.mark.parametrize("module", ["typer", "numpy"])  # while the command starts, and in the middle of a verb
 def test_a_signal_while_it_loads_is_one_line(number: signal.Signals, module: str) -> None:
-    done = _sent(number, module, "bake", "ggx", "--size", "4")
+    done = _sent(number, module, "bake", "ggx", "--resolution", "4")
     name = "Ctrl-C" if number == signal.SIGINT else number.name
     assert done.stderr == f"ended by {name}; nothing was written\n"
     assert (done.stdout, done.returncode) == ("", 128 + number)

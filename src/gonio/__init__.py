@@ -5,8 +5,8 @@
     value = gold.eval(wo, wi)            # (N, 3) arrays in, (N, 3) out
     sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
 
-Names load when first used; Dr.Jit and Mitsuba load when something is first computed. A libLLVM for them is chosen here,
-so that `import drjit` and `import mitsuba` work after this, and before it too.
+Names are loaded on first use; Dr.Jit and Mitsuba are loaded by the first computation. Importing Gonio chooses a libLLVM
+for Dr.Jit, so that `import drjit` and `import mitsuba` work before and after it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from . import llvm, moved
 from ._version import __version__ as __version__
 from .errors import MachineError
 
-# Before Dr.Jit looks for one. Where there is none, whoever computes on the CPU says so; a GPU does without.
+# Must run before Dr.Jit searches for a libLLVM. Without one the first CPU computation fails; a GPU needs none.
 with contextlib.suppress(MachineError):
     llvm.use()
 
@@ -35,7 +35,7 @@ _PLACES = {
     "optics.ndf": ("NDF", "Stretched"),
     "optics.masking": ("Masking",),
     "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
-    # what a material of one's own is written with
+    # for user-defined materials
     "material": (
         *("Angle", "BSDF", "KnownViolation", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
         *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number"),
@@ -48,6 +48,7 @@ _PLACES = {
     "energy": ("Albedo", "albedo"),
     "instruments.capture.run": ("capture",),
     "instruments.goniometer.run": ("measure",),
+    "instruments.pictures": ("fit_picture",),
     "render": ("render", "resume"),
     "render.tables": ("bake",),
     "shaders": ("emit",),
@@ -57,7 +58,11 @@ _PLACES = {
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
+    "viewer.compensations": ("compensation",),
     "viewer.contact_sheet": ("study",),
+    "viewer.conversion": ("convert",),
+    "viewer.description": ("info",),
+    "viewer.explanation": ("explain",),
     "viewer.widget": ("view",),
     "work.cluster": ("Cluster",),
 }
@@ -73,6 +78,7 @@ if TYPE_CHECKING:
     from .fitting.fit import fit
     from .instruments.capture.run import capture
     from .instruments.goniometer.run import measure
+    from .instruments.pictures import fit_picture
     from .material import BSDF, KnownViolation, Parameter, Preset, Sample, method, model, models, never
     from .material.parameters import (
         Angle,
@@ -124,21 +130,25 @@ if TYPE_CHECKING:
     from .transport.integrators import Integrator
     from .verify import verify
     from .verify.laws import Law
+    from .viewer.compensations import compensation
     from .viewer.contact_sheet import study
+    from .viewer.conversion import convert
+    from .viewer.description import info
     from .viewer.error_map import compare
+    from .viewer.explanation import explain
     from .viewer.panels import Panel
     from .viewer.plots import plot
     from .viewer.widget import view
     from .work.cluster import Cluster
     from .work.cluster import Cluster as cluster
 
-    material = _notation.material  # after `from .material`, which type checkers take to bind the subpackage
+    material = _notation.material  # after `from .material`, which type checkers read as the subpackage
 
 
 if not TYPE_CHECKING:  # a type checker would accept every misspelt name
 
     class _Gonio(ModuleType):
-        """A module whose public functions stay what they are when a subpackage of the same name is imported."""
+        """A module whose public functions are not replaced when a subpackage of the same name is imported."""
 
         def __setattr__(self, name: str, value: object) -> None:
             if not (name in _FLAT and isinstance(value, ModuleType)):
@@ -158,7 +168,7 @@ if not TYPE_CHECKING:  # a type checker would accept every misspelt name
         class_name = _ALIASES.get(name, name)
         if class_name in _FLAT:
             return __getattr__(class_name)
-        if class_name.islower():  # a submodule that is being imported, no material
+        if class_name.islower():  # a submodule that is being imported, not a material
             raise AttributeError(f"module 'gonio' has no attribute '{name}'")
         for cls in __getattr__("models")().values():
             if cls.__name__ == class_name:
@@ -229,16 +239,21 @@ __all__ = [
     "choice",
     "cluster",
     "compare",
+    "compensation",
     "compress",
+    "convert",
     "emit",
+    "explain",
     "file",
     "fit",
+    "fit_picture",
     "fits",
     "flag",
     "fresnel",
     "get_precision",
     "index",
     "indices",
+    "info",
     "material",
     "materials",
     "measure",

@@ -1,12 +1,12 @@
-"""What callers from Python hand over, held against what a function's annotations promise.
+"""Checks the arguments of public functions against their annotations.
 
     @checked
     def bake(target: str | Path, size: int = 128, aspect: float | None = None): ...
 
     bake("ggx", size="4")      # InputError: size: '4' given, a whole number expected
 
-Told by annotation, once for all: None, bool, int, float, str, Path, BSDF, ArrayLike, tuple, Sequence and Mapping of
-these. An annotation of another kind is left to the function. Whole numbers come out as `int`, be they NumPy's.
+The supported annotations are None, bool, int, float, str, Path, BSDF, ArrayLike, and tuple, Sequence and Mapping of
+these. Arguments with other annotations are not checked. Integers, NumPy's included, are converted to `int`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import inspect
 import math
 import operator
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import ParamSpec, TypeAlias, TypeVar
 
@@ -23,14 +24,14 @@ from .errors import InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
-# gives the value as the function is to have it; ValueError where it is wrong
+# returns the converted value; raises ValueError if it is wrong
 Check: TypeAlias = Callable[[object], object]
 
-_SHOWN = 60  # letters of a wrong value
+_SHOWN = 60  # characters of a wrong value
 
 
 def checked(call: Callable[P, R]) -> Callable[P, R]:
-    """The function, which raises InputError where an argument is not what its annotation says."""
+    """Wrap a function so that it raises InputError for an argument that does not match its annotation."""
     signature = inspect.signature(call)
     kinds = {name: _check_of(str(p.annotation)) for name, p in signature.parameters.items()}
     several = {name for name, p in signature.parameters.items() if p.kind == p.VAR_POSITIONAL}
@@ -51,18 +52,38 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
     return guarded
 
 
+def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function that takes former names of keywords too, with a DeprecationWarning: `@renamed(former="present")`."""
+
+    def decorate(call: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(call)
+        def translated(*args: P.args, **kwargs: P.kwargs) -> R:
+            for former, present in names.items():
+                if former in kwargs:
+                    if present in kwargs:
+                        raise InputError(f"both {former} and {present} given", call.__name__, f"give {present} alone")
+                    text = f"{call.__name__}: {former} is now {present}"
+                    warnings.warn(text, DeprecationWarning, stacklevel=2)
+                    kwargs[present] = kwargs.pop(former)
+            return call(*args, **kwargs)
+
+        return translated
+
+    return decorate
+
+
 def shown(value: object) -> str:
-    """A value as an error shows it: short, and printable everywhere."""
+    """A value as error messages show it: short, and printable in every encoding."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
 
-# ---------------------------------------------------------------------- one kind each
+# ---------------------------------------------------------------------- checks of single values
 
 
-def whole(value: object) -> int:
-    """A whole number, Python's or NumPy's; True is none."""
-    import numpy as np  # here, as below: `gonio --help` loads this file, and has no use for NumPy
+def integer(value: object) -> int:
+    """A Python or NumPy integer as `int`; booleans are rejected."""
+    import numpy as np  # imported here, as below, because `gonio --help` loads this file and does not need NumPy
 
     if isinstance(value, bool | np.bool_):
         raise ValueError
@@ -73,7 +94,7 @@ def whole(value: object) -> int:
 
 
 def number(value: object) -> object:
-    """A number that is one: not NaN, no text."""
+    """A scalar number; NaN and text are rejected."""
     import numpy as np
 
     if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
@@ -141,7 +162,7 @@ def _of_class(name: str) -> Check:
 _KINDS: dict[str, tuple[Check, str]] = {
     "None": (_nothing, ""),
     "bool": (_flag, "True or False"),
-    "int": (whole, "a whole number"),
+    "int": (integer, "a whole number"),
     "float": (number, "a number"),
     "str": (_text, "a text"),
     "Path": (_of_class("Path"), "a path"),
@@ -153,13 +174,13 @@ _KINDS: dict[str, tuple[Check, str]] = {
 
 @functools.cache
 def _check_of(annotation: str) -> Check | None:
-    """The check of an annotation; None for one that says nothing known."""
+    """The check of an annotation; None for an annotation that is not supported."""
     options = []
     for part in _alternatives(annotation):
-        found = _one(part)
-        if found is None:
+        option = _one(part)
+        if option is None:
             return None
-        options.append(found)
+        options.append(option)
     expected = " or ".join(words for _, words in options if words)
 
     def check(value: object) -> object:
@@ -174,7 +195,7 @@ def _check_of(annotation: str) -> Check | None:
 
 
 def _alternatives(annotation: str) -> list[str]:
-    """The types of an annotation, split at the bars outside of brackets."""
+    """The alternatives of an annotation: split at each `|` outside brackets."""
     parts, depth = [""], 0
     for letter in annotation:
         depth += (letter == "[") - (letter == "]")

@@ -1,7 +1,7 @@
-"""One family of errors and warnings, each with what happened, where, and what to do about it.
+"""The family of errors and warnings: each says what happened, where, and what to do about it.
 
-Every message that a user can cause is a `GonioError`: the command line prints it in three lines and
-exits with `code`, Python users catch one class.
+Every error that a user can cause is a `GonioError`: the command line prints it in three lines and exits with `code`;
+Python programs catch one class.
 """
 
 from __future__ import annotations
@@ -9,23 +9,27 @@ from __future__ import annotations
 import os
 import re
 
-_ENDLESS = re.compile(r"\d{50,}")  # far beyond the 17 that a double keeps
+_ENDLESS = re.compile(r"\d{50,}")  # a double has 17 significant digits
 
 
 def printable(text: str) -> str:
-    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes.
+    """The text with characters that cannot be encoded, such as invalid UTF-8 in a file name, written as escapes.
 
-    Of a number that fills the screen its beginning is left.
+    Numbers with very many digits are shortened.
     """
-    readable = text.encode("utf-8", "backslashreplace").decode()
-    return _ENDLESS.sub(lambda number: f"{number[0][:20]}... ({len(number[0])} digits)", readable)
+    return _ENDLESS.sub(lambda number: f"{number[0][:20]}... ({len(number[0])} digits)", encodable(text))
+
+
+def encodable(text: str) -> str:
+    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 class GonioError(Exception):
-    """Something the user can put right.
+    """An error that the user can correct.
 
-    what   what is wrong, with the value that was given and what was expected
-    where  file and JSON pointer, option, or argument; empty where there is none
+    what   what is wrong: the given value and what was expected
+    where  file and JSON pointer, option, or argument; may be empty
     hint   what to do about it
     """
 
@@ -43,21 +47,21 @@ class GonioError(Exception):
 
 
 class InputError(GonioError, ValueError):
-    """A scene, parameter, option or file that cannot be used as it stands."""
+    """A scene, parameter, option or file that cannot be used as given."""
 
 
 class MachineError(GonioError):
-    """The machine lacks something: no LLVM, no GPU, a full disk."""
+    """A missing resource of the machine: no LLVM, no GPU, a full disk."""
 
     code = 3
 
 
 class GonioWarning(UserWarning):
-    """Odd but usable input; the text says what is assumed."""
+    """Unusual but usable input; the text says what is assumed."""
 
 
 def did_you_mean(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A hint that names the nearest known spelling, or lists what is known."""
+    """A hint that suggests the closest known name, or lists the known names."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, known, n=1, cutoff=0.55)
@@ -66,16 +70,16 @@ def did_you_mean(name: str, known: list[str] | tuple[str, ...]) -> str:
     return "known: " + ", ".join(sorted(known))
 
 
-# --------------------------------------------------------------------------- errors in code of the user's
+# --------------------------------------------------------------------------- errors in user code
 
 _OWN = os.path.dirname(__file__)
 _LIBRARIES = (os.path.dirname(os.__file__), f"{os.sep}site-packages{os.sep}", f"{os.sep}dist-packages{os.sep}")
-_IN_LOOP = "encountered an exception (see above)"  # what Dr.Jit makes of any exception while it records a loop
+_IN_LOOP = "encountered an exception (see above)"  # Dr.Jit's text for any exception raised while it records a loop
 
 
 def user_line(error: BaseException) -> str:
-    """FILE:LINE of the innermost call in code that Gonio called, of neither its own nor a library's; "" where there is
-    none. The program that calls Gonio is not meant."""
+    """FILE:LINE of the innermost frame in user code called by Gonio (neither Gonio's own nor a library's); "" if there
+    is none. The program that calls Gonio does not count as user code."""
     cause: BaseException | None = error
     while cause is not None:
         within, line = False, ""
@@ -94,23 +98,21 @@ def user_line(error: BaseException) -> str:
 
 
 def summary(error: BaseException) -> str:
-    """The type and the first line of the text of an exception."""
+    """The exception's type and the first line of its text."""
     text = str(error).strip().partition("\n")[0]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def in_user_code(error: BaseException) -> InputError | None:
-    """An exception that came up in code of the user's, with its line; None where no such code was called."""
+    """An InputError for an exception raised in user code, with its line; None if no user code was called."""
     line = user_line(error)
     return (
-        InputError(summary(error), line, "mend it there: formulas are written in the words of gonio.ops")
-        if line
-        else None
+        InputError(summary(error), line, "correct it there: formulas use the functions of gonio.ops") if line else None
     )
 
 
 def out_of_loop(error: BaseException) -> BaseException:
-    """What went wrong, where Dr.Jit only says that something did while it recorded a loop; else the error itself."""
+    """The exception that Dr.Jit replaced by a generic one while it recorded a loop; any other error unchanged."""
     cause: BaseException | None = error
     while isinstance(cause, RuntimeError) and _IN_LOOP in str(cause):
         cause = cause.__cause__ or cause.__context__

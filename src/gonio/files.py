@@ -1,33 +1,51 @@
-"""Files and folders that appear whole or not at all."""
+"""Atomic writes of files and folders."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import shutil
 import tempfile
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NoReturn
 
-from .errors import InputError, MachineError
+from .errors import GonioError, InputError, MachineError
+
+MAX_NAME = 255  # bytes of a file's name, on nearly all file systems
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def check_current_folder() -> None:
+    """Raise InputError where the current folder has been deleted: libraries in C++ end the process then."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise InputError(f"no current folder: {_reason(error)}", "", "cd to a folder that exists") from None
 
 
 def check_file(path: str | Path) -> Path:
     """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
-    target = Path(path).expanduser()
+    target = Path(os.path.expanduser(path))
     try:
         if target.is_symlink():
             target = target.resolve()
         looped = target.is_symlink()  # from Python 3.13 on; before, it raises
-    except (OSError, RuntimeError):
+    except RuntimeError:
         looped = True
+    except (OSError, ValueError) as error:
+        looped = getattr(error, "errno", None) == errno.ELOOP
+        if not looped:
+            raise InputError(f"no usable file name: {_reason(error)}", str(path), "choose another name") from None
     if looped:
-        raise InputError("this is a loop of links", str(path), "remove it, or choose another name")
+        raise InputError("this symbolic link points to itself", str(path), "remove it, or choose another name")
     folder = target.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         hint = f"mkdir -p '{folder}', or choose another"
         raise InputError(f"the folder '{folder}' does not exist", str(path), hint)
-    if target.is_dir():
+    if os.path.isdir(target):
         raise InputError("this is a folder, expected a file name", str(path), "name a file, such as a.exr")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"no permission to write in '{folder}'", str(path), "choose another folder with -o")
@@ -36,12 +54,12 @@ def check_file(path: str | Path) -> Path:
 
 def check_folder(folder: str | Path) -> Path:
     """The folder, if it exists or can be made where it is named; InputError before anything is computed where not."""
-    folder = Path(folder).expanduser()
-    if not folder.is_dir():
-        if folder.exists():
+    folder = Path(os.path.expanduser(folder))
+    if not os.path.isdir(folder):
+        if os.path.exists(folder):
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
         check_file(folder)
-        try:  # a folder that claims to be writable need not be
+        try:  # a folder that is reported as writable may still refuse
             folder.mkdir()
             folder.rmdir()
         except OSError as error:
@@ -53,78 +71,134 @@ def check_folder(folder: str | Path) -> Path:
     return folder
 
 
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def with_ending(path: Path, ending: str, start: str = "") -> Path:
+    """The path of a file beside `path`: its name with `start` before and `ending` behind.
+
+    A name that would be longer than file systems allow is cut, and has a sum of the whole name in its place.
+    """
+    if not path.name:  # "." or "/"
+        return path / (start + ending)
+    name, room = os.fsencode(path.name), MAX_NAME - len(os.fsencode(start + ending))
+    if len(name) > room:
+        name = name[: room - 9] + f"-{zlib.crc32(name):08x}".encode()
+    return path.with_name(start + os.fsdecode(name) + ending)
+
+
 def write_whole(
     path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True, durable: bool = True
 ) -> Path:
-    """Write a file so that at every moment `path` is the old one or the whole new one.
+    """Write a file atomically: at every moment `path` is either the old file or the complete new one.
 
     content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
     durable  force it to the disk first, so that not even a power cut leaves half of it
-    rescue   where it cannot be written, write it to the temporary folder, so that hours of work are not lost
-    Raises MachineError where the disk is full, which says where the content is; nothing of it is left beside `path`.
+    rescue   where it cannot be written, write it elsewhere, so that hours of work are not lost: in a new folder beside
+             it, in the current folder or among the temporary files
+    Raises MachineError where it cannot be written, InputError where the path cannot be a file's. The error says where
+    the content is; nothing of it is left as `path`.
     """
-    target = check_file(path)
-    # In the same folder, hence on the same file system, where a rename is one step.
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
+
+    def fill(file: Path) -> None:
         if callable(content):
-            content(temporary)
-            if durable:
-                with open(temporary, "rb") as file:
-                    os.fsync(file.fileno())
+            content(file)
         else:
-            with open(temporary, "wb") as file:
-                file.write(content)
-                file.flush()
-                if durable:
-                    os.fsync(file.fileno())  # a full disk can show itself as late as here
+            file.write_bytes(content)
+
+    try:
+        target = check_file(path)
+    except InputError as error:
+        if not rescue:
+            raise
+        _rescue(error, Path(path), fill)
+    # In the same folder, hence on the same file system, where a rename is one step.
+    suffix = target.suffix if len(target.suffix) <= 16 else ""
+    temporary = with_ending(target, f".{os.getpid()}.part{suffix}", ".")
+    try:
+        fill(temporary)
+        if durable:
+            with open(temporary, "rb") as file:
+                os.fsync(file.fileno())  # a full disk can show itself as late as here
         os.replace(temporary, target)
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
-        kept = _rescued(target.name, content) if rescue else None
-        hint = "free some space, or choose another folder with -o; nothing was written"
-        raise MachineError(what, str(path), f"it is kept as {kept}: move it from there" if kept else hint) from error
+        failure = _failure(error, path)
+        if not rescue:
+            raise failure from error
+        _rescue(failure, target, fill, elsewhere=error.errno in _FULL)
     finally:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
     return target
 
 
-def _rescued(name: str, content: bytes | Callable[[Path], None]) -> Path | None:
-    """The file in a folder of its own among the temporary ones, None where there is no room either."""
-    folder = None
-    try:
-        folder = Path(tempfile.mkdtemp(prefix="gonio-"))
-        if callable(content):
-            content(folder / name)
-        else:
-            (folder / name).write_bytes(content)
-        return folder / name
-    except OSError:
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        return None
+def _failure(error: OSError, path: str | Path) -> MachineError:
+    what = "the disk is full" if error.errno in _FULL else f"cannot write: {error.strerror or error}"
+    hint = "free some space, or choose another folder with -o; nothing was written"
+    return MachineError(what, str(path), hint)
+
+
+def _remove(file: Path) -> None:
+    with contextlib.suppress(OSError):  # its folder may be gone: this must not hide where the content is
+        file.unlink()
+
+
+def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], elsewhere: bool = False) -> NoReturn:
+    """Raise the failure, with the place where the content lies now.
+
+    fill       makes the file, or the folder, of the name that it is given
+    elsewhere  do not try beside the target: its disk is full
+    """
+    place = keep_elsewhere(target, fill, elsewhere)
+    hint = failure.hint if place is None else f"it is kept as {place}: move it from there"
+    raise type(failure)(failure.what, failure.where, hint)
+
+
+def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool = False) -> Path | None:
+    """The file or folder that `fill` made, with the target's name, in a new folder: beside the target, in the current
+    folder or among the temporary files; None where there is no room in any.
+
+    elsewhere  not beside the target: its disk is full
+    """
+    places: list[Callable[[], str | Path]] = [lambda: target.parent, Path.cwd, tempfile.gettempdir]
+    for place in places[1:] if elsewhere else places:
+        folder = None
+        try:
+            folder = Path(tempfile.mkdtemp(prefix="gonio-", dir=place()))
+            file = folder / (with_ending(target, "").name if target.name else "files")
+            fill(file)
+            return file
+        except OSError:
+            if folder is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+    return None
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files."""
-    part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")
-    try:
-        part.mkdir()
+    """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files.
+
+    Raises MachineError where it cannot be written, which says where its files are instead.
+    """
+
+    def fill(into: Path) -> None:
+        into.mkdir()
         for name, content in files.items():
-            with open(part / name, "wb") as file:
+            with open(into / name, "wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
+
+    part = None
+    try:
+        part = with_ending(folder.absolute(), f".{os.getpid()}.part", ".")
+        fill(part)
         if not folder.exists():
             os.replace(part, folder)
         else:
             for name in files:
                 os.replace(part / name, folder / name)
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
-        kind = MachineError if full else InputError
-        raise kind(what, str(folder), "nothing was written; choose another folder with -o") from error
+        _rescue(_failure(error, folder), folder, fill, elsewhere=error.errno in _FULL)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        if part is not None:
+            shutil.rmtree(part, ignore_errors=True)

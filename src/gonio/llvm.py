@@ -1,9 +1,9 @@
-"""Find a libLLVM that Dr.Jit can use, before Dr.Jit looks for one itself.
+"""Selects a libLLVM that Dr.Jit can use, before Dr.Jit searches for one.
 
-Dr.Jit ships no LLVM. When it is imported it loads the one that DRJIT_LIBLLVM_PATH names, else the first it finds. With
-LLVM 14, 15 and 16 Mitsuba 3.9 aborts the whole process ("Cannot select fminimum"), and an abort cannot be caught. So
-`import gonio` names one that works. Versions are read from the files, without loading them: every libLLVM carries its
-version as a symbol-version string such as `LLVM_19.1`.
+Dr.Jit does not ship LLVM. When imported, it loads the library named by DRJIT_LIBLLVM_PATH, or else the first it finds.
+With LLVM 14, 15 and 16, Mitsuba 3.9 aborts the process ("Cannot select fminimum"), and an abort cannot be caught.
+Therefore `import gonio` selects one that works. Versions are read from the files without loading them: every libLLVM
+contains its version as a symbol-version string such as `LLVM_19.1`.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _SYSTEM_FOLDERS = (
     "/usr/local/opt/llvm/lib",
 )
 
-# Mitsuba's kinds of objects that Dr.Jit numbers; `jit_registry_id_bound` tells whether one of them is alive.
+# Mitsuba's classes that Dr.Jit registers; `jit_registry_id_bound` tells whether any instance is alive.
 _REGISTERED = ("BSDF", "Emitter", "Medium", "Mesh", "PhaseFunction", "Sensor", "Shape", "Texture")
 
 
 class Library(NamedTuple):
-    """A libLLVM: where it is, its version ("" where the file names none) and who provided it."""
+    """A libLLVM: its path, its version ("" if the file names none) and its source."""
 
     path: Path
     version: str
@@ -51,7 +51,7 @@ class Library(NamedTuple):
 
 
 def read_version(path: Path) -> str:
-    """The version of the libLLVM at `path`, "" where it is none; the file is read, not loaded."""
+    """The version of the libLLVM at `path`, "" if it is not one; the file is read, not loaded."""
     try:
         with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
             match = re.search(rb"\0LLVM_(\d+(?:\.\d+)?)\0", text)
@@ -59,38 +59,38 @@ def read_version(path: Path) -> str:
                 return match[1].decode()
     except (OSError, ValueError):  # missing, unreadable or empty
         return ""
-    # macOS and Windows builds carry no version nodes; their file names do.
+    # macOS and Windows builds have no version symbols; their file names contain the version.
     match_name = re.search(r"LLVM[-.](?:so\.|C\.)?(\d+(?:\.\d+)?)", path.resolve().name)
     return match_name[1] if match_name else ""
 
 
 def _wheel() -> list[Path]:
-    """Those of installed wheels."""
+    """The libraries of installed wheels."""
     places = (("lib", "libLLVM*.so*"), ("lib", "libLLVM*.dylib"), ("bin", "LLVM-C*.dll"))
     prefixes = dict.fromkeys((sys.prefix, sys.base_prefix))
     return [path for prefix in prefixes for folder, name in places for path in sorted(Path(prefix, folder).glob(name))]
 
 
 def _system() -> list[Path]:
-    """Those of the system."""
+    """The system's libraries."""
     from ctypes.util import find_library
 
     names = ("libLLVM*.so*", "libLLVM*.dylib")
-    found = [path for folder in _SYSTEM_FOLDERS for name in names for path in sorted(Path(folder).glob(name))]
-    found += sorted(Path("/usr/lib").glob("llvm-*/lib/libLLVM*.so*"))
+    paths = [path for folder in _SYSTEM_FOLDERS for name in names for path in sorted(Path(folder).glob(name))]
+    paths += sorted(Path("/usr/lib").glob("llvm-*/lib/libLLVM*.so*"))
     by_linker = find_library("LLVM")
-    return [*found, Path(by_linker)] if by_linker and os.path.isabs(by_linker) else found
+    return [*paths, Path(by_linker)] if by_linker and os.path.isabs(by_linker) else paths
 
 
 def _ranked(paths: list[Path], source: str) -> list[Library]:
-    """One entry a file, the newest first."""
+    """One entry per file, newest first."""
     files = dict.fromkeys(path.resolve() for path in paths)
-    found = [Library(path, read_version(path), source) for path in files]
-    return sorted(found, key=lambda library: -float(library.version or 0))
+    ranked = [Library(path, read_version(path), source) for path in files]
+    return sorted(ranked, key=lambda library: -float(library.version or 0))
 
 
 def _in_order() -> Iterator[Library]:
-    """The environment's, the wheel's, the system's; each is looked for when the one before was not enough."""
+    """The environment's, then the wheel's, then the system's libraries; each source is searched only when needed."""
     given = os.environ.get(VARIABLE)
     if given:
         yield from _ranked([Path(given)], "environment")
@@ -99,22 +99,21 @@ def _in_order() -> Iterator[Library]:
 
 
 def libraries() -> list[Library]:
-    """Every libLLVM in reach, one entry a file, in the order in which they are tried."""
-    seen: dict[Path, Library] = {}
+    """Every available libLLVM, one entry per file, in the order in which they are tried."""
+    unique: dict[Path, Library] = {}
     for library in _in_order():
-        # `use` writes the wheel's path into the environment: it stays the wheel's
-        first = seen.setdefault(library.path, library)
-        seen[library.path] = first._replace(source=library.source)
-    return list(seen.values())
+        # `use` writes the wheel's path into the environment; its source is still the wheel
+        first = unique.setdefault(library.path, library)
+        unique[library.path] = first._replace(source=library.source)
+    return list(unique.values())
 
 
 def use() -> Library:
-    """Choose the first usable libLLVM and see to it that Dr.Jit uses it; `import gonio` does so.
+    """Choose the first usable libLLVM and make Dr.Jit use it; called by `import gonio`.
 
-    Dr.Jit loads its libLLVM when it is imported. Where a program has imported it before Gonio and it took one that is
-    too old, it is made to load another, as long as nothing has been computed and no object of Mitsuba's is alive.
-    Where the environment names one that cannot be used, the next is taken, with a warning. Raises MachineError where
-    nothing fits.
+    Dr.Jit loads its libLLVM when it is imported. If it was imported before Gonio and loaded one that is too old, it is
+    restarted with another, provided that nothing has been computed and no Mitsuba object is alive. If the environment
+    names an unusable library, the next one is used, with a warning. Raises MachineError if no usable library exists.
     """
     loaded = _loaded()
     if loaded is not None and loaded.usable:
@@ -140,7 +139,7 @@ def use() -> Library:
 
 
 def _loaded() -> Library | None:
-    """The libLLVM that Dr.Jit has loaded, of version "" where it found none; None where Dr.Jit is not imported."""
+    """The libLLVM that Dr.Jit has loaded, with version "" if it found none; None if Dr.Jit is not imported."""
     dr = sys.modules.get("drjit")
     if dr is None:
         return None
@@ -149,11 +148,11 @@ def _loaded() -> Library | None:
 
 
 def _exchange() -> bool:
-    """Let Dr.Jit shut down and start again with the libLLVM that the environment names now; whether it did.
+    """Restart Dr.Jit with the libLLVM that the environment names now; returns whether it was restarted.
 
-    It is left alone where kernels have run, a GPU holds values, or objects of Mitsuba's are alive: these would be lost.
-    Dr.Jit offers this to C++ only, by the names that Linux and macOS give to `jit_shutdown(int)` and so on. Having
-    found no libLLVM at first, it looks for none again.
+    Dr.Jit is not restarted if kernels have run, a GPU holds values, or Mitsuba objects are alive: they would be lost.
+    Dr.Jit offers this to C++ only, under the mangled names that Linux and macOS give to `jit_shutdown(int)` etc. If it
+    found no libLLVM on import, it does not search again.
     """
     import ctypes
 
@@ -165,7 +164,7 @@ def _exchange() -> bool:
     try:
         core = ctypes.CDLL(str(next(Path(str(dr.__file__)).parent.glob("*drjit-core.*"))))
         shutdown, start, alive = core._Z12jit_shutdowni, core._Z8jit_initj, core._Z21jit_registry_id_boundPKcS0_
-    except (AttributeError, OSError, StopIteration):  # Windows, or another Dr.Jit
+    except (AttributeError, OSError, StopIteration):  # Windows, or a different Dr.Jit
         return False
     variants = mi.variants() if mi else ()
     if any(alive(variant.encode(), kind.encode()) for variant in variants for kind in _REGISTERED):

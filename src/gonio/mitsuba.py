@@ -5,7 +5,7 @@
     import gonio.mitsuba
     bsdf = mi.load_dict({"type": "gonio_conductor", "preset": "Au", "alpha": 0.2})
 
-It does not matter which is imported first. The import sets a variant only where none is set, and registers again
+The order of the imports does not matter. The import sets a variant only if none is set, and registers the plugins again
 whenever the variant changes.
 """
 

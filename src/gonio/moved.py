@@ -1,6 +1,6 @@
-"""Import paths of Gonio 0.1 that have moved: they go on working for one release, with a warning that says where to.
+"""Import paths of Gonio 0.1 that have moved. They work for one more release, with a warning that names the new path.
 
-`_MOVED` maps a package or module to its new name; what lies below it follows. Delete after one release.
+`_MOVED` maps old packages and modules to new ones; submodules follow. Delete this file after one release.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ _MOVED = {
 
 
 def new_name(name: str) -> str:
-    """The present name of a module of 0.1; "" where it has not moved."""
+    """The present name of a module of 0.1; "" if it has not moved."""
     head, _, tail = name.removeprefix("gonio.").rpartition(".")
     if name.removeprefix("gonio.") in _MOVED:
         return "gonio." + _MOVED[name.removeprefix("gonio.")]
@@ -124,7 +124,7 @@ def new_name(name: str) -> str:
 
 
 class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds a moved module at its new place; asked last, for what is nowhere else."""
+    """Finds moved modules; it is asked last, for names that no other finder knows."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
@@ -134,7 +134,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         return importlib.machinery.ModuleSpec(name, self, is_package=True)
 
     def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
-        """The module at its new place, which then stands under both names."""
+        """The module at its new path, registered under both names."""
         new = new_name(spec.name)
         warnings.warn(f"{spec.name} is now {new}", DeprecationWarning, stacklevel=2)
         module = _Alias(spec.name)
@@ -146,7 +146,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 
 class _Alias(ModuleType):
-    """A module of 0.1: every name is looked up in the module that has taken its place."""
+    """A module of 0.1 that forwards every attribute to its replacement."""
 
     def __getattr__(self, name: str) -> object:
         if name.startswith("__"):
@@ -155,6 +155,6 @@ class _Alias(ModuleType):
 
 
 def install() -> None:
-    """Have Python ask for moved modules, after everything else."""
+    """Append the finder to Python's import system."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
         sys.meta_path.append(_Finder())

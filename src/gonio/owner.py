@@ -1,9 +1,9 @@
-"""Dr.Jit and Mitsuba have one owner at a time.
+"""One thread at a time uses Dr.Jit and Mitsuba.
 
-Both are imported step by step, have one variant for all threads, and order kernels within a thread only; our recorder
-has one stack. So every public call that computes holds `COMPUTING` until its values are there: calls from several
-threads, or by `asyncio.to_thread`, wait for each other. Who uses Dr.Jit or Mitsuba in threads beside Gonio
-holds it too:
+Both are imported lazily, have one variant for all threads, and order kernels within one thread only; the recorder
+has a single stack. Every public call that computes therefore holds `COMPUTING` until its values are available: calls
+from several threads, or through `asyncio.to_thread`, wait for each other. Code that uses Dr.Jit or Mitsuba in other
+threads must hold the lock too:
 
     from gonio.owner import COMPUTING
     with COMPUTING:
@@ -25,22 +25,22 @@ from .errors import out_of_loop
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# Plain, and taken by `with`: a lock written in Python could be left behind by a Ctrl-C between two of its lines.
+# An RLock used with `with`: a lock implemented in Python could stay locked after a Ctrl-C between two of its lines.
 COMPUTING = threading.RLock()
 
-if hasattr(os, "register_at_fork"):  # not on Windows; who held it may be a thread that the child has not
+if hasattr(os, "register_at_fork"):  # not on Windows; the lock may be held by a thread that does not exist in the child
     os.register_at_fork(after_in_child=lambda: COMPUTING._at_fork_reinit())  # type: ignore[attr-defined]
 
 
 def settle() -> None:
-    """Wait for this thread's kernels: another thread's would not wait for them."""
+    """Wait for the kernels of this thread; another thread would not wait for them."""
     dr = sys.modules.get("drjit")
     if dr is not None and hasattr(dr, "sync_thread"):
         dr.sync_thread()
 
 
-def alone(call: Callable[P, R]) -> Callable[P, R]:
-    """The function, run while no other thread computes."""
+def exclusive(call: Callable[P, R]) -> Callable[P, R]:
+    """Wrap a function so that no other thread computes while it runs."""
 
     @functools.wraps(call)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -60,10 +60,10 @@ def alone(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def forget_frames(error: BaseException) -> None:
-    """Drop the tracebacks of an exception and of its causes, and with them what Gonio's functions held.
+    """Drop the tracebacks of an exception and its causes, and the objects that Gonio's frames hold.
 
-    A notebook keeps its last exception, and would keep the scene: Dr.Jit's virtual calls go to every BSDF that is
-    alive, so that each later render would run into the same error. GONIO_DEBUG=1 keeps them for a debugger.
+    A notebook stores its last exception and with it the scene: Dr.Jit's virtual calls go to every living BSDF, so that
+    each later render would raise the same error. GONIO_DEBUG=1 preserves the frames for a debugger.
     """
     chain: BaseException | None = None if os.environ.get("GONIO_DEBUG") else error
     while chain is not None:
@@ -72,5 +72,5 @@ def forget_frames(error: BaseException) -> None:
 
 
 def public(call: Callable[P, R]) -> Callable[P, R]:
-    """A function of Gonio's that users call: its arguments are `checked`, and it runs `alone`."""
-    return alone(checked(call))
+    """Mark a public function: its arguments are `checked`, and it runs `exclusive`."""
+    return exclusive(checked(call))

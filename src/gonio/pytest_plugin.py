@@ -1,11 +1,11 @@
-"""Gonio in other people's tests: a fixture, and test items for materials that the command line names.
+"""The pytest plugin: a fixture, and test items for materials that the command line names.
 
     def test_glass(gonio_verify):
         gonio_verify("glass.py:Glass")
 
     pytest --gonio glass.py:Glass --gonio mitsuba:roughplastic --gonio-quick
 
-Every run of pytest loads this file where Gonio is installed, so it imports nothing of Gonio before it is used.
+Every pytest run loads this file if Gonio is installed, so it imports nothing of Gonio until it is used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def gonio_verify() -> Callable[..., Report]:
-    """Fail the test where a material breaks a law: gonio_verify(material or target, ...), as `check`."""
+    """Fail the test if a material breaks a law: gonio_verify(material or target, ...), as `check`."""
     return check
 
 
@@ -47,12 +47,12 @@ def check(
     breaks: Mapping[str, float] | Collection[str] = (),
     **more: Any,
 ) -> Report:
-    """The report of a material that keeps its laws; fails the test, with the report's text, where it does not.
+    """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
 
     target  a material, or a target's name as `gonio verify` takes it
     law     a law's name, or several; all where None
     breaks  laws that may be broken, by name, or with the largest figure that may be; one that holds fails the test
-    more    as `gonio.verify` takes it: deep, seed, limit, memory, isolated
+    more    as `gonio.verify` takes it: deep, seed, timeout, memory, isolated
     A material that can be sent to another process, or named, is judged there, and may crash.
     """
     __tracebackhide__ = True
@@ -64,7 +64,7 @@ def check(
     except InputError as error:
         if error.where != "isolated" or "isolated" in more:
             raise
-        report = verify(target, quick=quick, law=law, isolated=False, **more)  # a class of the test's own
+        report = verify(target, quick=quick, law=law, isolated=False, **more)  # a class local to the test
     complaints = _complaints(report, breaks)
     if complaints:
         pytest.fail("\n".join([str(report), *complaints]), pytrace=False)
@@ -72,19 +72,19 @@ def check(
 
 
 def _complaints(report: Report, breaks: Mapping[str, float] | Collection[str]) -> list[str]:
-    found = []
+    complaints = []
     broken = set()
     for verdict in report.failures:
         broken.add(verdict.law)
         if verdict.law not in breaks:
-            found.append(f"{verdict.law} is broken: {'; '.join(verdict.why)}")
+            complaints.append(f"{verdict.law} is broken: {'; '.join(verdict.why)}")
             continue
         most = breaks[verdict.law] if isinstance(breaks, Mapping) else None
         if most is not None and (verdict.figure is None or not abs(verdict.figure) <= most):
-            found.append(f"{verdict.law} is broken by {verdict.shown or 'no figure'}, and {most:g} is allowed")
+            complaints.append(f"{verdict.law} is broken by {verdict.shown or 'no figure'}, and {most:g} is allowed")
     asked = {verdict.law for card in report.cards for verdict in card.verdicts}
-    found += [f"{name} is said to be broken, and holds" for name in breaks if name in asked and name not in broken]
-    return found
+    complaints += [f"{name} is declared broken, but holds" for name in breaks if name in asked and name not in broken]
+    return complaints
 
 
 # --------------------------------------------------------------------------- --gonio
@@ -104,7 +104,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 
 class Target(pytest.Collector):
-    """A target, judged once by all its laws that were chosen."""
+    """A target, judged once against all selected laws."""
 
     def __init__(self, *, target: str, **more: Any) -> None:
         super().__init__(**more)
@@ -130,7 +130,7 @@ class Target(pytest.Collector):
 
 
 class LawItem(pytest.Item):
-    """A law of a target."""
+    """One law of a target."""
 
     parent: Target
 

@@ -1,4 +1,4 @@
-"""Canaries: each test fails once a fault of Mitsuba or Dr.Jit is mended, and its file in `bridge/faults` can go.
+"""Canaries: each test fails once a fault of Mitsuba or Dr.Jit is fixed, and its file in `bridge/faults` can go.
 
 Not here, since they would end or hang the test's process: `exr_threads` (tests/test_one_cpu.py has the workaround),
 `missing_texture`; `shape_order`, which is left to chance; `bent_normals`, a call that BSDFs do not have;
@@ -17,10 +17,10 @@ from gonio.bridge.faults.black_environment import is_black_environment
 from gonio.bridge.faults.interrupted_recording import interruptible
 from gonio.bridge.faults.lost_derivatives import own_variable
 from gonio.bridge.faults.merged_mesh_bbox import compute_boxes
+from gonio.bridge.faults.rotated_sphere_normal import with_radial_normal
 from gonio.bridge.faults.shadow_ray_gap import shadow_ray_to
 from gonio.bridge.faults.textured_area_light import must_sample_by_area
 from gonio.bridge.faults.thin_lens_importance import camera_sample
-from gonio.bridge.faults.turned_sphere_normal import with_radial_normal
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -65,7 +65,7 @@ def test_textured_area_lights_are_sampled_wrongly() -> None:
     assert means[0] != pytest.approx(means[1], rel=0.03)
 
 
-def test_a_turned_sphere_returns_the_normal_of_another() -> None:
+def test_a_rotated_sphere_returns_the_normal_of_another() -> None:
     sphere = mi.load_dict({"type": "sphere", "to_world": T().rotate([1, 0, 0], 90)})
     ps = sphere.sample_position(mi.Float(0), mi.Point2f(0.1, 0.2))
     assert abs(float(dr.dot(ps.n, ps.p)[0])) < 0.9

@@ -65,9 +65,7 @@ def _parsed(arguments: list[str]) -> dict[str, object]:
 
 def _made_by(arguments: list[str], values: dict[str, object]) -> set[str]:
     """Files that a command writes, as far as it names them."""
-    made = {str(values[name]) for name in ("output", "export") if values.get(name)}
-    if arguments[0] == "convert":
-        made.add(arguments[2])
+    made = {str(values["output"])} if values.get("output") else set()
     return made | {f"{name}.checkpoint" for name in made}
 
 
@@ -223,7 +221,7 @@ def _type(newcomer: _Newcomer, line: str) -> None:
         for following in hint:
             _type(newcomer, following)
         newcomer.activated = False  # by README's own line
-    elif words[:2] == ["gonio", "view"] and "--export" not in words:
+    elif words[:2] == ["gonio", "view"] and not {"-o", "--export"} & set(words):
         newcomer.serve(line)
     elif "65536" in words or words[:2] == ["gonio", "resume"]:  # hours
         newcomer.interrupt(line, newcomer.folder / "long.exr.checkpoint")

@@ -39,6 +39,7 @@ def test_every_verdict_on_a_plugin_has_a_grade_a_cause_and_a_program() -> None:
     assert {path.name for path in PROGRAMS} == {Path(one["program"]).name for one in FINDINGS}
 
 
+@pytest.mark.slow
 def test_every_program_shows_its_fault_without_gonio() -> None:
     made = {line.split("Mitsuba ")[1].split(",")[0] for path in PROGRAMS for line in path.read_text().splitlines()[:1]}
     assert len(made) == 1

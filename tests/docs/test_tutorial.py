@@ -79,6 +79,7 @@ def members() -> Iterator[None]:
             family.remove(name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "left_out",
     [pytest.param(AGAIN, id="what judges once"), pytest.param(set(), id="all", marks=pytest.mark.slow)],

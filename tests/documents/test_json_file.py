@@ -36,6 +36,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     "command",
     [
@@ -43,15 +44,15 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "study {} --vary a.albedo=.1,.3 --spp 1 --size 8x8 -o a.png",
         "plot {} -o a.png",
         "emit {}",
-        "bake {} --size 4 --lut E -o tables",
+        "bake {} --resolution 4 --lut E -o tables",
         "measure {} --theta-i 0,40 -o a.gonio",
         "compare {} lambert",
         "explain {}",
         "info {}",
-        "convert {} again.json",
+        "convert {} -o again.json",
         "fit sample --model {} -o refined.json",
         pytest.param("verify {} --quick --law linearity", marks=pytest.mark.slow),
-        pytest.param("view {} --export a.html", marks=pytest.mark.slow),
+        pytest.param("view {} -o a.html", marks=pytest.mark.slow),
     ],
 )
 def test_every_verb_takes_the_result_of_a_fit(
@@ -119,19 +120,19 @@ def test_every_result_is_read(tmp_path: Path, content: Any, item: str, expected:
 @pytest.mark.parametrize(
     ("content", "text", "words"),
     [
-        ("{", "", "is no material"),
-        ('{"scene": {}, "camera": {}}', "", "is no material"),
-        ("[1, 2]", "", "is no material"),
+        ("{", "", "is not a material"),
+        ('{"scene": {}, "camera": {}}', "", "is not a material"),
+        ("[1, 2]", "", "is not a material"),
         ('{"type": "conductr"}', "", "unknown material 'conductr'"),
         ('{"type": "conductor", "alhpa": 1}', "", "no parameter 'alhpa'"),
         ('{"fits": [{"material": "lambert(albedo=0.5)"}]}', "", "name the material itself: 'lambert(albedo=0.5)'"),
         ('{"type": "mix", "a": {"type": "json", "file": "found.json"}}', "", "which is in another file"),
         ('{"type": "mix", "a": {"type": "gonio-json", "file": "found.json"}}', "", "which is in another file"),
-        ('{"type": "two-sided", "base": ' * 70 + '{"type": "lambert"}' + "}" * 70, "", "more than 64 materials"),
+        ('{"type": "two-sided", "base": ' * 70 + '{"type": "lambert"}' + "}" * 70, "", "more than 64 nested materials"),
         ('{"fits": [{"notation": 3}]}', "", 'an object with a "type"'),
-        ('[{"file": "a", "fits": [{"notation": {"type": "lambert"}}]}, {"file": "b", "fits": [{}]}]', "", "say which"),
-        ('{"type": "own.py:Own", "albedo": 0.5}', "", "code that a file of data alone does not run"),
-        ('{"type": "conductor", "ndf": "own.py:Own"}', "", "code that a file of data alone does not run"),
+        ('[{"file": "a", "fits": [{"notation": {"type": "lambert"}}]}, {"file": "b", "fits": [{}]}]', "", "name one"),
+        ('{"type": "own.py:Own", "albedo": 0.5}', "", "code that a data file may not run"),
+        ('{"type": "conductor", "ndf": "own.py:Own"}', "", "code that a data file may not run"),
     ],
 )
 def test_what_is_no_material_is_one_clear_error(tmp_path: Path, content: str, text: str, words: str) -> None:
@@ -194,7 +195,7 @@ def test_a_scene_takes_it_with_its_own_defaults(tmp_path: Path, fitted: Path) ->
         ({"type": "measured", "file": "../secret.binary"}, "outside the scene's folder"),
         ({"type": "measured", "file": "/etc/secret.binary"}, "outside the scene's folder"),
         ({"type": "mix", "a": {"type": "json", "file": "found.json"}}, "in another file"),
-        ({"scene": {}}, "it holds no material"),
+        ({"scene": {}}, "it contains no material"),
     ],
 )
 def test_nothing_gets_in_through_it(tmp_path: Path, content: dict[str, Any], says: str) -> None:

@@ -54,7 +54,7 @@ if importlib.util.find_spec("MaterialX"):
         assert found["base_color"] == pytest.approx([0.8, 0.4 * 0.75, 0.2 * 0.5])
         assert [found[key] for key in ("base_weight", "specular_roughness", "coat_weight")] == [1.0, 0.2, 0.5]
         assert found["fuzz_roughness"] == pytest.approx(0.3**0.4)
-        assert notices == ("specular_rotation is left out",)
+        assert notices == ("specular_rotation is omitted",)
         old = STANDARD.replace('surfaceshader"', 'surfaceshader" version="1.0.0"', 1)
         assert read(tmp_path, old).notation["base_weight"] == 0.8
 
@@ -121,7 +121,7 @@ if importlib.util.find_spec("MaterialX"):
 
     def test_a_material_that_the_format_does_not_hold_is_not_written(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"type": "conductor", "alpha": 0.3}')
-        with pytest.raises(InputError, match="a conductor given, and materialx holds openpbr"):
+        with pytest.raises(InputError, match="a conductor given, but materialx holds openpbr"):
             documents.convert(str(tmp_path / "a.json"), tmp_path / "a.mtlx")
         (tmp_path / "b.json").write_text('{"type": "openpbr", "alpha": 0.3}')
         with pytest.raises(InputError, match="has no input 'alpha'"):
@@ -141,21 +141,21 @@ if importlib.util.find_spec("MaterialX"):
     BAD = {
         "unknown surface": (surface("", "gold_leaf"), "unknown node 'gold_leaf'"),
         "unknown input": (given("base_colour", "color3", 'value="1,1,1"'), "no input 'base_colour'"),
-        "a picture": (given("base_color", "color3", 'nodename="tiles"'), "its base_color is joined to 'tiles'"),
-        "a graph": (given("base_color", "color3", 'nodegraph="G" output="o"'), "its base_color is joined to 'G'"),
+        "a picture": (given("base_color", "color3", 'nodename="tiles"'), "its base_color is connected to 'tiles'"),
+        "a graph": (given("base_color", "color3", 'nodegraph="G" output="o"'), "its base_color is connected to 'G'"),
         "another type": (given("base_color", "float", 'value="1"'), "of type float, color3 expected"),
         "no number": (given("base_weight", "float", 'value="red"'), "base_weight = 'red' is no float"),
         "no value": (given("base_weight", "float", ""), "base_weight = '' is no float"),
         "not finite": (given("base_weight", "float", 'value="1e999"'), "base_weight = '1e999' is no"),
         "of itself": (including("a.mtlx"), "which includes it again"),
-        "outside": (including("../b.mtlx"), "lies outside its folder"),
+        "outside": (including("../b.mtlx"), "is outside its folder"),
         "a million nodes": (HEAD + "<a/>" * 1_000_000 + "</materialx>", "more than 100000 elements"),
-        "deep": (HEAD + "<a>" * 100_000 + "</a>" * 100_000 + "</materialx>", "more than 64 elements"),
+        "deep": (HEAD + "<a>" * 100_000 + "</a>" * 100_000 + "</materialx>", "more than 64 nested elements"),
         "laughs": (f'<!DOCTYPE m [<!ENTITY l0 "ha">{LAUGHS}]><materialx>&l11;</materialx>', "declares a document type"),
         "a file": ('<!DOCTYPE m [<!ENTITY x SYSTEM "/etc/passwd">]><materialx>&x;</materialx>', "declares a document"),
         "cut off": (PAINT[:200], "not well-formed"),
-        "another language": ("<scene/>", "<scene> is no MaterialX document"),
-        "nothing to read": (f"{HEAD}</materialx>", "it holds no material"),
+        "another language": ("<scene/>", "<scene> is not a MaterialX document"),
+        "nothing to read": (f"{HEAD}</materialx>", "it contains no material"),
     }
 
     @pytest.mark.parametrize("name", BAD)

@@ -40,6 +40,7 @@ def address(tmp_path: Path) -> Iterator[str]:
         yield f"{root}alone.html"
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("lang", ["glsl", "wgsl"])
 @pytest.mark.parametrize("name", ["oren-nayar", "mix", "kulla-conty-turned", "kulla-conty-glass"])
 def test_a_bundle_is_enough_to_draw_with(name: str, lang: str, chromium: Any, address: str, tmp_path: Path) -> None:

@@ -42,9 +42,10 @@ def packages(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_language_by_one_file(packages: Path, tmp_path: Path) -> None:
     bundle = tmp_path / "bundle"
-    command = ["emit", "kulla-conty", "-p", "base=conductor", "--lang", "vulkan-glsl", "--bundle", str(bundle)]
+    command = ["emit", "kulla-conty", "-p", "base=conductor", "--lang", "vulkan-glsl", "-o", f"{bundle}/"]
     done = outside.gonio(packages, *command)
     assert done.returncode == 0, done.stderr
     manifest = json.loads((bundle / "manifest.json").read_text())

@@ -47,7 +47,7 @@ def test_bad_input_is_one_clear_error():
         go.albedo(go.Lambert(), 0.5, method="guess")
     with pytest.raises(go.InputError, match="cosine"):
         go.albedo(go.Lambert(), 1.5)
-    with pytest.raises(go.InputError, match="one value a ray"):
+    with pytest.raises(go.InputError, match="one value per ray"):
         go.albedo(go.Conductor(alpha=np.array([0.1, 0.2])), 0.5)
     with pytest.raises(go.InputError, match="no closed form"):
         go.albedo(go.OrenNayar(), 0.5, method="closed-form")

@@ -68,7 +68,7 @@ def test_homework_pictures_read_back_pixel_by_pixel(tmp_path, store, flip):
 
 @pytest.mark.parametrize("flip", [True, False])
 def test_the_homeworks_split_sum_is_a_picture_too(tmp_path, flip):
-    baked = tables.bake("ggx", tmp_path / "t", layout="homework", lut=["dfg"], size=8, flip=flip, store="1-E")
+    baked = tables.bake("ggx", tmp_path / "t", layout="homework", lut=["dfg"], resolution=8, flip=flip, store="1-E")
     assert {file.name for file in (tmp_path / "t").iterdir()} >= {"dfg.png", "tables.npz"}
     expected = np.round(baked.arrays["dfg"][:: -1 if flip else 1] * 255)
     picture = read_png(tmp_path / "t" / "dfg.png")
@@ -77,7 +77,7 @@ def test_the_homeworks_split_sum_is_a_picture_too(tmp_path, flip):
 
 
 def test_a_folder_reads_back_what_was_written(tmp_path):
-    baked = tables.bake("beckmann", tmp_path / "t", size=8)
+    baked = tables.bake("beckmann", tmp_path / "t", resolution=8)
     found = baked_files.load(tmp_path / "t")
     for name, array in baked.arrays.items():
         np.testing.assert_array_equal(found.arrays[name], array)
@@ -173,14 +173,14 @@ def test_any_other_material_is_baked_over_the_cosine():
 
 
 def test_pictures_of_a_third_axis_stand_below_each_other(tmp_path):
-    baked = tables.bake("ggx", tmp_path / "t", lut=("E",), size=8, aspect=0.5, azimuths=3)
+    baked = tables.bake("ggx", tmp_path / "t", lut=("E",), resolution=8, aspect=0.5, azimuths=3)
     picture = read_png(tmp_path / "t" / "E.png")
     assert picture.shape == (24, 8, 3)
     np.testing.assert_array_equal(picture[..., 0], np.round(baked.arrays["E"].reshape(24, 8) * 255))
 
 
 def test_a_picture_or_an_empty_folder_is_no_table(tmp_path):
-    tables.bake("ggx", tmp_path / "t", size=8)
+    tables.bake("ggx", tmp_path / "t", resolution=8)
     with pytest.raises(go.InputError, match=r"'\.png' given"):
         baked_files.load(tmp_path / "t" / "E.png")
     with pytest.raises(go.InputError, match=r"no tables\.npz"):
@@ -188,7 +188,7 @@ def test_a_picture_or_an_empty_folder_is_no_table(tmp_path):
 
 
 def test_every_cut_and_every_changed_byte_of_a_file_is_noticed(tmp_path):
-    tables.bake("ggx", tmp_path / "t", size=4, lut=("E",))
+    tables.bake("ggx", tmp_path / "t", resolution=4, lut=("E",))
     file = tmp_path / "t" / "tables.npz"
     whole, truth = file.read_bytes(), baked_files.load(file)
     rng = np.random.default_rng(2)
@@ -213,7 +213,7 @@ def test_every_cut_and_every_changed_byte_of_a_file_is_noticed(tmp_path):
 
 @pytest.mark.parametrize("change", ["value", "manifest", "another", "none"])
 def test_an_altered_file_is_refused(tmp_path, change):
-    tables.bake("ggx", tmp_path / "t", size=4)
+    tables.bake("ggx", tmp_path / "t", resolution=4)
     file = tmp_path / "t" / "tables.npz"
     with np.load(file) as opened:
         arrays = dict(opened)
@@ -234,12 +234,12 @@ def test_an_altered_file_is_refused(tmp_path, change):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"size": 0}, "0 x 0"),
-        ({"size": 5000}, "5000 x 5000"),
+        ({"resolution": 0}, "0 x 0"),
+        ({"resolution": 5000}, "5000 x 5000"),
         ({"masking": "smith"}, "unknown masking"),
-        ({"method": "ggx", "spp": 0}, "0 samples"),
-        ({"spp": 0}, "0 samples"),
-        ({"points": "sobol"}, "unknown points"),
+        ({"method": "ggx", "samples": 0}, "0 samples"),
+        ({"samples": 0}, "0 samples"),
+        ({"sampler": "sobol"}, "unknown points"),
         ({"method": "sobol"}, "unknown method"),
         ({"lut": ["F"]}, "unknown table"),
         ({"layout": "polar"}, "unknown layout"),
@@ -260,13 +260,13 @@ def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text)
 @pytest.mark.parametrize(
     ("target", "options", "text"),
     [
-        (go.Conductor(), {"masking": "smith-separable"}, "masking of a material"),
-        (go.Conductor(), {"aspect": 0.5}, "aspect of a material"),
+        (go.Conductor(), {"masking": "smith-separable"}, "masking given for a material"),
+        (go.Conductor(), {"aspect": 0.5}, "aspect given for a material"),
         (go.Conductor(), {"method": "ggx"}, "Conductor by 'ggx'"),
-        (go.Conductor(), {"lut": ["dfg"]}, "split sum of a material"),
-        (go.Conductor(), {"lut": ["glass"]}, "glass of a Conductor"),
+        (go.Conductor(), {"lut": ["dfg"]}, "split sum requested for a material"),
+        (go.Conductor(), {"lut": ["glass"]}, "glass requested for a Conductor"),
         (go.Conductor(), {"layout": "homework"}, "homework's layout"),
-        (go.Conductor(alpha=np.array([0.1, 0.2])), {}, "one value a ray"),
+        (go.Conductor(alpha=np.array([0.1, 0.2])), {}, "one value per ray"),
         (go.Conductor(alpha=(0.0, 0.2)), {}, "alpha_y / alpha_x = inf"),
         (go.Lambert(), {"layout": "stretched"}, "Lambert by quadrature, stretched"),
         (go.Lambert(), {"lut": ["glass"]}, "table 'glass' of Lambert"),
@@ -274,22 +274,22 @@ def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text)
 )
 def test_what_a_material_does_not_have_is_refused(tmp_path, target, options, text):
     with pytest.raises(go.InputError, match=text):
-        tables.bake(target, tmp_path / "t", size=4, **options)
+        tables.bake(target, tmp_path / "t", resolution=4, **options)
     assert not any(tmp_path.iterdir())
 
 
 def test_a_file_in_place_of_the_folder_and_a_missing_parent_are_refused(tmp_path):
     (tmp_path / "f").write_text("")
     with pytest.raises(go.InputError, match="is a file"):
-        tables.bake("ggx", tmp_path / "f", size=4)
+        tables.bake("ggx", tmp_path / "f", resolution=4)
     with pytest.raises(go.InputError, match="does not exist"):
-        tables.bake("ggx", tmp_path / "no" / "t", size=4)
+        tables.bake("ggx", tmp_path / "no" / "t", resolution=4)
     assert [p.name for p in tmp_path.iterdir()] == ["f"]
 
 
 def test_a_folder_that_cannot_be_written_is_one_clear_error():
     with pytest.raises(go.InputError, match=r"cannot write|no permission"):
-        tables.bake("ggx", "/proc/tables", size=4)
+        tables.bake("ggx", "/proc/tables", resolution=4)
 
 
 def test_a_public_solutions_pictures_agree_with_the_exact_table(shared):

@@ -45,7 +45,7 @@ def test_a_damaged_array_is_rebuilt_with_a_warning(folder, how):
     assert np.array_equal(cache.remember(("trial", 1), never), first)
     (file,) = folder.glob("trial-*.npz")
     damage(file, how)
-    with pytest.warns(go.GonioWarning, match="it is built again"):
+    with pytest.warns(go.GonioWarning, match="it is rebuilt"):
         again = cache.remember(("trial", 1), lambda: np.arange(300.0))
     assert np.array_equal(again, first)
     assert np.array_equal(cache.remember(("trial", 1), never), first)  # and kept
@@ -70,7 +70,7 @@ def test_baked_tables_are_kept_and_a_damaged_one_is_baked_again(folder, monkeypa
     assert again.manifest == first.manifest
     assert all(np.array_equal(again.arrays[name], value) for name, value in first.arrays.items())
     damage(file, how)
-    with pytest.warns(go.GonioWarning, match="it is built again"):
+    with pytest.warns(go.GonioWarning, match="it is rebuilt"):
         rebuilt = bake.cached("ggx", size=4)
     assert rebuilt.manifest == first.manifest
 
@@ -81,7 +81,7 @@ def test_a_table_in_anothers_place_is_not_taken_for_it(folder):
     bake.cached("beckmann", size=4, lut=("E",))
     (second,) = set(folder.glob("baked-*.npz")) - {first}
     second.write_bytes(first.read_bytes())
-    with pytest.warns(go.GonioWarning, match="not what was asked for"):
+    with pytest.warns(go.GonioWarning, match="not the requested table"):
         assert bake.cached("beckmann", size=4, lut=("E",)).manifest["ndf"] == "beckmann"
 
 

@@ -86,6 +86,7 @@ def test_what_cannot_be_coated_is_one_clear_error(make: object, what: str) -> No
         make()  # type: ignore[operator]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name", ["lambert", "eon", "gold, alpha .05", "gold, alpha .05; coloured", "gold, alpha .05; coat alpha .2"]
 )

@@ -39,6 +39,7 @@ WHITE = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", WHITE)
 def test_the_furnace_is_closed_for_any_base_that_only_reflects(name):
     base = WHITE[name]
@@ -51,6 +52,7 @@ def test_lambert_misses_nothing_and_a_dark_base_stays_dark():
     np.testing.assert_allclose(go.KullaConty(dark).eval(WO, WI), dark.eval(WO, WI), rtol=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("color", "power"), [("sheet", 1), ("bounce", 2)])
 def test_what_is_given_back_has_the_colour_of_the_bounces(color, power):
     share = np.array([0.2, 0.5, 0.9])
@@ -63,6 +65,7 @@ def test_what_is_given_back_has_the_colour_of_the_bounces(color, power):
     np.testing.assert_allclose(added[0], expected, atol=2e-3 * missing)
 
 
+@pytest.mark.slow
 def test_the_brightest_channel_of_a_material_without_shares_is_its_white():
     found = go.albedo(go.KullaConty(go.Phong((0.2, 0.1, 0.05), 0.0)), MU).value
     np.testing.assert_allclose(found[:, 0], 1.0, atol=1e-3)
@@ -74,6 +77,7 @@ def test_where_a_base_gains_nothing_is_added():
     np.testing.assert_array_equal(go.KullaConty(bright).eval(WO, WI), bright.eval(WO, WI))
 
 
+@pytest.mark.slow
 def test_it_is_reciprocal_where_its_base_is():
     rng = np.random.default_rng(3)
     v = rng.normal(size=(500, 3))
@@ -84,6 +88,7 @@ def test_it_is_reciprocal_where_its_base_is():
         np.testing.assert_allclose(forth, back, rtol=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["phong", "own", "coated"])
 def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
     model = go.KullaConty(WHITE[name])
@@ -97,6 +102,7 @@ def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
     assert np.all(np.abs(drawn.value - exact.value) < 6 * drawn.error + 5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "base",
     [go.OrenNayar(0.8, 0.5), pytest.param(go.Phong(0.1, 0.4, 30.0), marks=pytest.mark.slow)],
@@ -124,6 +130,7 @@ def test_a_new_value_compiles_no_kernel():
         dr.set_flag(dr.JitFlag.KernelHistory, False)
 
 
+@pytest.mark.slow
 def test_its_gradient_is_that_of_differences():
     dr = backend.drjit()
     kind = backend.types("float64")
@@ -174,5 +181,5 @@ def test_textures_are_refused_when_the_scene_is_built():
     mi = engine.load("cpu")
     adapter.register(mi)
     base = {"type": "gonio_oren_nayar", "albedo": {"type": "checkerboard"}}
-    with pytest.raises(RuntimeError, match="it takes colours and numbers, no texture"):
+    with pytest.raises(RuntimeError, match="this base needs tables, which are computed for colors and numbers"):
         mi.load_dict({"type": "gonio_kulla_conty", "base": base})

@@ -65,6 +65,7 @@ def test_all_layers_together_are_reciprocal() -> None:
     np.testing.assert_allclose(forth, back, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_light_through_glass_is_reciprocal() -> None:
     model = go.OpenPBR(transmission_weight=0.8, coat_weight=0.5, specular_roughness=0.5, coat_color=(0.9, 0.5, 0.4))
     below = WI * [1.0, 1.0, -1.0]
@@ -185,9 +186,9 @@ def test_light_is_absorbed_inside_by_the_colour_at_its_depth() -> None:
 @pytest.mark.parametrize(
     ("values", "what"),
     [
-        ({"emission_luminance": 10.0}, "a surface that shines"),
-        ({"transmission_weight": 1.0, "transmission_depth": 1.0, "transmission_scatter": 0.5}, "scattered inside"),
-        ({"transmission_weight": 1.0, "transmission_dispersion_scale": 1.0}, "dispersion is not followed"),
+        ({"emission_luminance": 10.0}, "emission given"),
+        ({"transmission_weight": 1.0, "transmission_depth": 1.0, "transmission_scatter": 0.5}, "volume scattering"),
+        ({"transmission_weight": 1.0, "transmission_dispersion_scale": 1.0}, "dispersion is not supported"),
         ({"specular_ior": 0.7}, ">= 1"),
     ],
 )
@@ -197,5 +198,5 @@ def test_what_no_surface_has_is_one_clear_error(values: dict[str, float], what: 
 
 
 def test_a_body_that_scatters_is_taken_for_a_dense_one_with_a_warning() -> None:
-    with pytest.warns(go.GonioWarning, match="subsurface_radius is taken for 0"):
+    with pytest.warns(go.GonioWarning, match="subsurface_radius is treated as 0"):
         go.OpenPBR(subsurface_weight=1.0)

@@ -55,6 +55,7 @@ def by_brute_force(light, n, alpha, ndf="ggx", parts=8):
     return (between(light, parts) * weight[..., None]).sum((0, 1)) / weight.sum()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("ndf", DENSITIES)
 def test_every_level_agrees_with_brute_force(ndf):
     light = environment()
@@ -215,7 +216,7 @@ def test_a_bad_map_is_refused_by_its_name(tmp_path, capsys, monkeypatch, name):
         (["sky.exr", "--ndf", "gxx"], "ggx"),
         (["sky.exr", "--masking", "x"], "masking"),
         (["sky.exr", "--lut", "E"], "prefiltered"),
-        (["sky.exr", "--size", "64"], "--size 64 does not go with"),
+        (["sky.exr", "--resolution", "64"], "--resolution 64 does not go with"),
         (["sky.exr", "-o", "no/folder"], "does not exist"),
         (["screen.png"], "cut off at white"),
         (["ggx", "--lut", "E", "--levels", "3"], "--levels 3 does not go with"),

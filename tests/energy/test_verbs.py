@@ -10,7 +10,7 @@ from gonio import cli
 
 def test_bake_info_and_plot_work_together(tmp_path, capsys):
     folder = tmp_path / "t"
-    assert cli.run(["bake", "ggx", "--size", "8", "-o", str(folder), "--json"]) == 0
+    assert cli.run(["bake", "ggx", "--resolution", "8", "-o", str(folder), "--json"]) == 0
     baked = json.loads(capsys.readouterr().out)
     assert cli.run(["info", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["hash"] == baked["hash"]
@@ -18,6 +18,7 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -30,7 +31,7 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
 )
 def test_every_kind_of_table_is_printed_and_drawn(tmp_path, capsys, words):
     folder = tmp_path / "t"
-    assert cli.run(["bake", *words, "--size", "4", "-o", str(folder)]) == 0
+    assert cli.run(["bake", *words, "--resolution", "4", "-o", str(folder)]) == 0
     text = capsys.readouterr().out
     assert "max error" in text and "mu  " in text
     assert cli.run(["info", str(folder)]) == 0
@@ -40,7 +41,7 @@ def test_every_kind_of_table_is_printed_and_drawn(tmp_path, capsys, words):
 
 
 def test_a_model_with_parameters_is_baked(tmp_path, capsys):
-    words = ["bake", "conductor", "--preset", "Au", "-p", "masking=smith-separable", "--lut", "E", "--size", "4"]
+    words = ["bake", "conductor", "--preset", "Au", "-p", "masking=smith-separable", "--lut", "E", "--resolution", "4"]
     assert cli.run([*words, "-o", str(tmp_path / "t"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["masking"] == "smith-separable"
 
@@ -56,10 +57,11 @@ class Worn(go.Conductor):
 """
 
 
+@pytest.mark.slow
 def test_materials_of_ones_own_are_compared(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(OWN)
-    words = ["compensation", "mine.py:Half", "mine.py:Worn(preset=Cu)", "--walks", "1000"]
+    words = ["compensation", "mine.py:Half", "mine.py:Worn(preset=Cu)", "--samples", "1000"]
     assert cli.run([*words, "--json", "-o", "figures"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["albedo"]["gold"]["half"] == found["albedo"]["gold"]["kulla-conty bounce"]
@@ -72,7 +74,7 @@ def test_materials_of_ones_own_are_compared(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     "words",
     [
-        ["bake", "ggx", "--size", "0"],
+        ["bake", "ggx", "--resolution", "0"],
         ["bake", "gold"],
         ["bake", "ggx", "--masking", "x"],
         ["bake", "ggx", "-p", "alpha=.3"],

@@ -491,7 +491,7 @@ def trained(data: bytes, folder: Path) -> object:
 def _tables() -> tuple[bytes, ...]:
     import gonio as go
 
-    return (go.bake("ggx", lut=["E"], size=4).npz(),)
+    return (go.bake("ggx", lut=["E"], resolution=4).npz(),)
 
 
 @target("tables", _tables, [b"manifest", b"seal", b"(4, 4)", b"PK\x01\x02"])
@@ -609,20 +609,20 @@ def message(data: bytes, folder: Path) -> object:
 ])  # fmt: skip
 def link(data: bytes, folder: Path) -> object:
     """The address of the page, and the headers by which the server tells its own page from a stranger's."""
-    from gonio.viewer.server import Door
+    from gonio.viewer.guards import AccessControl
     from starlette.datastructures import Headers
 
     query, _, rest = data.partition(b"|")
     host, _, origin = rest.partition(b"|")
     headers = Headers(raw=[(b"host", host), (b"origin", origin)])
-    return Door("127.0.0.1", "abc").refusal(headers, query, needs_origin=False)
+    return AccessControl("127.0.0.1", "abc").refusal(headers, query, needs_origin=False)
 
 
 @target("options", lambda: [
     b"render nowhere --spp 4 --size 640x480 --seed 3 --timeout 1.5 --exposure -1 -o a.png",
     b"study nowhere --vary shapes.0.material.alpha=0.1,0.2 --spp 2",
     b"emit lambert --lang glsl --param albedo=.5", b"compare a.exr b.exr --metric flip --tolerance .1",
-    b"convert a.exr b.png --exposure auto", b"models conductor --json", b"schema scene", b"verify nothing --quick",
+    b"convert a.exr -o b.png --exposure auto", b"models conductor --json", b"schema scene", b"verify nothing --quick",
 ], [b"--", b"-o", b"--size", b"--param", b"=", b"''", b"1e999", b"nan", b"auto"])  # fmt: skip
 def options(data: bytes, folder: Path) -> object:
     """The command line, in an empty folder; of verbs that compute or serve, only what names nothing to work on."""

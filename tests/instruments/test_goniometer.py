@@ -41,7 +41,7 @@ def test_mirrors_return_all_light_from_any_side(surface: str, tmp_path: Path, mo
     rough = np.random.default_rng(1).standard_normal((16, 16, 1)).repeat(3, axis=2)
     images.write("heights.exr", rough.astype(np.float32))
     found = go.measure(
-        surface=surface, theta_i=[0.0, 60.0, 88.0], theta_r=VIEWS, phi=[0.0, 180.0], rays=1 << 15, patches=8
+        surface=surface, theta_i=[0.0, 60.0, 88.0], theta_r=VIEWS, phi=[0.0, 180.0], samples=1 << 15, patches=8
     )
     for first, later, lost in zip(found.first, found.later, found.lost, strict=True):
         assert first + later == pytest.approx(1.0, abs=2e-3)
@@ -82,7 +82,7 @@ def test_a_facet_s_albedo_counts_at_every_bounce() -> None:
             theta_i=[0.0],
             theta_r=[0.0],
             phi=[0.0],
-            rays=1 << 15,
+            samples=1 << 15,
         )
         kept[albedo] = np.array([found.first[0], found.later[0]])
     assert kept[0.5][0] == pytest.approx(0.5 * kept[1.0][0], rel=1e-5)
@@ -107,7 +107,7 @@ def test_the_detector_s_cone_has_its_size() -> None:
 def test_a_flat_lambertian_surface_is_lambert_and_errors_are_honest() -> None:
     found = go.measure(
         surface="gaussian:alpha=0,squares=16", facet="lambert:albedo=.8", theta_i=[0.0, 45.0], theta_r=VIEWS,
-        phi=[0.0, 90.0, 180.0], rays=1 << 18, solid_angle=0.02,
+        phi=[0.0, 90.0, 180.0], samples=1 << 18, solid_angle=0.02,
     )  # fmt: skip
     f, error = values(found.table), found.table.beside["error"]
     assert f.mean() == pytest.approx(0.8 / np.pi, rel=0.01)
@@ -123,7 +123,7 @@ def test_the_first_bounce_of_a_gaussian_surface_is_beckmann_s() -> None:
         theta_i=lights,
         theta_r=VIEWS,
         phi=azimuths,
-        rays=1 << 18,
+        samples=1 << 18,
         solid_angle=0.02,
     )
     theory = Model(go.Conductor(alpha=0.3, ndf="beckmann", fresnel="one"), 0.02)
@@ -139,7 +139,7 @@ def test_the_first_bounce_of_a_gaussian_surface_is_beckmann_s() -> None:
 def test_the_first_bounce_is_beckmann_s_within_three_percent() -> None:
     lights, views, azimuths = [0.0, 30.0, 60.0], np.arange(0.0, 88.0, 2.5), np.arange(0.0, 181.0, 15.0)
     found = go.measure(
-        surface="gaussian:alpha=.3", theta_i=lights, theta_r=views, phi=azimuths, rays=4_000_000, patches=96
+        surface="gaussian:alpha=.3", theta_i=lights, theta_r=views, phi=azimuths, samples=4_000_000, patches=96
     )
     model = go.Conductor(alpha=0.3, ndf="beckmann", fresnel="one")
     axes = [np.radians(axis) for axis in (lights, views, azimuths)]
@@ -156,7 +156,7 @@ def test_one_bounce_among_grooves_is_oren_and_nayar_s() -> None:
     views, azimuths = np.arange(10.0, 71.0, 10.0), [0.0, 60.0, 120.0, 180.0]
     found = go.measure(
         surface=f"vgroove:sigma={sigma}", facet=f"lambert:albedo={albedo}", theta_i=[30.0], theta_r=views,
-        phi=azimuths, rays=4_000_000,
+        phi=azimuths, samples=4_000_000,
     )  # fmt: skip
     r, phi = np.meshgrid(np.radians(views), np.radians(azimuths), indexing="ij")
     a, b, c, s2 = np.maximum(light, r), np.minimum(light, r), np.cos(phi), sigma**2  # OrenNayar1994, sec. 4.3
@@ -174,7 +174,9 @@ def test_one_bounce_among_grooves_is_oren_and_nayar_s() -> None:
 def test_a_seed_gives_the_same_values_and_another_others() -> None:
     def found(seed: int) -> np.ndarray:
         return values(
-            go.measure(surface=SMALL, theta_i=[40.0], theta_r=VIEWS, phi=[180.0], rays=8192, patches=8, seed=seed).table
+            go.measure(
+                surface=SMALL, theta_i=[40.0], theta_r=VIEWS, phi=[180.0], samples=8192, patches=8, seed=seed
+            ).table
         )
 
     assert np.array_equal(found(1), found(1)) and not np.array_equal(found(1), found(2))
@@ -203,7 +205,7 @@ def test_a_model_s_cells_hold_its_values_at_their_middles(tmp_path: Path) -> Non
 
 
 def test_noise_is_as_large_as_asked_and_its_error_is_known() -> None:
-    plain, noisy = (go.measure("lambert", kind="samples", noise=noise) for noise in (0.0, 0.05))
+    plain, noisy = (go.measure("lambert", table="samples", noise=noise) for noise in (0.0, 0.05))
     off = values(noisy.table) / values(plain.table) - 1.0
     assert off.std() == pytest.approx(0.05, rel=0.05) and abs(off.mean()) < 2e-3
     assert noisy.error == pytest.approx(0.05, rel=0.1)
@@ -259,10 +261,11 @@ def test_a_blocked_direction_moves_to_the_rim_and_stays_above() -> None:
 # ---------------------------------------------------------------------- files
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("suffix", [".gonio", ".bsdf", ".brdf"])
 def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None:
     found = go.measure(
-        surface=SMALL, facet="conductor:Au", output=tmp_path / f"a{suffix}", rays=4096, patches=8, solid_angle=0.05
+        surface=SMALL, facet="conductor:Au", output=tmp_path / f"a{suffix}", samples=4096, patches=8, solid_angle=0.05
     )
     table = read(tmp_path / f"a{suffix}")
     red, _, blue = go.Measured(str(tmp_path / f"a{suffix}")).eval([0.0, 0.0, 1.0], [0.1, 0.0, 0.995])[0]
@@ -274,7 +277,7 @@ def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None
 
 def test_gonio_files_keep_errors_and_info_tells_of_them(tmp_path: Path) -> None:
     path = tmp_path / "a.gonio"
-    found = go.measure("lambert", path, kind="samples", noise=0.1)
+    found = go.measure("lambert", path, table="samples", noise=0.1)
     table = read(path)
     assert np.allclose(table.beside["error"], found.table.beside["error"], rtol=1e-6)
     assert describe(path)["error"] == pytest.approx(found.error, rel=1e-3)
@@ -283,7 +286,7 @@ def test_gonio_files_keep_errors_and_info_tells_of_them(tmp_path: Path) -> None:
 
 
 def test_errors_of_another_shape_are_refused(tmp_path: Path) -> None:
-    made = go.measure("lambert", kind="samples", noise=0.1).table
+    made = go.measure("lambert", table="samples", noise=0.1).table
     made.beside["error"] = made.beside["error"][1:]
     from gonio.measure.formats.own import Own
 
@@ -292,7 +295,7 @@ def test_errors_of_another_shape_are_refused(tmp_path: Path) -> None:
 
 
 def test_few_angles_are_measured_each_and_many_on_a_grid() -> None:
-    few = go.measure(surface=SMALL, theta_i=[7.0, 50.0], theta_r=[0.0, 30.0], phi=[0.0], rays=1024, solid_angle=0.05)
+    few = go.measure(surface=SMALL, theta_i=[7.0, 50.0], theta_r=[0.0, 30.0], phi=[0.0], samples=1024, solid_angle=0.05)
     assert few.incidence == pytest.approx((7.0, 50.0))
     many = Rough(surface_of(SMALL), go.Mirror(), 0.05, 1024, 8, 1)
     many.prepare(np.linspace(0.0, 0.5 * np.pi, 1000))
@@ -300,7 +303,13 @@ def test_few_angles_are_measured_each_and_many_on_a_grid() -> None:
 
 
 def test_later_bounces_alone_can_be_measured() -> None:
-    asked = {"surface": "vgroove:slope=.9", "theta_i": [0.0], "theta_r": VIEWS, "phi": [90.0, 180.0], "rays": 1 << 14}
+    asked = {
+        "surface": "vgroove:slope=.9",
+        "theta_i": [0.0],
+        "theta_r": VIEWS,
+        "phi": [90.0, 180.0],
+        "samples": 1 << 14,
+    }
     every, first, later = (go.measure(bounces=bounces, **asked) for bounces in ("all", "first", "later"))
     assert np.allclose(values(every.table), values(first.table) + values(later.table), rtol=1e-4, atol=1e-6)
     assert np.allclose(values(first.table), every.table.beside["first"])
@@ -308,9 +317,8 @@ def test_later_bounces_alone_can_be_measured() -> None:
 
 def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "a.gonio"
-    arguments = (
-        f"measure --surface gaussian -p squares=32 -p alpha=.2 --facet conductor:Au --theta-i 0,30 --rays 2000 -o {out}"
-    )
+    arguments = "measure --surface gaussian -p squares=32 -p alpha=.2 --facet conductor:Au --theta-i 0,30"
+    arguments += f" --samples 2000 -o {out}"
     for extra in ([], ["--json"]):
         with pytest.raises(SystemExit) as caught:
             cli.main([*arguments.split(), *extra])
@@ -339,23 +347,23 @@ def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest
         ({"material": "lambert", "bounces": "first"}, "bounces of a material"),
         ({"material": "lambert", "noise": -0.1}, "0 to 1 expected"),
         ({"material": "lambert", "blocked": 90.0}, "0 to 60 expected"),
-        ({"material": "lambert", "kind": "sphere"}, "unknown kind of table"),
+        ({"material": "lambert", "table": "sphere"}, "unknown kind of table"),
         ({"material": "lambert", "theta_i": []}, "no angles"),
         ({"material": "lambert", "theta_r": [95.0]}, "0 to 89.95 expected"),
         ({"material": "lambert", "phi": [float("inf")]}, "0 to 180 expected"),
         ({"material": "lambert", "theta_i": [10.0], "output": "a.binary"}, "directions of its own"),
-        ({"material": "lambert", "kind": "samples", "output": "a.binary"}, "hold tables of kind half-difference"),
+        ({"material": "lambert", "table": "samples", "output": "a.binary"}, "hold tables of kind half-difference"),
         ({"material": "lambert", "output": "a.npz"}, "cannot be written"),
-        ({"material": "lambert", "output": "a.tif"}, "no format of measurements"),
+        ({"material": "lambert", "output": "a.tif"}, "not a format of measurements"),
         ({"surface": SMALL, "solid_angle": 0.0}, "more than 0"),
         ({"surface": SMALL, "solid_angle": -1.0}, "more than 0"),
         ({"surface": SMALL, "solid_angle": 1e-9}, "half angle"),
-        ({"surface": SMALL, "solid_angle": 1e-4, "kind": "half-difference"}, "GB"),
+        ({"surface": SMALL, "solid_angle": 1e-4, "table": "half-difference"}, "GB"),
         ({"surface": SMALL, "facet": "mirrror"}, "unknown material"),
         ({"surface": SMALL, "facet": "dielectric"}, "lets light through"),
         ({"surface": SMALL, "facet": "conductor(alpha=(.1,.4))"}, "anisotropic"),
-        ({"surface": SMALL, "rays": 1}, "1000 to"),
-        ({"surface": SMALL, "rays": 1 << 30, "theta_i": [0.0]}, "67108864 rays on each patch"),
+        ({"surface": SMALL, "samples": 1}, "1000 to"),
+        ({"surface": SMALL, "samples": 1 << 30, "theta_i": [0.0]}, "67108864 rays on each patch"),
         ({"surface": 5}, "a surface expected"),
         ({"surface": SMALL, "seed": -1}, "0 to"),
         ({"surface": SMALL, "bounces": "third"}, "all, first, later expected"),

@@ -90,7 +90,7 @@ def test_a_path_that_leads_nowhere_is_refused(folder: Path, free: list[str], tex
 
 def test_a_picture_of_another_size_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match=r"true.npz: 32x24 pixels, 16x16 expected"):
-        fit_picture(folder / "true.npz", folder / "scene.json", fixed={"/camera/film/size": [16, 16]})
+        fit_picture(folder / "true.npz", folder / "scene.json", param={"/camera/film/size": [16, 16]})
     with pytest.raises(SystemExit) as ended:
-        cli.main(["fit", "--from", str(folder / "true.npz")])
+        cli.main(["fit", str(folder / "true.npz")])
     assert ended.value.code == 2

@@ -203,7 +203,7 @@ def test_a_surface_of_one_s_own_is_measured_by_its_name() -> None:
 
     go.register(Steps)
     try:
-        found = go.measure(surface="steps", theta_i=[30.0], theta_r=[30.0, 60.0], phi=[180.0], rays=8192)
+        found = go.measure(surface="steps", theta_i=[30.0], theta_r=[30.0, 60.0], phi=[180.0], samples=8192)
     finally:
         Surface.family.remove("steps")
     assert found.first[0] == pytest.approx(1.0) and found.later[0] == 0.0

@@ -59,7 +59,7 @@ def test_a_plot_ends_where_the_data_end(narrow: str, tmp_path: Path) -> None:
         path = go.plot(found, kind=kind, output=tmp_path / f"{kind}.svg").path
         assert path is not None and ("not measured" if kind == "image" else "from 0° to 60°") in path.read_text()
     go.plot(found, GOLD, kind="slice")
-    with pytest.raises(InputError, match=r"80 degrees of view asked for, and .* is known from 0 to 60"):
+    with pytest.raises(InputError, match=r"80 degrees of view requested, but .* is known from 0 to 60"):
         go.plot(found, angles=[80])
 
 

@@ -46,7 +46,7 @@ def network(folder: Path) -> Network:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(networks, "STEPS", 150)
         patch.setattr(networks, "ROUNDS", 3)
-        row = go.compress(SAMPLE, folder / "network.gonio", method="network")[0]
+        row = go.compress(SAMPLE, folder / "network.gonio", codec="network")[0]
     assert row.kind == "network" and row.size < 6000
     found = read(row.path)
     assert isinstance(found, Network)
@@ -56,7 +56,7 @@ def network(folder: Path) -> Network:
 @pytest.mark.parametrize(("method", "size"), [("log", 2048), ("log", 4096), ("lowrank", 4096)])
 def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, size: int, folder: Path) -> None:
     path = folder / f"{method}-{size}.gonio"
-    row = go.compress(SAMPLE, path, method=method, bytes=size)[0]
+    row = go.compress(SAMPLE, path, codec=method, bytes=size)[0]
     assert path.stat().st_size == row.size <= size
     sample, table = read(SAMPLE), read(path)
     assert table.name == row.kind
@@ -72,7 +72,7 @@ def test_more_bytes_err_less(folder: Path) -> None:
 
 def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
     path = folder / "both.gonio"
-    rows = go.compress([SAMPLE, folder / "half.gonio"], path, method="lowrank", bytes=4096)
+    rows = go.compress([SAMPLE, folder / "half.gonio"], path, codec="lowrank", bytes=4096)
     assert [row.path for row in rows] == [f"{path}:sample", f"{path}:half"]
     assert path.stat().st_size <= 2 * 4096 + 1 and report.describe(path)["items"] == ["sample", "half"]
     one, half = (read(row.path) for row in rows)
@@ -89,7 +89,7 @@ def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
 
 
 def test_visible_normals_are_rebuilt(folder: Path) -> None:
-    row = go.compress(folder / "a.bsdf", folder / "a.gonio", method="rgl")[0]
+    row = go.compress(folder / "a.bsdf", folder / "a.gonio", codec="rgl")[0]
     assert row.size < 0.6 * (folder / "a.bsdf").stat().st_size and row.error < 1e-4
     old, new = read(folder / "a.bsdf"), read(row.path)
     for there, here in zip(old.vndf[0], new.vndf[0], strict=True):
@@ -106,7 +106,7 @@ def test_an_adaptive_table_stays_one_in_few_bytes(folder: Path) -> None:
 @pytest.mark.parametrize("name", ["cc_ibiza_sunset", "chm_mint", "irid_flake_paint1"])
 def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: Path, shared: Path) -> None:
     file = shared / "data" / "rgl" / f"{name}_rgb.bsdf"
-    row = go.compress(file, tmp_path / "a.gonio", method="rgl")[0]
+    row = go.compress(file, tmp_path / "a.gonio", codec="rgl")[0]
     assert row.size < 0.21 * 658_952 and row.error < (1e-3 if name.startswith("irid") else 1e-5)
 
 
@@ -158,8 +158,8 @@ def test_a_published_network_says_what_its_table_does(shared: Path) -> None:
 
 def test_what_cannot_be_compressed_is_said(folder: Path) -> None:
     for words, match in (
-        ({"method": "rgl"}, "half-difference, an adaptive one expected"),
-        ({"method": "lg"}, "lg"),
+        ({"codec": "rgl"}, "half-difference, an adaptive one expected"),
+        ({"codec": "lg"}, "lg"),
         ({"bytes": 10}, "10 bytes given"),
         ({"bytes": 1100}, "1100 bytes, a table takes"),
     ):

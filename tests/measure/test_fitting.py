@@ -67,7 +67,7 @@ def test_a_sum_of_lobes_is_found_again() -> None:
 
 @pytest.mark.parametrize("metric", ["log", "log1p", "cuberoot", "linear"])
 def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
-    found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", metric=metric)
+    found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", loss=metric)
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=2e-3)
 
 
@@ -158,7 +158,7 @@ def test_what_the_data_do_not_tell_is_said() -> None:
     twice = Sum(go.Conductor(alpha=0.3, albedo=0.6), go.Conductor(alpha=0.3, albedo=0.4))
     shares = ("a.albedo", "b.albedo")
     held = {f"{part}.{name}": tree.value_at(twice, f"{part}.{name}") for part in "ab" for name in ("eta", "k", "alpha")}
-    found = fit(cells, twice, free=shares, fixed=held)
+    found = fit(cells, twice, free=shares, param=held)
     assert np.isinf(found.errors).all()
     assert any("do not tell a.albedo.r and b.albedo.r from each other" in note for note in found.notes)
 
@@ -172,7 +172,7 @@ def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
 
 
 def test_parameters_that_are_held_stay() -> None:
-    found = fit(table(METAL), "conductor(alpha=.25)", fixed={"k": METAL.k})
+    found = fit(table(METAL), "conductor(alpha=.25)", param={"k": METAL.k})
     assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")
 
 
@@ -227,11 +227,11 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda t: fit(t, "lambert", metric="other"), "unknown metric"),
+        (lambda t: fit(t, "lambert", loss="other"), "unknown metric"),
         (lambda t: fit(t, "lambert+"), "no sum of materials"),
         (lambda t: fit(t, "lambert", lobes=0), "0 lobes"),
-        (lambda t: fit(t, "lambert", fixed={"rough": 1.0}), "rough"),
-        (lambda t: fit(t, "lambert", fixed={"albedo": 0.3}), "nothing is left"),
+        (lambda t: fit(t, "lambert", param={"rough": 1.0}), "rough"),
+        (lambda t: fit(t, "lambert", param={"albedo": 0.3}), "nothing is left"),
         (lambda t: fit(t, "lambert", grazing=0.0), "0 degrees"),
         (lambda t: modelled("mirror+lambert"), "delta lobe"),
         (lambda t: batch.files_of([str(Path(__file__).parent / "nothing-there")]) and fit("nothing.binary"), "no file"),

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.measure import SAMPLE, compare, read, report
+from gonio.measure.formats import npz
 from gonio.measure.formats.base import Format
 from gonio.measure.formats.merl import SCALE
 from gonio.measure.formats.npz import written
 from gonio.measure.formats.own import Own
-from gonio.measure.tables import angles, half_difference
+from gonio.measure.tables import angles, half_difference, samples
 from gonio.measure.tables.base import Measurement
 from gonio.ops import Direction, Spectrum
 
@@ -51,6 +52,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return found
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", formats())
 def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, files: dict[str, Path]) -> None:
     sample, table = read(SAMPLE), read(files[name])
@@ -246,3 +248,16 @@ def test_the_shared_files_are_read_with_their_faults(shared: Path) -> None:
     assert len(report.describe(data / "nbrdf" / "merl.npz")["items"]) == 13
     with pytest.raises(InputError, match="did you mean 'chrome'"):
         read(f"{data / 'nbrdf' / 'merl.npz'}:crome")
+
+
+def test_an_axis_without_entries_is_refused_in_every_kind_of_table(files: dict[str, Path], tmp_path: Path) -> None:
+    tables = {table.name: table for table in map(read, files.values())}
+    tables["samples"] = samples.Samples(np.linspace(0.1, 1.0, 40).reshape(10, 4), np.ones((10, 3)))
+    assert len(tables) >= 4
+    for kind, table in tables.items():
+        file = {name: np.asarray(part) for name, part in npz.arrays(Own().write(table), kind).items()}
+        for name in set(file) - {"manifest"}:
+            for axis in range(file[name].ndim):
+                content = written({**file, name: np.take(file[name], [], axis=axis)})
+                with pytest.raises(InputError, match=f"the array {name} of shape .* is empty"):
+                    Own().read(content, kind)

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import gonio as go
 import numpy as np
 import pytest
@@ -79,7 +84,7 @@ class Strict(BSDF):
     ("text", "given", "words"),
     [
         ("lamberd", [], "did you mean 'lambert'"),
-        ("lambert(", [], "is no material"),
+        ("lambert(", [], "is not a material"),
         ("lambert(albedo)", [], "sets nothing"),
         ("lambert", ["=3"], "sets nothing"),
         ("lambert", ["albdo=1"], "no parameter 'albdo'"),
@@ -89,9 +94,9 @@ class Strict(BSDF):
         ("lambert(preset=Au)", [], "no presets"),
         ("dielectric", ["transmission=perhaps"], "true or false"),
         ("dielectric", ["ndf=gxg"], "did you mean 'ggx'"),
-        ("mix", ["a=3"], "'3' is no material"),
-        ("mix", ['a={"kind": "lambert"}'], "is no material"),
-        ("mix", ["a={"], "is no material"),
+        ("mix", ["a=3"], "'3' is not a material"),
+        ("mix", ['a={"kind": "lambert"}'], "is not a material"),
+        ("mix", ["a={"], "is not a material"),
         ("mix(a=lambert(albedo=-1))", [], "-1 given"),
     ],
 )
@@ -131,7 +136,7 @@ def test_a_path_leads_through_several_materials() -> None:
     [
         (["bse.alpha=.2"], "did you mean 'base'?"),
         (["base.alhpa=.2"], "did you mean 'alpha'?"),
-        (["base.alpha.x=.2"], "'alpha' of conductor is no material"),
+        (["base.alpha.x=.2"], "'alpha' of conductor is not a material"),
         (["base=lambert", "base.alpha=.2"], "lambert has no parameter 'alpha'"),
         (["base.alpha=-1"], "-1 given"),
     ],
@@ -161,3 +166,20 @@ def test_values_of_a_material_change_by_path() -> None:
     assert found == go.KullaConty(go.Conductor.preset("Au", alpha=(0.1, 0.2), ndf="beckmann"))
     with pytest.raises(InputError, match="no parameter 'alhpa'"):
         notation.changed(gold, {"base.alhpa": 0.1})
+
+
+def test_naming_a_material_finds_no_tables(tmp_path: Path) -> None:
+    """They take up to half a minute and hundreds of megabytes: they are found when a formula first asks."""
+    program = (
+        "import sys, gonio as go\n"
+        "from gonio.catalog import notation\n"
+        "for name in set(go.models()) - {'measured'}:  # that reads its file\n"
+        "    try: notation.named(name)\n"
+        "    except go.InputError: pass  # a required parameter is missing\n"
+        "notation.named('coat(base=kulla-conty(base=conductor),alpha=.3)')\n"
+        "assert 'drjit' not in sys.modules"
+    )
+    environment = {**os.environ, "GONIO_CACHE": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not list(tmp_path.rglob("*.np*"))

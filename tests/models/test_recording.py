@@ -81,6 +81,7 @@ def _check(name: str, method: str, mode: str = "radiance") -> None:
         )
 
 
+@pytest.mark.sample(70)
 @pytest.mark.parametrize("method", ["eval", "pdf", "sample"])
 @pytest.mark.parametrize("name", each(MATERIALS, QUICK))
 def test_recorded_graph_equals_the_model(name: str, method: str) -> None:

@@ -85,14 +85,14 @@ def test_a_dielectric_takes_a_name_and_is_a_number_to_all_who_ask() -> None:
     [
         ("bk8", 550.0, "unknown refractive index 'bk8'", "did you mean 'bk7'"),
         ("gols", 550.0, "unknown", "did you mean 'gold'"),
-        ("bk7", 0.55, "0.55 nm is outside of bk7, which is known from 300 to 2500 nm", "in nanometres"),
-        ("diamond", [500.0, 800.0], "800 nm is outside of diamond", 'outside="level"'),
-        ("bk7", -1.0, "not a positive number", "nanometres"),
-        ("bk7", np.nan, "not a positive number", "nanometres"),
-        ("cauchy(a)", 550.0, "no number", "such as"),
+        ("bk7", 0.55, "0.55 nm is outside the range of bk7, which is 300 to 2500 nm", "in nanometers"),
+        ("diamond", [500.0, 800.0], "800 nm is outside the range of diamond", 'outside="level"'),
+        ("bk7", -1.0, "not a positive number", "nanometers"),
+        ("bk7", np.nan, "not a positive number", "nanometers"),
+        ("cauchy(a)", 550.0, "not a number", "such as"),
         ("sellmeier(1, 2, 3)", 550.0, "3 numbers", "b1, c1"),
         ("cauchy(nan)", 550.0, "not finite", ""),
-        ("sellmeier(1, 0.25)", 500.0, "has no index at 500 nm", "lambda in micrometres"),
+        ("sellmeier(1, 0.25)", 500.0, "has no index at 500 nm", "lambda in micrometers"),
     ],
 )
 def test_what_cannot_be_is_one_clear_error(name: str, wavelength: float, message: str, hint: str) -> None:

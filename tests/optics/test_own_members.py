@@ -215,9 +215,10 @@ def test_a_member_without_its_formula_says_which_is_missing(strangers: Any) -> N
         Empty().conductor(KIND.float(1.0), KIND.float(0.2), KIND.float(3.0))
 
 
+@pytest.mark.slow
 def test_a_package_brings_them_to_the_command_line(tmp_path: Path) -> None:
     outside.install(tmp_path, "strangers", OPTICS, POINTS)
-    command = ["verify", "conductor", "--quick", "--json", "--report", str(tmp_path / "report")]
+    command = ["verify", "conductor", "--quick", "--json", "-o", str(tmp_path / "report")]
     options = [word for name, value in NAMES.items() for word in ("-p", f"{name}={value}")]
     done = outside.gonio(tmp_path, *command, *options)
     assert done.returncode == 0, done.stdout + done.stderr

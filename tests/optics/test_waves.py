@@ -136,13 +136,13 @@ def test_mueller_matrices_do_to_stokes_vectors_what_amplitudes_do_to_fields() ->
     [
         ((0.1, 0.0), "eta = 0, a positive index expected"),
         ((0.1, -1.5), "eta = -1.5"),
-        ((0.1, 1.5, -0.1), "k = -0.1, which would give light"),
-        ((2.0, 1.5), "an angle outside of 0 to pi/2"),
+        ((0.1, 1.5, -0.1), "k = -0.1, which would amplify light"),
+        ((2.0, 1.5), "an angle outside 0 to pi/2"),
         ((-0.1, 1.5), "an angle outside"),
-        ((0.1, 1.5 + 1j), "give eta and k apart"),
+        ((0.1, 1.5 + 1j), "give eta and k separately"),
         ((0.1, "glass"), "'glass' given, a number"),
         ((np.nan, 1.5), "not finite"),
-        (([0.1, 0.2], [1.0, 2.0, 3.0]), "do not go together"),
+        (([0.1, 0.2], [1.0, 2.0, 3.0]), "do not broadcast"),
     ],
 )
 def test_an_index_that_no_medium_has_is_an_error(arguments: tuple[Any, ...], text: str) -> None:

@@ -14,6 +14,7 @@ from gonio.bridge import engine
 from gonio.render import bench
 
 
+@pytest.mark.slow
 def test_the_table_has_rays_a_material_and_integrators_beside_mitsubas(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,7 +6,9 @@ import json
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import gonio as go
 import numpy as np
@@ -19,8 +21,11 @@ from gonio.render import checkpoints
 from gonio.render.finish import render_to_file
 from gonio.render.prepare import prepare
 from gonio.render.request import Request
-from gonio.transport import passes
+from gonio.transport import mitsuba_render, passes
 from gonio.work import facts, kept
+
+sys.path.insert(0, str(Path(__file__).parent))
+from test_run import XML
 
 
 @pytest.fixture(autouse=True)
@@ -173,9 +178,126 @@ def test_a_material_of_this_program_alone_is_refused_before_the_render(tmp_path:
     namespace: dict[str, object] = {}
     exec("import gonio as go\nclass Mine(go.Lambert):\n    'Mine.'\n    name = 'mine-for-checkpoints'\n", namespace)
     mine = namespace["Mine"]()  # type: ignore[operator]
-    with pytest.raises(InputError, match="known to this program alone"):
+    with pytest.raises(InputError, match="known to this program only"):
         go.render(mine, spp=4, size=(24, 16), checkpoint=tmp_path / "c")
     assert go.render(mine, spp=2, size=(24, 16), output=tmp_path / "a.exr").shape == (16, 24, 3)
+
+
+# --- a checkpoint is an untrusted file -----------------------------------------------------------------
+
+
+def rewritten(path: Path, change: Callable[[dict[str, Any], dict[str, Any]], object]) -> None:
+    """Change facts and arrays of a checkpoint; its checksum is right afterwards."""
+    content = kept.read(path)
+    change(content.facts, content.arrays)
+    kept.write(path, content.facts, content.arrays)
+
+
+WRONG_FACTS = {
+    "done": ["2", -1, 1.5, None, [2], 2**40, True],
+    "wanted": ["4", 0, 2**31, {}],
+    "size": [[24], "24x16", [24, "x"], None],
+    "output": [None, 5],
+    "temporary": ["no", 2],
+    "identity": [[], {"version": 5}, "x"],
+}
+WRONG_REQUEST = {
+    "scene": [5, None, ["a"], {"$material": {"type": "lambert"}}],
+    "output": [5, {}],
+    "spp": ["4", -1, 0, 1.5, 2**40],
+    "size": [[24], [0, 0], [-1, 5], "24x16", [1e9, 1e9], [10**9, 10**9]],
+    "integrator": [5, ["path"], "no-such"],
+    "max_depth": [0, "x"],
+    "sampler": [5],
+    "seed": [-1, "x", 2**40],
+    "device": [5, "abacus"],
+    "spectral": ["yes", 5],
+    "threads": [0, "x", 10**9],
+    "denoise": [5, "x"],
+    "exposure": ["bright", [], 1e400],
+    "allow_outside": ["x"],
+    "overrides": [5, [], {"": 5}, {"scene.shapes.0.material": {"$material": 5}}, {"/a": {"$material": {}}}],
+    "material": [
+        5,
+        "lambert",
+        {"type": "lambert"},
+        {"$material": {"type": 5}},
+        {"$material": {"type": "lambert", "x": 1}},
+    ],
+    "until_error": ["x", -1, 0],
+    "gradient": ["x", [5], ["shapes.0.nothing"]],
+    "unknown": [1],
+}
+
+
+def test_facts_of_other_types_or_ranges_are_refused(scene: Path, tmp_path: Path) -> None:
+    stopped_after(scene, 2, tmp_path / "c", spp=4)
+    original = (tmp_path / "c").read_bytes()
+    cases = [((name,), value) for name, values in WRONG_FACTS.items() for value in values]
+    cases += [(("request", name), value) for name, values in WRONG_REQUEST.items() for value in values]
+    cases += [(("request",), value) for value in (5, [], {}, None)]
+    for (*outer, name), value in cases:
+        (tmp_path / "c").write_bytes(original)
+
+        def change(found: dict[str, Any], arrays: dict[str, Any]) -> None:
+            (found["request"] if outer else found)[name] = value  # noqa: B023 - called at once
+
+        rewritten(tmp_path / "c", change)
+        with pytest.raises(go.GonioError) as caught:
+            go.resume(tmp_path / "c")
+        assert caught.value.code == 2, (name, value)
+
+
+@pytest.mark.parametrize("kind", ["path", "xml"])
+def test_sums_of_another_shape_or_type_are_refused(
+    scene: Path, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if kind == "xml":
+        monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+        scene = tmp_path / "ball.xml"
+        scene.write_text(XML)
+    stopped_after(scene, 2 if kind == "path" else 4, tmp_path / "c", spp=5)
+    original = (tmp_path / "c").read_bytes()
+    for name in kept.read(tmp_path / "c").arrays:
+        for make in (
+            lambda a: a[:0],
+            lambda a: a[None],
+            lambda a: a.astype(np.uint8),
+            lambda a: np.concatenate([a, a], -1),
+            lambda a: a.reshape(-1)[0],
+            lambda a: np.full_like(a, -1 if a.dtype.kind == "i" else 5) if a.dtype.kind == "i" else a[:1],
+        ):
+            (tmp_path / "c").write_bytes(original)
+            rewritten(tmp_path / "c", lambda _, arrays: arrays.update({name: np.asarray(make(arrays[name]))}))  # noqa: B023
+            with pytest.raises(InputError, match=r"does not fit|channels"):
+                go.resume(tmp_path / "c")
+    (tmp_path / "c").write_bytes(original)
+    rewritten(tmp_path / "c", lambda _, arrays: arrays.clear())
+    with pytest.raises(InputError, match="does not fit"):
+        go.resume(tmp_path / "c")
+
+
+def test_a_picture_is_written_beside_the_checkpoint_or_where_it_is_told(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "far").mkdir()
+    (tmp_path / "near").mkdir()
+    (tmp_path / "current").mkdir()
+    monkeypatch.chdir(tmp_path / "current")
+    file = tmp_path / "near" / "c"
+    stopped_after(scene, 2, file, spp=4, output=tmp_path / "far" / "a.exr")
+    with pytest.warns(GonioWarning, match=rf"goes to {file.parent / 'a.exr'}: the checkpoint names .*far"):
+        go.resume(file, spp=4)
+    assert [path.name for path in tmp_path.rglob("*.exr")] == ["a.exr"] and (tmp_path / "near" / "a.exr").is_file()
+    told, notice = checkpoints.asked_again(file, Request(Path(), output=tmp_path / "far" / "b.exr"), False, writes=True)
+    assert told.output == tmp_path / "far" / "b.exr" and not notice
+    stopped_after(scene, 2, tmp_path / "near" / "d", spp=4)
+    told, notice = checkpoints.asked_again(tmp_path / "near" / "d", Request(Path()), False, writes=True)
+    assert told.output == tmp_path / "near" / "ball.png" and "current" in notice
+    assert checkpoints.asked_again(tmp_path / "near" / "d", Request(Path()), False)[0].output is None
+    file.rename(file.with_name("a.exr"))
+    with pytest.raises(InputError, match="the checkpoint itself has the picture's name"):
+        checkpoints.asked_again(file.with_name("a.exr"), Request(Path()), False, writes=True)
 
 
 # --- a checkpoint that nobody asked for ----------------------------------------------------------------
@@ -189,7 +311,7 @@ def test_a_long_render_has_a_checkpoint_beside_it_until_it_is_done(
 
     def look(progress: passes.Progress) -> None:
         time.sleep(0.05)  # the file is written by a thread of its own
-        seen.append(checkpoints.beside(output).exists())
+        seen.append(checkpoints.default_path(output).exists())
 
     render_to_file(Request(scene, output, spp=6), report=look)
     assert seen[-1]
@@ -210,7 +332,9 @@ def test_a_time_limit_leaves_what_goes_on_and_the_end_removes_it(scene: Path, tm
     assert result.checkpoint == tmp_path / "a.exr.checkpoint" and result.checkpoint.is_file()
     told: list[str] = []
     change = Request(Path(), spp=result.spp + 3)
-    again = render_to_file(checkpoints.asked_again(result.checkpoint, change, False), tell=told.append)
+    request, notice = checkpoints.asked_again(result.checkpoint, change, False)
+    assert not notice
+    again = render_to_file(request, tell=told.append)
     assert (again.spp, again.stopped, again.checkpoint) == (result.spp + 3, "", None)
     assert f"{result.spp} of {result.spp + 3}" in told[0]
     assert np.array_equal(images.read(output).pixels, go.render(scene, spp=again.spp))
@@ -239,14 +363,9 @@ def test_a_full_disk_costs_the_checkpoint_and_not_the_picture(
 
 # --- Mitsuba's scenes ----------------------------------------------------------------------------------
 
-sys.path.insert(0, str(Path(__file__).parent))
-from test_run import XML  # noqa: E402
-
 
 @pytest.mark.parametrize("integrator", [None, "path"])
 def test_a_mitsuba_scene_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str | None) -> None:
-    from gonio.transport import mitsuba_render
-
     monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
     xml = tmp_path / "ball.xml"
     xml.write_text(XML)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import drjit as dr
 import numpy as np
+import pytest
 from gonio.bridge import engine
 from gonio.pictures import images
 
@@ -31,6 +32,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 def test_exr_is_written_and_read_with_one_cpu(scene: Path, tmp_path: Path) -> None:
     done = one_cpu.run(PICTURES, scene, folder=tmp_path)
     assert done.stdout == "done\n", done.stderr

@@ -95,7 +95,7 @@ def test_headers_that_contradict_their_file_are_refused(tmp_path: Path) -> None:
     longer = struct.pack("<i", 329) + exr[at + 4 : at + 8] + bytes(325)
     assert "has 329 bytes, float has 4" in refused(exr[:at] + longer + exr[at + 8 :])
     preview = b"preview\0preview\0" + struct.pack("<iII", 8, 1 << 15, 1 << 15)
-    assert "no preview of the size" in refused(exr[:8] + preview + exr[8:])
+    assert "not a preview of the stated size" in refused(exr[:8] + preview + exr[8:])
     assert "unknown version" in refused(exr[:4] + b"\x03" + exr[5:])
     assert "XYZ" in refused(radiance(9, 1, b"").replace(b"rgbe", b"xyze"))
 

@@ -67,6 +67,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     path = tmp_path / "a.exr"
     path.write_bytes(b"old")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("rescued")))
+    monkeypatch.chdir(tempfile.gettempdir())
 
     def no_space(descriptor: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -77,6 +78,25 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     assert caught.value.code == 3
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", images.SUFFIXES)
+def test_a_scene_whose_name_is_no_text_has_its_picture(suffix: str, tmp_path: Path, picture: np.ndarray) -> None:
+    path = images.write(tmp_path / f"a{suffix}", picture, {"scene": os.fsdecode(b"caf\xe9/scene.json")})
+    assert images.read(path).metadata["scene"] == r"caf\udce9/scene.json"
+
+
+def test_a_picture_that_no_library_can_encode_is_kept_as_an_array(
+    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: object) -> bytes:
+        raise RuntimeError("OpenEXR says no")
+
+    monkeypatch.setattr(images, "_bitmap_bytes", failing)
+    with pytest.raises(MachineError, match="OpenEXR says no") as caught:
+        images.write(tmp_path / "a.exr", picture)
+    kept = caught.value.hint.removeprefix("it is kept as ").removesuffix(": `gonio convert` reads that")
+    assert np.array_equal(images.read(kept).pixels, picture)
 
 
 def test_a_disk_that_fills_up_while_writing_leaves_nothing(tmp_path: Path) -> None:

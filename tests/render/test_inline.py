@@ -191,7 +191,7 @@ def test_a_face_without_an_area_is_never_met():
 def test_pictures_are_those_of_mitsubas_rays(name, monkeypatch):
     scene = Path(__file__).parents[2] / "examples" / name
     ours = go.render(scene, size=(64, 48), spp=4)
-    monkeypatch.setattr(inline, "MOST", 0)
+    monkeypatch.setattr(inline, "MAX_COST", 0)
     theirs = go.render(scene, size=(64, 48), spp=4)
     assert not np.array_equal(ours, theirs)  # the last bits: they were traced apart
     off = np.abs(ours - theirs).max(-1)

@@ -54,6 +54,7 @@ def test_lamps_are_chosen_as_often_as_it_says(scene: Any) -> None:
     assert np.argmax(corner) == nearest and max(corner) > 0.4
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_lobes(scene: Any) -> None:
     def pictures(integrator: str, spp: int) -> np.ndarray:
         found = []

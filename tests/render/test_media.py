@@ -204,7 +204,7 @@ def test_absorption_takes_no_texture(tmp_path: Path) -> None:
     from PIL import Image
 
     Image.fromarray(np.full((2, 2, 3), (128, 20, 255), np.uint8)).save(tmp_path / "flat.png")
-    with pytest.raises(InputError, match="no place on the surface"):
+    with pytest.raises(InputError, match="the interior has no uv coordinates"):
         rendered(tmp_path, [slab(-1, 1, absorption={"type": "imageTex", "file": "flat.png"})])
 
 

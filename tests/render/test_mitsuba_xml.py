@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -206,7 +207,45 @@ def test_what_a_scene_grows_to_is_bounded(tmp_path: Path) -> None:
         mitsuba_xml.read(scene(tmp_path / "scene", chain), {})
     with pytest.raises(InputError, match="more than 64 elements inside each other"):
         mitsuba_xml.read(scene(tmp_path / "scene", '<shape type="cube">' * 10_000 + "</shape>" * 10_000), {})
+    with pytest.raises(InputError, match="a parameter's name of 5000 characters"):
+        mitsuba_xml.read(scene(tmp_path / "scene", f'<default name="{"a" * 5000}" value="1"/>'), {})
     file = scene(tmp_path / "scene", "")
     file.write_text('<!DOCTYPE a [<!ENTITY b "x">]><scene version="3.0.0"/>')
     with pytest.raises(InputError, match="declares a document type"):
+        mitsuba_xml.read(file, {})
+
+
+def test_many_parameters_take_no_longer_than_few(tmp_path: Path) -> None:
+    names = [f"n{'x' * (n % 50)}{n}" for n in range(5_000)]
+    content = "".join(f'<default name="{name}" value="{n}"/>' for n, name in enumerate(names))
+    content += "".join(f'<integer name="i{n}" value="${name}"/>' for n, name in enumerate(names))
+    start = time.process_time()
+    text = mitsuba_xml.read(scene(tmp_path / "scene", content), {}).text
+    assert time.process_time() - start < 2.0  # 0.1 s; 40 s where each name is searched for in each value
+    assert all(f'name="i{n}" value="{n}"' in text for n in (0, 17, 4_999))
+
+
+def test_the_longest_name_of_a_parameter_counts_and_its_value_is_no_name(tmp_path: Path) -> None:
+    content = '<default name="a" value="1"/><default name="ab" value="2$a"/><string name="x" value="$ab$a.$abc\\$a"/>'
+    assert '<string name="x" value="211.21c\\$a">' in mitsuba_xml.read(scene(tmp_path / "scene", content), {}).text
+
+
+@pytest.mark.parametrize(
+    ("count", "last", "message"),
+    [
+        (60, '<bsdf type="diffuse" id="a60"/>', ""),
+        (20_000, '<bsdf type="diffuse" id="a20000"/>', "references lead on from one object to the next 20000 times"),
+        (1, '<bsdf type="twosided" id="a1"><ref id="a1"/></bsdf>', "is part of itself"),
+        (20_000, '<alias id="a0" as="a20000"/>', "is part of itself"),
+    ],
+)
+def test_references_are_bounded_before_mitsuba_follows_them(
+    count: int, last: str, message: str, tmp_path: Path
+) -> None:
+    content = "".join(f'<bsdf type="twosided" id="a{n}"><ref id="a{n + 1}"/></bsdf>' for n in range(count)) + last
+    file = scene(tmp_path / "scene", content)
+    if not message:
+        mitsuba_xml.read(file, {})
+        return
+    with pytest.raises(InputError, match=message):
         mitsuba_xml.read(file, {})

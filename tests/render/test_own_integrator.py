@@ -118,10 +118,11 @@ def test_names_are_taken_once(registered: dict[str, type]) -> None:
 
         name = "path"
 
-    with pytest.raises(InputError, match="the integrator 'path' is there already"):
+    with pytest.raises(InputError, match="the integrator 'path' already exists"):
         integrators.Integrator.family.add(Another)
 
 
+@pytest.mark.slow
 def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_path: Path) -> None:
     package = tmp_path / "site"
     metadata = package / "occlusion-1.0.dist-info"

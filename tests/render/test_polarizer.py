@@ -80,6 +80,7 @@ def expected(degrees: float, roll: float) -> np.ndarray:
     return found
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0])
 @pytest.mark.parametrize("roll", [0.0, 25.0])
 def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(
@@ -134,7 +135,7 @@ def test_a_polarizer_in_an_unpolarized_variant_is_an_error(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"integrator": {"type": "normal"}}, "integrator 'normal', which follows no polarized light"),
+        ({"integrator": {"type": "normal"}}, "integrator 'normal', which does not trace polarized light"),
         ({"integrator": {"type": "whitted"}}, "integrator 'whitted'"),
         ({"ambient": [0.1, 0.1, 0.1]}, "ambient light, which has no polarization"),
     ],

@@ -154,6 +154,7 @@ def test_caustics_make_the_picture_of_paths(seed: int) -> None:
     agree(scene.pictures("caustics", 64), scene.pictures("path", 512), 0.04)  # edges lose light of mirrors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_particles_make_the_picture_of_paths(seed: int) -> None:
     scene = Scene(200 + seed, ROUGH, SURFACES + POINTS)

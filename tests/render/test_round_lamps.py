@@ -47,7 +47,7 @@ def picture(
 
 
 # Mitsuba's `ray_test` tells a ball of 1 mm, three metres away, from what is beside it by float32: to a sixth.
-WAYS = [pytest.param(inline.MOST, r, id=f"kernel-{r}") for r in (0.001, 0.05, 1.0, 2.5)]
+WAYS = [pytest.param(inline.MAX_COST, r, id=f"kernel-{r}") for r in (0.001, 0.05, 1.0, 2.5)]
 WAYS += [pytest.param(0, r, id=f"embree-{r}") for r in (0.01, 1.0)]
 
 
@@ -58,7 +58,7 @@ def test_a_ball_lights_the_floor_by_the_closed_form(
 ) -> None:
     """pi L (r / d)^2 straight below. Mitsuba's own samples of the smallest are 7 % too bright, and a lamp hides its
     limb from shadow rays that end on it: of one of 5 cm, .1 %."""
-    monkeypatch.setattr(inline, "MOST", most)
+    monkeypatch.setattr(inline, "MAX_COST", most)
     for integrator in ("directSampleLight", "path"):
         image = picture([4.5, 1, 0], [0, 0, 0], 0.02, integrator, 3, floor=FLOOR, lamp=ball(kind, (0, 3, 0), radius))
         assert image.mean() == pytest.approx(GREY * (radius / 3) ** 2, rel=3e-4)
@@ -78,11 +78,11 @@ def test_one_of_several_balls_does_too(kind: str) -> None:
     assert image.mean() == pytest.approx(GREY * expected, rel=2e-3)
 
 
-@pytest.mark.parametrize("most", [inline.MOST, 0], ids=["kernel", "embree"])
+@pytest.mark.parametrize("most", [inline.MAX_COST, 0], ids=["kernel", "embree"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ball_does_not_light_itself(kind: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """However white it is. Toward a place on itself a sphere's cap is that place, in a direction made of rounding."""
-    monkeypatch.setattr(inline, "MOST", most)
+    monkeypatch.setattr(inline, "MAX_COST", most)
     for radius, centre in ((0.4, (2, 4, 3)), (0.01, (0, 0, 5))):
         x, y, z = centre
         lamp = ball(kind, centre, radius, bsdf=grey(0.9))
@@ -148,6 +148,7 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     assert found[0] == pytest.approx(found[1], rel=4e-3)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize(
     "shape, flipped",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from gonio.bridge import engine
-from gonio.errors import InputError, MachineError
+from gonio.errors import GonioError, InputError, MachineError
 from gonio.pictures import denoise, images
 from gonio.render.finish import render_to_file
 from gonio.render.prepare import prepare
@@ -367,6 +369,7 @@ def endless(scene: Path) -> Path:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "SIGHUP")]
 )
@@ -394,6 +397,79 @@ def test_a_second_ctrl_c_ends_at_once_and_leaves_no_file(endless: Path, tmp_path
     time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=5)
-    assert process.returncode == 128 + signal.SIGINT
+    # Python's own end where the second came before Gonio's handler stood again
+    assert process.returncode in (128 + signal.SIGINT, -signal.SIGINT)
     # Where the pass ended between the two, the picture is kept, and whole; never is a part of it left.
     assert [entry.name for entry in output.parent.iterdir() if "checkpoint" not in entry.name] in ([], ["a.exr"])
+
+
+FAILS = {
+    '<integrator type="path"><integer name="samples_per_pass" value="3"/></integrator>': r"must be a multiple of",
+    '<integrator type="aov"><string name="aovs" value=""/></integrator>': "Mitsuba cannot render it",
+}
+BUMP = """<shape type="cube"><bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf></shape>"""
+
+
+@pytest.mark.parametrize("element", FAILS)
+def test_what_mitsuba_cannot_render_is_an_error_of_the_scene(element: str, tmp_path: Path) -> None:
+    path = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
+    (tmp_path / "a.xml").write_text(XML.replace(path, element))
+    with pytest.raises(InputError, match=FAILS[element]) as caught:
+        render_to_file(Request(tmp_path / "a.xml", tmp_path / "a.exr", spp=4))
+    assert caught.value.where == str(tmp_path / "a.xml")
+
+
+@pytest.mark.parametrize("integrator", [None, "path"])
+def test_a_plugin_that_is_not_made_for_it_is_an_error_of_the_scene(integrator: str | None, tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text(XML.replace("<shape", f"{BUMP}<shape", 1))
+    with pytest.raises(InputError, match=r"Mitsuba cannot render it: \[Texture\] .*not implemented"):
+        render_to_file(Request(tmp_path / "a.xml", tmp_path / "a.exr", spp=4, integrator=integrator))
+
+
+# --- a finished picture is never lost ------------------------------------------------------------------
+
+
+def kept_at(error: GonioError) -> Path:
+    """Where the error says that the picture is."""
+    found = re.search(r"it is kept as (.*): move it from there", error.hint)
+    assert found is not None, error.hint
+    return Path(found[1])
+
+
+@pytest.mark.parametrize("suffix", images.SUFFIXES)
+def test_a_folder_that_is_removed_while_it_renders_costs_no_picture(
+    suffix: str, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "current").mkdir()
+    monkeypatch.chdir(tmp_path / "current")
+    with pytest.raises(InputError, match="does not exist") as caught:
+        render_to_file(
+            Request(scene, tmp_path / "out" / f"a{suffix}", spp=2),
+            report=lambda progress: shutil.rmtree(tmp_path / "out", ignore_errors=True),
+        )
+    assert images.read(kept_at(caught.value)).pixels.shape == (16, 24, 3)
+
+
+def test_a_current_folder_that_is_deleted_while_it_renders_costs_no_picture(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "current").mkdir()
+    monkeypatch.chdir(tmp_path / "current")
+    with pytest.raises(MachineError, match="cannot write") as caught:
+        render_to_file(
+            Request(scene, Path("a.exr"), spp=2),
+            report=lambda progress: shutil.rmtree(tmp_path / "current", ignore_errors=True),
+        )
+    assert images.read(kept_at(caught.value)).pixels.shape == (16, 24, 3)
+
+
+def test_a_denoiser_that_fails_costs_no_picture(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(denoise, "denoise", failing)
+    with pytest.raises(MachineError, match="not denoised: MemoryError") as caught:
+        render_to_file(Request(scene, tmp_path / "a.exr", spp=2, denoise=True))
+    assert caught.value.where == str(tmp_path / "a.exr")
+    assert images.read(tmp_path / "a.exr").pixels.shape == (16, 24, 3)

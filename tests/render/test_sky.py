@@ -83,6 +83,7 @@ LAMP = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("ball", "rest"), [(None, {}), (METAL, {"lamp": LAMP})], ids=["grey", "gold, and a lamp"])
 def test_pictures_are_those_of_lobes_alone(ball: dict[str, Any] | None, rest: dict[str, Any]) -> None:
     made = scene(sunny(20.0), ball, **rest)

@@ -105,6 +105,7 @@ def test_in_rgb_glass_has_the_index_of_sodium_light(tmp_path: Path) -> None:
 
 
 # smooth glass: the tests of Snell's window, of rainbows and of single wavelengths see it too
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [pytest.param(0.0, marks=pytest.mark.slow), 0.15])
 def test_a_dispersing_ball_is_the_sum_of_its_single_wavelengths(tmp_path: Path, alpha: float) -> None:
     """Lamps of four lines, and glass whose index differs much between them: each line alone sees a plain index."""
@@ -195,6 +196,7 @@ def test_a_lamp_looks_alike_in_rgb_and_by_its_spectrum(tmp_path: Path, light: di
     assert brightest == pytest.approx(light.get("scale", 1.0), rel=0.01), "beside the ball"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("dark", ["a sky of no light", "a lamp of no power", "a lamp of 0 by its spectrum"])
 def test_what_is_dark_beside_a_lamp_takes_nothing_from_it(tmp_path: Path, dark: str) -> None:
     mi.Bitmap(np.zeros((4, 8, 3), np.float32)).write(str(tmp_path / "dark.exr"))

@@ -148,6 +148,7 @@ def test_particles_are_seen_between_the_clips_of_the_camera(clip: dict[str, floa
     agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["light", "caustics"])
 def test_particles_pass_instances(name: str) -> None:
     block = {"type": "cube", "to_world": T().translate([-0.5, -0.2, 0.8]).scale(0.3), "bsdf": GREY}
@@ -371,6 +372,7 @@ MATERIALS = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name", [n if k < 3 else pytest.param(n, marks=pytest.mark.slow) for k, n in enumerate(MATERIALS)]
 )
@@ -379,6 +381,7 @@ def test_the_retrace_takes_nothing_and_adds_nothing(name: str) -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["ball", "pane"])
 def test_light_from_a_mirror_is_seen_through_a_rough_surface(name: str) -> None:
     """Particles come to the side of it that is turned away from the camera."""
@@ -388,6 +391,7 @@ def test_light_from_a_mirror_is_seen_through_a_rough_surface(name: str) -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
 
+@pytest.mark.slow
 def test_the_retrace_finds_light_that_first_traces_hardly_find(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.3, wall=None)
     with_them = pictures(drawn, "caustics", 64, 12, 8)
@@ -396,6 +400,7 @@ def test_the_retrace_finds_light_that_first_traces_hardly_find(monkeypatch: pyte
     assert with_them.var(0, ddof=1).mean() < 0.5 * without.var(0, ddof=1).mean()
 
 
+@pytest.mark.slow
 def test_the_retrace_ends_where_light_is_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.5, wall=COATED)
     with_them = pictures(drawn, "caustics", 256, 6, 8)
@@ -418,6 +423,7 @@ def test_a_lamp_that_mirrors_alone_show_is_seen_once() -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 256, 6, 8))
 
 
+@pytest.mark.slow
 def test_long_chains_keep_their_weights_finite() -> None:
     drawn = before_a_wall({"type": "dielectric", "int_ior": 1.01}, 0.5, size=8)
     found = pictures(drawn, "caustics", 2048, 1, depth=100)  # asserts that no value is left out

@@ -126,6 +126,7 @@ def test_blur_is_told_from_what_less_of_it_shows() -> None:
         assert abs(nothing.value) < 4 * nothing.deviation < 0.02
 
 
+@pytest.mark.slow
 def test_caustics_are_blurred_no_more_than_was_promised() -> None:
     scene, error, pictures = caustic(), 0.02, []
     for seed in (98, 99):
@@ -176,6 +177,7 @@ def test_one_that_began_anew_goes_on_to_the_same_bits(tmp_path: Path) -> None:
         assert np.array_equal(finish(again), whole.image()) and again.done == whole.done
 
 
+@pytest.mark.slow
 def test_differences_are_those_of_pictures_with_less_blur_by_maps_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Seen through a dark pane, whose second trips bring nothing; against half the radius, where that is less noisy."""
     monkeypatch.setattr(caustics, "INNER", 0.5)

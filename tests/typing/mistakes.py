@@ -43,7 +43,7 @@ go.verify(3)  # reportArgumentType
 print(go.verify(gold).failed)  # reportAttributeAccessIssue
 go.emit(gold, language="glsl")  # reportCallIssue
 go.plot(gold, kinds="slice")  # reportCallIssue
-go.bake("ggx", resolution=64)  # reportCallIssue
+go.bake("ggx", texels=64)  # reportCallIssue
 go.study("scene", ["alpha"])  # reportArgumentType
 go.compare("a.exr")  # reportCallIssue
 go.view(gold, width=400)  # reportCallIssue

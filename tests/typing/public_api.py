@@ -154,7 +154,7 @@ cell = go.view(gold, "lambert", height=400)
 
 # ---------------------------------------------------------------------- proof, shaders, tables
 
-report = go.verify([gold, "lambert"], quick=True, seed=1, law=["reciprocity", "energy"], report="out", progress=None)
+report = go.verify([gold, "lambert"], quick=True, seed=1, law=["reciprocity", "energy"], output="out", progress=None)
 assert_type(report.passed, bool)
 assert_type(report["reciprocity"].figure, float | None)
 assert_type(report.cards[0]["energy"].why, list[str])
@@ -165,7 +165,7 @@ made = bundle("conductor(preset=Au)", lang="wgsl")
 assert_type(made.text, str)
 assert_type(made.write("shader"), list[Path])
 
-baked = go.bake("ggx", "tables", lut=["E", "Eavg"], size=64, method="quadrature", masking="smith-correlated")
+baked = go.bake("ggx", "tables", lut=["E", "Eavg"], resolution=64, method="quadrature", masking="smith-correlated")
 assert_type(baked.arrays["E"], NDArray[np.float64])
 print(baked.manifest["size"])
 
@@ -329,16 +329,20 @@ bronze = go.material("alum-bronze", fit="ngan2005/ward")
 assert_type(bronze, go.BSDF)
 print(sorted(go.materials())[:3], [*go.fits("alum-bronze")][:2])
 gold_table = go.Measured("gold.binary")
-fitted = go.fit("gold.binary", "lambert+ggx", metric="log")
+fitted = go.fit("gold.binary", "lambert+ggx", loss="log")
 assert_type(fitted.material, go.BSDF)
 print(fitted.interval[0, 1], fitted.text, fitted.notes)
-for row in go.compress(["gold.binary", "silk.bsdf"], "both.gonio", method="lowrank", bytes=8192):
+for row in go.compress(["gold.binary", "silk.bsdf"], "both.gonio", codec="lowrank", bytes=8192):
     print(row.path, row.size, row.error, row.sphere)
 
 readout = go.measure(surface="gaussian:alpha=.3", facet=go.Mirror(), output="rough.gonio", theta_i=[0.0, 30.0])
 print(readout.table.beside["error"], readout.first, readout.later, readout.error)
 go.measure(gold, "gold.binary", noise=0.02, blocked=5.0, solid_angle=0.002)
 
+found = go.fit_picture("photo.exr", "scene.json", ["shapes.0.material"], param={"camera.verticalFov": 30.0})
+print(found.materials, found.losses)
+print(go.convert("ball.exr", "ball.png", exposure="auto").summary, go.info("gold.binary")["path"])
+print(go.explain("ggx").text(80), go.compensation(gold, samples=1000)["rms"])
 photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
 assert_type(photographed.material, go.BSDF)
 print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import gonio as go
+import pytest
 from gonio.verify import box, subject, verify
 from gonio.verify.effort import EFFORTS
 
@@ -43,6 +44,7 @@ def test_a_mistake_in_a_corner_of_the_ranges_is_caught_and_placed() -> None:
     assert "--param coat=" in verdict.command
 
 
+@pytest.mark.slow
 def test_no_range_is_invented() -> None:
     (axis,) = [a for a in box.axes(subject.of(Unbounded())) if a.path == "gain"]
     assert (axis.low, axis.high) == (0.0, 0.25)

@@ -145,6 +145,7 @@ def cause(material: go.BSDF, law: str) -> str:
     return verdict.cause
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("mistake", "law", "words"),
     [
@@ -198,6 +199,7 @@ class NarrowPdf(RightFacets):
         return s._replace(pdf=where(s.pdf > 0.0, self.pdf(wo, s.wi), 0.0))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
@@ -239,6 +241,7 @@ def test_light_that_no_sample_finds_is_placed() -> None:
     assert "where wi.x < 0" in found.words  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_a_cascade_names_its_first_cause_once() -> None:
     report = verify(NoJacobianInSample(), quick=True, law=["energy", "weight"])
     assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from WEIGHT's"
@@ -246,6 +249,7 @@ def test_a_cascade_names_its_first_cause_once() -> None:
     assert text.index("weight: ") < text.index("energy: directional")
 
 
+@pytest.mark.slow
 def test_what_the_examiners_named_is_named() -> None:
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from mutants.third.delta import CertainOfItself
@@ -253,7 +257,7 @@ def test_what_the_examiners_named_is_named() -> None:
 
     for cls, law, words in (
         (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
-        (GreyWeight, "weight", "the weight is grey"),
+        (GreyWeight, "weight", "the weight is gray"),
         (OneLobeDensity, "weight", "a missing lobe of a mixture"),
         (CertainOfItself, "delta", "the pdf of delta samples is 1"),
     ):

@@ -113,6 +113,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
     return verify(f"{file}:{name}", quick=True, law=["reciprocity", "weight", "isotropy"], **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -120,7 +121,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
         pytest.param("IsDeaf", "no end after 6 s", marks=pytest.mark.slow),
         ("LoopsInAKernel", "no end after 6 s"),
         ("Allocates", "more than 1 GB of memory"),
-        ("Aborts", "the process died: SIGABRT"),
+        ("Aborts", "the process crashed: SIGABRT"),
         ("Leaves", "the process ended itself with exit code 0"),
         ("Exits", "SystemExit in sample"),
         ("KillsItsThread", "KeyboardInterrupt in sample"),
@@ -181,11 +182,11 @@ def test_the_report_is_the_same_in_one_process_in_another_and_in_several(file: P
     laws = ["energy", "weight", "isotropy"]
     here = plain(verify(names, quick=True, law=laws, isolated=False))
     assert here == plain(verify(names, quick=True, law=laws))
-    assert here == plain(verify(names, quick=True, law=laws, jobs=3))
+    assert here == plain(verify(names, quick=True, law=laws, workers=3))
 
 
 def test_a_crash_in_one_setting_leaves_the_others_as_they_are(file: Path) -> None:
-    report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], jobs=2)
+    report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], workers=2)
     assert [card.passed for card in report.cards] == [True, False, True]
 
 

@@ -158,7 +158,7 @@ def test_the_command_line_fails_on_what_is_new_only(
     assert code == 0 and json.loads(out)["passed"] and "::notice" in err
     mine.write_text(MINE.replace("COSINE", "wi.z"))
     code, out, _ = run(capsys, *asked, "--baseline", "known.json")
-    assert code == 0 and "mended: mine.py:Mine: reciprocity no longer fails" in " ".join(out.split())
+    assert code == 0 and "fixed: mine.py:Mine: reciprocity no longer fails" in " ".join(out.split())
 
 
 def test_files_that_cannot_be_written_are_told_of_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

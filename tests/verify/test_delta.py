@@ -53,6 +53,7 @@ def test_a_mistake_is_named(mistake: go.BSDF, why: str, cause: str) -> None:
     assert cause in verdict.cause and verdict.grade == "broken"
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "sound",
     [

@@ -65,6 +65,7 @@ def test_p_values_over_a_hundred_seeds_are_uniform() -> None:
         assert stats.kstest(values, "uniform").pvalue > 0.01
 
 
+@pytest.mark.slow
 def test_rounding_of_directions_counts_for_nothing_in_cells_of_their_steps() -> None:
     narrow = go.Conductor(alpha=2.5e-4, ndf="beckmann")
     assert verify(narrow, law="pdf", seed=1).passed

@@ -23,6 +23,7 @@ def test_every_model_is_in_the_list() -> None:
     assert set(go.models()) <= listed
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", FEW)
 def test_a_model_passes_every_law(name: str) -> None:
     report = verify(MODELS[name], quick=True, seed=2013)
@@ -37,6 +38,7 @@ def test_a_model_passes_twenty_seeds_in_a_row(name: str) -> None:
         assert report.passed, str(report)
 
 
+@pytest.mark.slow
 def test_another_value_compiles_no_kernel() -> None:
     dr = backend.drjit()
     laws = ["reciprocity", "energy", "pdf", "weight", "precision"]

@@ -52,9 +52,10 @@ def packages(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_law_by_one_file(packages: Path, tmp_path: Path) -> None:
     report = tmp_path / "report"
-    done = outside.gonio(packages, "verify", "lambert", "--quick", "--json", "--report", str(report))
+    done = outside.gonio(packages, "verify", "lambert", "--quick", "--json", "-o", str(report))
     assert done.returncode == 0, done.stderr
     verdicts = json.loads(done.stdout)["cards"][0]["verdicts"]
     asked = [law.name for law in laws.chosen(None)]

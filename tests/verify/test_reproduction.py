@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 
 import gonio as go
+import pytest
 from gonio.verify import Verdict, verify
 from gonio.verify.severity import Grade
 
@@ -23,6 +24,7 @@ def test_it_holds_the_plugin_and_the_figure() -> None:
     assert len([line for line in program.splitlines() if line]) <= 17
 
 
+@pytest.mark.slow
 def test_only_where_there_is_a_plugin() -> None:
     class Bright(go.Lambert):
         """Reflects more than it gets."""
@@ -34,5 +36,6 @@ def test_only_where_there_is_a_plugin() -> None:
     assert verdict.failed and verdict.reproduction == ""
 
 
+@pytest.mark.slow
 def test_what_a_plugin_holds_is_blamed_and_not_the_plugin() -> None:
     assert failed("mitsuba:twosided", "pdf").grade is Grade.INNER

@@ -87,6 +87,7 @@ def test_a_file_that_cannot_be_used_is_an_error_with_code_2(
     assert code == 2 and words in err
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -112,6 +113,7 @@ def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pyt
     assert "no end after 1 s" in found["weight"].why[0] and found["shader"].status == "does not apply"
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -121,13 +123,13 @@ def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pyt
         (["conductor", "--param", "alpha=x"], "a number expected"),
         (["conductor", "--param", "alpha=-1"], "-1 given"),
         (["conductor", "--param", "ndf=gxg"], "did you mean 'ggx'"),
-        (["conductor", "--sweep", "alpha=1..0"], "not an increasing range"),
+        (["conductor", "--vary", "alpha=1..0"], "not an increasing range"),
         (["conductor", "--quick", "--deep"], "give one of them"),
         (["conductor", "--law", "gravity"], "unknown law 'gravity'"),
         (["conductor", "--at", "10"], "not a pair of directions"),
         (["nowhere.py:Mine"], "no file"),
         (["nowhere.json"], "no file"),
-        (["conductor", "--report", "/proc/none"], "can be written to"),
+        (["conductor", "--output", "/proc/none"], "can be written to"),
         (["mitsuba:roughplastc"], "did you mean 'roughplastic'"),
         (["mitsuba:measured"], "filename"),
         (["mitsuba:roughplastic", "--param", "alhpa=1"], "alhpa"),

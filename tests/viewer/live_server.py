@@ -27,7 +27,7 @@ def running(what: stage.Stage = STAGE) -> Iterator[server.Server]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page, "_script", lambda: "console.log(1)")
         patch.setattr(page, "_style", lambda: "body { margin: 0 }")
-        application = server.Application(what, server.Door("127.0.0.1"))
+        application = server.Application(what, server.AccessControl("127.0.0.1"))
         one = server.Server(application, "127.0.0.1", 0, quiet=True)
         thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
         thread.start()
@@ -50,7 +50,7 @@ def wait_for(condition: Callable[[], Any], seconds: float = 20.0) -> None:
 def get(one: server.Server, path: str | None = None, **headers: str) -> tuple[int, dict[str, str], str]:
     """Status, headers (lower case) and body; `path` goes out as it is."""
     connection = http.client.HTTPConnection("127.0.0.1", one.port, timeout=10)
-    connection.putrequest("GET", f"/?token={one.application.door.token}" if path is None else path, skip_host=True)
+    connection.putrequest("GET", f"/?token={one.application.access.token}" if path is None else path, skip_host=True)
     for name, value in {"Host": f"127.0.0.1:{one.port}", **headers}.items():
         connection.putheader(name.replace("_", "-"), value)
     connection.endheaders()
@@ -62,7 +62,7 @@ def get(one: server.Server, path: str | None = None, **headers: str) -> tuple[in
 
 def speak(one: server.Server, token: str | None = None, origin: str | None = "", **more: Any) -> ClientConnection:
     """A connected page; `origin` "" is the right one."""
-    given = one.application.door.token if token is None else token
+    given = one.application.access.token if token is None else token
     right = f"http://127.0.0.1:{one.port}"
     address = f"ws://127.0.0.1:{one.port}/ws?token={given}"
     return connect(address, origin=right if origin == "" else origin, max_size=None, compression=None, **more)
@@ -74,7 +74,7 @@ def upgraded(one: server.Server, more: str = "", token: str | None = None, buffe
     client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
     client.settimeout(10)
     client.connect(("127.0.0.1", one.port))
-    host, given = f"127.0.0.1:{one.port}", one.application.door.token if token is None else token
+    host, given = f"127.0.0.1:{one.port}", one.application.access.token if token is None else token
     head = f"GET /ws?token={given} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n{more}"
     key = "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
     client.sendall(f"{head}Connection: Upgrade\r\nUpgrade: websocket\r\n{key}\r\n".encode())

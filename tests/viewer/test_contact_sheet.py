@@ -8,7 +8,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.viewer import contact_sheet, figures
+from gonio.viewer import contact_sheet, figures, sheet_layout
 from gonio.viewer.figures import Drawing
 from gonio.viewer.variations import Variation
 
@@ -24,6 +24,9 @@ from gonio.viewer.variations import Variation
         ('name="a,b",c', ("a,b", "c")),
         ("flag=true,false", (True, False)),
         ("file=v1.5.png", ("v1.5.png",)),
+        ("file=a/../b.png", ("a/../b.png",)),
+        ("p=0..1", (0, 0.25, 0.5, 0.75, 1)),
+        ("p=1..16", (1, 2, 4, 8, 16)),  # geometric from a factor of ten on
     ],
 )
 def test_values_are_split_at_commas_outside_of_brackets(text: str, values: tuple[object, ...]) -> None:
@@ -101,11 +104,11 @@ def test_no_two_pictures_overlap_in_a_sheet_of_three_parameters(tmp_path: Path) 
 
 @pytest.mark.parametrize(("count", "columns"), [(3, 3), (4, 2), (6, 3), (5, 3), (7, 4)])
 def test_a_row_is_wrapped_to_the_shape_of_a_page(count: int, columns: int) -> None:
-    assert contact_sheet._columns_of_a_row(count, aspect=1.0) == columns
+    assert sheet_layout._columns_of_a_row(count, aspect=1.0) == columns
 
 
 def test_wide_pictures_are_stacked() -> None:
-    assert contact_sheet._columns_of_a_row(5, aspect=10 / 3) == 1
+    assert sheet_layout._columns_of_a_row(5, aspect=10 / 3) == 1
 
 
 @pytest.mark.parametrize("suffix", [".pdf", ".svg"])

@@ -42,6 +42,7 @@ def test_a_layer_that_one_ball_has_is_written() -> None:
     assert [variant["off"] for variant in found["variants"]] == [[]]
 
 
+@pytest.mark.slow
 def test_a_slider_switches_a_layer_on(chrome: Any, tmp_path: Path) -> None:
     tab = chrome.new_page(viewport=WIDE)
     page = Page(tab, page_file.export(bare(Varnished()), tmp_path / "page.html"))

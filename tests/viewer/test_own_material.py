@@ -92,6 +92,7 @@ def agrees(page: Page, bsdf: go.BSDF) -> bool:
     return np.allclose(found, bsdf.eval(wo, wi, precision="float64"), rtol=2e-3, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_its_sliders_choices_and_inner_materials_do_what_python_says(opened: tuple[stage.Stage, Page]) -> None:
     what, page = opened
     bsdf = stage.replaced(what.materials["m0"].bsdf, what.rows[0].balls[2].values)

@@ -98,6 +98,7 @@ def test_the_split_sum_is_the_albedo_of_white_by_each_masking(homework: dict[str
 # --------------------------------------------------------------------------- any models
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("name", [name for name in models() if not models()[name].stochastic])
 def test_every_model_makes_a_page(name: str) -> None:
     data = page.page_data(stage.of_targets([name]))
@@ -137,10 +138,10 @@ def test_an_option_reaches_the_material_inside_too() -> None:
 
 def test_an_option_that_does_not_reach_everything_says_so() -> None:
     what = stage.of_targets(["coat", "conductor"], ["masking=schlick-direct"])
-    assert what.notes == ("masking is set of Coat itself; base.masking stays as it is",)
+    assert what.notes == ("masking is set on Coat itself; base.masking is unchanged",)
     what = stage.of_targets(["mix(a=conductor,b=conductor)", "conductor"], ["alpha=0.2"])
-    assert what.notes[0].startswith("alpha sets nothing of Mix, which has a.alpha and b.alpha: give one of them")
-    with pytest.raises(InputError, match=r"alpha sets nothing of Mix.*\n.*--param a\.alpha=0\.2"):
+    assert what.notes[0].startswith("alpha is ambiguous for Mix, which has a.alpha and b.alpha: give one of them")
+    with pytest.raises(InputError, match=r"alpha is ambiguous for Mix.*\n.*--param a\.alpha=0\.2"):
         stage.of_targets(["mix(a=conductor,b=conductor)"], ["alpha=0.2"])
 
 
@@ -174,7 +175,7 @@ def test_other_values_than_tables_were_found_from_are_another_variant() -> None:
     assert len({v["key"] for v in variants}) == 5 and len({v["text"] for v in variants}) == 1
     declared = [p["value"] for v in variants for p in v["manifest"]["parameters"] if p["path"] == "base.alpha"]
     assert declared == [0.3] * 5
-    with pytest.raises(InputError, match="no table is found from 'depth'"):
+    with pytest.raises(InputError, match="no table depends on 'depth'"):
         page.variant_data(what.materials["m0"].bsdf, {}, (), {"depth": 2.0})
 
 
@@ -185,7 +186,7 @@ def test_other_values_than_tables_were_found_from_are_another_variant() -> None:
         (["conductor"], ["beta=1"], "unknown parameter 'beta'"),
         (["conductor"], ["alpha=-1"], "-1 given"),
         (["conductor(alpha=x)"], [], "'x' given"),
-        (["mitsuba:plastic"], [], "no model of Gonio"),
+        (["mitsuba:plastic"], [], "not a model of Gonio"),
     ],
 )
 def test_what_cannot_be_shown_is_one_clear_error(targets: list[str], parameters: list[str], what: str) -> None:
@@ -302,7 +303,7 @@ def test_the_export_holds_everything_in_one_and_a_half_megabytes(tmp_path: Path)
 def test_nothing_is_written_where_it_cannot_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong in ("page.pdf", "no/such/page.html"):
         with pytest.raises(SystemExit) as ended:
-            cli.main(["view", "lambert", "--export", str(tmp_path / wrong)])
+            cli.main(["view", "lambert", "--output", str(tmp_path / wrong)])
         assert ended.value.code == 2
     assert "end" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

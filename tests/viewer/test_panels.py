@@ -87,6 +87,7 @@ def opened(tab: Any, messages: list[str]) -> Any:
     return output
 
 
+@pytest.mark.slow
 def test_an_installed_package_brings_a_panel_into_an_exported_page(package: Path, tmp_path: Path) -> None:
     file = tmp_path / "page.html"
     path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -109,7 +110,7 @@ def test_an_installed_package_brings_a_panel_into_an_exported_page(package: Path
 
 def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: type[go.Panel]) -> None:
     what = stage.of_models([go.Lambert(albedo=0.25)], [{"albedo"}])
-    one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
+    one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
     wait_for(lambda: one.started)
@@ -131,10 +132,11 @@ def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: 
     assert messages == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ("gonio.addPanel({ id: 'lobe', title: 'Another', mount() {} })", "There is a panel 'lobe' already."),
+        ("gonio.addPanel({ id: 'lobe', title: 'Another', mount() {} })", "A panel 'lobe' already exists."),
         ("gonio.addPanel({ id: 'empty', title: 'Empty' })", "A panel needs an id, a title and mount(host, app)."),
         ("gonio.addPanel({ id: }", "Unexpected token"),
     ],

@@ -128,7 +128,9 @@ def test_with_transport_path_it_is_the_renderers_own_picture() -> None:
     area = {"type": "area", "center": [0, 6, 6], "u": [2, 0, 0], "v": [0, 1.4, -1.4], "radiance": [5, 5, 5]}
     reference = Reference(what)
     found = picture(reference, scene(what, [WHITE, area], spp=16, transport="path", max_depth=5))
-    own = integrators.Render(reference._whole[1], integrators.Settings("path", max_depth=5), reference._render.sensor)
+    own = integrators.Render(
+        reference._combined[1], integrators.Settings("path", max_depth=5), reference._render.sensor
+    )
     own.advance(16)
     inside = found[..., 3] == 1.0
     assert inside.sum() > 800

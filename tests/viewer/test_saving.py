@@ -202,7 +202,7 @@ def test_a_page_that_comes_later_learns_what_is_wrong(file: Path) -> None:
 
 @contextmanager
 def live(what: Stage) -> Iterator[tuple[server.Server, Any]]:
-    one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
+    one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
     wait_for(lambda: one.started)

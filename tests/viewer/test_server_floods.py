@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 import websockets
-from gonio.viewer import server, session
+from gonio.viewer import guards, server, session
 from live_server import STAGE, final_frame, get, next_frame, rest, running, scene, speak, upgraded, wait_for
 
 
@@ -52,8 +52,8 @@ def test_200_connections_that_say_nothing_leave_a_good_page_served(one: server.S
 
 
 def test_connections_that_say_nothing_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "REQUEST_SECONDS", 0.2)
-    monkeypatch.setattr(server, "MOST_CONNECTIONS", 20)
+    monkeypatch.setattr(guards, "REQUEST_SECONDS", 0.2)
+    monkeypatch.setattr(guards, "MAX_CONNECTIONS", 20)
     with running() as one:
         idle = [socket.create_connection(("127.0.0.1", one.port), 10) for _ in range(40)]
         for connection in idle:
@@ -68,7 +68,7 @@ def test_200_sessions_that_never_read_leave_a_good_page_served(one: server.Serve
     async def flood() -> int:
         """How many of 200 sessions with the right token are open at the end."""
         right = {"origin": f"http://127.0.0.1:{one.port}", "compression": None}
-        address = f"ws://127.0.0.1:{one.port}/ws?token={one.application.door.token}"
+        address = f"ws://127.0.0.1:{one.port}/ws?token={one.application.access.token}"
         opened: list[Any] = []
 
         async def client() -> None:
@@ -86,7 +86,7 @@ def test_200_sessions_that_never_read_leave_a_good_page_served(one: server.Serve
         good.send(scene(1))
         final_frame(good, 1)
         left = asyncio.run(flood())
-        assert left <= server.MOST_SESSIONS
+        assert left <= server.MAX_SESSIONS
         good.send(scene(2))  # it was there before and is there still
         assert final_frame(good, 2).any()
         with speak(one) as later:
@@ -99,7 +99,7 @@ def test_a_page_that_takes_no_frames_is_ended(monkeypatch: pytest.MonkeyPatch) -
     with running() as one:
         with speak(one) as silent, pytest.raises(websockets.ConnectionClosed, match="1008"):
             silent.recv(10)
-        with speak(one) as idle, pytest.raises(websockets.ConnectionClosed, match="nothing was asked for"):
+        with speak(one) as idle, pytest.raises(websockets.ConnectionClosed, match="nothing was requested"):
             idle.send(json.dumps({"type": "ack", "frame": 1}))  # of a frame that was not sent
             idle.recv(10)
         with speak(one) as stalled, pytest.raises(websockets.ConnectionClosed, match="frames are not taken"):
@@ -109,6 +109,7 @@ def test_a_page_that_takes_no_frames_is_ended(monkeypatch: pytest.MonkeyPatch) -
         assert get(one)[0] == 200
 
 
+@pytest.mark.slow
 def test_a_page_that_sends_and_never_reads_is_let_go(one: server.Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session, "RATE", 1e9)  # else it takes the while until so many answers wait
     monkeypatch.setattr(session, "SHARE", 1e9)
@@ -210,13 +211,14 @@ def test_a_message_of_endless_fragments_is_cut_off(one: server.Server) -> None:
         assert client.recv(12) == b"HTTP/1.1 101"
         client.sendall(b"\x02\x80\x00\x00\x00\x00")
         with contextlib.suppress(OSError):  # more than one may be on its way when it ends
-            client.sendall(b"\x00\x80\x00\x00\x00\x00" * (server.MOST_FRAGMENTS + 10))
+            client.sendall(b"\x00\x80\x00\x00\x00\x00" * (guards.MAX_FRAGMENTS + 10))
         assert b"too many fragments" in rest(client)
     wait_for(lambda: not one.application.sessions)
 
 
+@pytest.mark.slow
 def test_a_flood_of_pings_is_cut_off(one: server.Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "MOST_CONTROLS", 20)
+    monkeypatch.setattr(guards, "MAX_CONTROLS", 20)
     with speak(one) as client:
         for _ in range(10):
             assert client.ping().wait(10)
@@ -233,11 +235,11 @@ def test_a_handshake_that_makes_no_sense_holds_no_connection(one: server.Server,
 
 
 def test_pages_that_are_asked_for_and_not_taken_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "MOST_ANSWERS", 3)
-    monkeypatch.setattr(server, "ANSWER_SECONDS", 1.0)
+    monkeypatch.setattr(guards, "MAX_ANSWERS", 3)
+    monkeypatch.setattr(guards, "ANSWER_SECONDS", 1.0)
     with running() as one, contextlib.ExitStack() as clients:
         one.application._html = "x" * (16 << 20)  # more than the system's buffers hold
-        request = f"GET /?token={one.application.door.token} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+        request = f"GET /?token={one.application.access.token} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
         for _ in range(10):
             client = clients.enter_context(socket.create_connection(("127.0.0.1", one.port), 10))
             client.sendall(request)
@@ -248,7 +250,7 @@ def test_pages_that_are_asked_for_and_not_taken_are_bounded(monkeypatch: pytest.
 
 
 def test_when_all_places_are_taken_a_newcomer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "MOST_SESSIONS", 1)
+    monkeypatch.setattr(server, "MAX_SESSIONS", 1)
     with running() as one, speak(one) as first:
         first.send(scene(1))
         next_frame(first)
@@ -257,7 +259,7 @@ def test_when_all_places_are_taken_a_newcomer_is_told(monkeypatch: pytest.Monkey
 
 
 def test_a_page_that_takes_nothing_gives_its_place_to_a_newcomer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "MOST_SESSIONS", 1)
+    monkeypatch.setattr(server, "MAX_SESSIONS", 1)
     monkeypatch.setattr(server, "PATIENCE_SECONDS", 0.05)
     with running() as one, speak(one) as stalled:
         stalled.send(scene(1, spp=1))

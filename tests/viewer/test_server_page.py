@@ -75,7 +75,7 @@ class Live:
 @pytest.fixture(scope="module")
 def live() -> Iterator[Live]:
     with browser.chromium() as chromium:
-        application = server.Application(stage.homework(), server.Door("127.0.0.1"))
+        application = server.Application(stage.homework(), server.AccessControl("127.0.0.1"))
         one = server.Server(application, "127.0.0.1", 0, quiet=True)
         thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
         thread.start()
@@ -92,6 +92,7 @@ def live() -> Iterator[Live]:
             thread.join(20)
 
 
+@pytest.mark.slow
 def test_the_picture_is_the_path_traced_one(live: Live) -> None:
     live.wait("gonio.live.status.samples >= 256")
     raster, reference = live.pictures()

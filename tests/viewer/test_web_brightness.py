@@ -19,7 +19,7 @@ from test_web_picture import python_picture
 from web_page import COARSE, PIXELS, WIDE, Page, decoded
 
 MODELS = [name for name in models() if not models()[name].stochastic]
-SAMPLES = 256
+SAMPLES = 64
 FEW = 32  # the light of a whole ball is a mean over hundreds of pixels
 
 
@@ -103,7 +103,7 @@ def live(chrome: Any) -> Iterator[Callable[[stage.Stage], Any]]:
     opened = []
 
     def open_page(what: stage.Stage) -> Any:
-        one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
+        one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)
         thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
         thread.start()
         while not one.started:

@@ -81,6 +81,7 @@ def balls(picture: np.ndarray) -> list[np.ndarray]:
     return sorted((m for m in masks if m.sum() > 200), key=lambda m: float(np.mean(np.nonzero(m)[1])))
 
 
+@pytest.mark.slow
 def test_the_difference_is_that_of_split_sum_and_truth(lit: Page) -> None:
     full, split = of_term(lit, "full", 128), of_term(lit, "split", 32)
     difference = of_term(lit, "split-error", 128)

@@ -1,4 +1,4 @@
-/** The page at work: resolves the state into what is drawn, draws while anything is left to refine, answers panels. */
+/** The page's application: resolves the state into what is drawn, refines the picture, and notifies the panels. */
 import { attachCamera } from "./camera";
 import type { PageData, Values, Vec3 } from "./data";
 import { type EnvironmentPicture, environmentFromData } from "./environment";
@@ -14,13 +14,13 @@ import { Change, type Slot, type State, Store, initialState } from "./state";
 import { decodeState, encodeState } from "./url";
 import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
 
-/** The Okabe-Ito colours that stand out on light and dark alike, told apart by most eyes. */
+/** The Okabe-Ito colors that are visible on light and dark backgrounds and distinct under most color deficiencies. */
 const SLOT_COLORS = ["#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#0072b2"];
-/** A change counts as motion for so long: coarser pictures are drawn meanwhile where the machine is slow. */
+/** Duration in ms for which a change counts as motion: slow machines draw coarser pictures meanwhile. */
 const MOTION = 160;
-const MOST_PIXELS = 2_400_000;
+const MAX_PIXELS = 2_400_000;
 
-/** What is wrong with the user's file, where, and what to do about it. */
+/** What is wrong with the user's file, the location, and how to fix it. */
 export interface Fault {
   what: string;
   where: string;
@@ -40,16 +40,16 @@ export class PageApp implements App {
   presenter: Presenter | null = null;
   /** Resolves with the first picture on the canvas. */
   readonly ready: Promise<void>;
-  /** After a new picture, reference or picked point. */
+  /** Called after a new picture, reference or picked point. */
   onRefresh: (what: Refresh) => void = () => {};
   onSay: (text: string, kind: "info" | "error") => void = () => {};
-  /** What the page waits for, by what makes it wait; null: no more. */
+  /** What the page is waiting for, per cause; null: no longer waiting. */
   onBusy: (what: "shader" | "server", text: string | null) => void = () => {};
-  /** A live page asks its server for a variant that is not here. */
+  /** A live page asks its server for a variant that the page lacks. */
   onMissingVariant: (slot: number) => void = () => {};
-  /** What is wrong with the picture, as a line; "" where nothing is. */
+  /** What is wrong with the picture, as one line; "" if nothing is. */
   onFlaws: (text: string) => void = () => {};
-  /** The user's file cannot be shown, and why; null where it can again. */
+  /** Why the user's file cannot be shown; null once it can be again. */
   onFault: (fault: Fault | null) => void = () => {};
   reference: Picture | null = null;
   private meshes: Partial<Record<State["view"]["mesh"], MeshBuffers>> = {};
@@ -75,7 +75,7 @@ export class PageApp implements App {
     readonly overlay: HTMLElement,
   ) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
-    if (!gl) throw new Error("This browser has no WebGL 2, which the page draws with.");
+    if (!gl) throw new Error("This browser does not support WebGL 2, which the page needs.");
     this.gl = gl;
     this.store = new Store(data);
     this.store.state = this.fromLink();
@@ -87,13 +87,13 @@ export class PageApp implements App {
       this.resolveReady = resolve;
       this.rejectReady = reject;
     });
-    this.ready.catch(() => {}); // said on the page
+    this.ready.catch(() => {}); // reported on the page
     const pictured = data.scene.lights.find((l) => l.type === "environment" && l.image?.data);
     if (pictured?.type === "environment" && pictured.image?.data)
       this.environment = environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
     attachCamera(canvas, this.store, (x, y) => this.pick(x, y));
     this.store.subscribe((change) => this.respond(change));
-    canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has dropped the page's pictures: load it again.", "error"));
+    canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has lost the page's pictures: reload the page.", "error"));
     new ResizeObserver(() => this.resized()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.themeChanged());
     addEventListener("hashchange", () => {
@@ -111,7 +111,7 @@ export class PageApp implements App {
     return this.store.state;
   }
 
-  /** Made when it is first asked for: a browser may lack what it needs, and the page draws all the same. */
+  /** Created on first use: a browser may lack what it needs, and the page draws without it. */
   get evaluator(): Evaluator {
     return (this.ownEvaluator ??= new Evaluator(this.shaders));
   }
@@ -121,8 +121,8 @@ export class PageApp implements App {
   }
 
   /**
-   * Other materials and rows in the place of the page's own, after the user's file was saved. What was changed on the
-   * page stays, where what it belongs to is still there.
+   * Replaces the page's materials and rows after the user's file was saved. The user's changes on the page are kept where
+   * the row or parameter they belong to still exists.
    */
   renew(made: Pick<PageData, "revision" | "materials" | "scene" | "dfg">): void {
     const { lights, view } = this.state;
@@ -132,13 +132,13 @@ export class PageApp implements App {
     this.lastShader.clear();
     this.store.initial = initialState(this.data);
     const state = decodeState(changes, this.store.initial, this.data.materials);
-    // What a link cannot hold: files that were dropped on the page.
+    // What a link cannot contain: files that were dropped on the page.
     this.store.replace({ ...state, lights, view: { ...state.view, mesh: view.mesh } });
   }
 
-  // ---------------------------------------------------------------- the state, resolved
+  // ---------------------------------------------------------------- resolving the state
 
-  /** Weights that are not off on some ball of a row. */
+  /** Weights that are nonzero on at least one ball of a row. */
   switchedOn({ material, values, balls }: Slot): string[] {
     const parameters = this.shaders.material(material).variants[0]?.manifest.parameters ?? [];
     return parameters
@@ -146,7 +146,7 @@ export class PageApp implements App {
       .map(({ path }) => path);
   }
 
-  /** The shader that fits a ball, or null where the page lacks it. */
+  /** The shader that fits a ball, or null if the page has none. */
   fitting(slot: number, ball: number): Shader | null {
     return this.fit(this.slot(slot), ball);
   }
@@ -155,38 +155,38 @@ export class PageApp implements App {
     return this.shaders.find(row.material, row.choices, this.wantedValues(row, ball), this.switchedOn(row));
   }
 
-  /** Balls of a row whose shader the page lacks. */
+  /** Balls of a row for which the page has no shader. */
   lacking(row: Slot): number[] {
     return row.balls.flatMap((_, ball) => (this.fit(row, ball) ? [] : [ball]));
   }
 
-  /** Whether a row can be shown as it is, sooner or later: a page without a server keeps to what it holds. */
+  /** Whether a row can be shown, now or once the server answers: a page without a server is limited to its shaders. */
   possible(row: Slot): boolean {
     return Boolean(this.data.socket) || this.lacking(row).length === 0;
   }
 
-  /** What draws a ball; without one that of the selected, where it is of this row, else of the first. */
+  /** The shader of a ball; if it has none, that of the selected ball if it is in this row, else that of the first. */
   shaderOf(slot: number, ball?: number): Shader {
     const { selection } = this.state;
     const { material, balls } = this.slot(slot);
     const index = ball ?? (selection.slot === slot ? Math.min(selection.ball, balls.length - 1) : 0);
-    const found = this.fitting(slot, index);
+    const shader = this.fitting(slot, index);
     const place = `${slot} ${index}`;
-    if (found) {
-      this.lastShader.set(place, found);
-      return found;
+    if (shader) {
+      this.lastShader.set(place, shader);
+      return shader;
     }
-    // Until the server has written it, the last one that fitted.
+    // The last shader that fitted, until the server has written the new one.
     const last = this.lastShader.get(place);
     return last?.material.id === material ? last : this.shaders.at(this.shaders.material(material), 0);
   }
 
-  /** What a ball is drawn with: what tables were found from has the values of its shader, also where others are wanted. */
+  /** The parameters a ball is drawn with: those that tables were computed from are fixed to the shader's values. */
   valuesOf(slot: number, ball: number): Values {
     return { ...this.wantedValues(this.slot(slot), ball), ...this.shaderOf(slot, ball).variant.fixed };
   }
 
-  /** Declared, then the row's, then the ball's own. */
+  /** Declared values, overridden by the row's, overridden by the ball's. */
   wantedValues({ material, values, balls }: Slot, ball: number): Values {
     return { ...this.shaders.declared(material), ...values, ...balls[ball]?.set };
   }
@@ -203,7 +203,7 @@ export class PageApp implements App {
     return slot;
   }
 
-  /** Whether the first row is shown only as what the others are subtracted from. */
+  /** Whether the first row serves only as the reference that the other rows are subtracted from. */
   private comparesRows(): boolean {
     return this.state.view.term === "rows" && this.visibleSlots().length > 1;
   }
@@ -234,7 +234,7 @@ export class PageApp implements App {
     const { mesh } = this.state.view;
     if (mesh === "torus") this.meshes.torus ??= upload(this.gl, torus());
     if (mesh === "shaderball") this.meshes.shaderball ??= upload(this.gl, shaderBall());
-    return this.meshes[mesh] ?? null; // a link to a dropped file shows spheres: the file is not in it
+    return this.meshes[mesh] ?? null; // a link does not contain a dropped file: it shows spheres
   }
 
   useMesh(mesh: Mesh): void {
@@ -262,7 +262,7 @@ export class PageApp implements App {
     this.saveLink();
   }
 
-  /** What is edited and plotted is among what is seen: a row alone, or the first one left, is the selected one. */
+  /** The selected row is always visible, since panels edit and plot it: a row shown alone, or the first visible one. */
   private selectShown(): void {
     const shown = this.visibleSlots();
     const { slot, ball } = this.state.selection;
@@ -291,24 +291,24 @@ export class PageApp implements App {
     });
   }
 
-  /** The browser says so late, and under load after a picture of the new size is there: that one stands. */
+  /** Browsers report a resize late, under load after a picture of the new size was drawn, which is then kept. */
   private resized(): void {
     if (this.renderer.hasSize(...this.size())) this.redraw();
     else this.invalidate();
   }
 
-  /** Backing size of the canvas: multiples of 4, so that a reference at half or a quarter has whole pixels. */
+  /** Backing size of the canvas: multiples of 4, so that a reference at half or a quarter of it has integer size. */
   size(): [number, number] {
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const [w, h] = [this.canvas.clientWidth * ratio, this.canvas.clientHeight * ratio];
-    const fit = Math.min(1, Math.sqrt(MOST_PIXELS / Math.max(w * h, 1)));
+    const fit = Math.min(1, Math.sqrt(MAX_PIXELS / Math.max(w * h, 1)));
     return [Math.max(4, Math.floor((w * fit) / 4) * 4), Math.max(4, Math.floor((h * fit) / 4) * 4)];
   }
 
   private frame(now: number): void {
     if (this.converging) return this.schedule();
     const moving = now - this.changed < MOTION;
-    // What was asked of the GPU must be done before more is: a queue of samples would stand before the next slider.
+    // Earlier GPU work has to finish before more is submitted: a queue of samples would delay the response to a slider.
     if (this.fence && !this.dirty) {
       if (this.gl.getSyncParameter(this.fence, this.gl.SYNC_STATUS) !== this.gl.SIGNALED) return this.schedule();
       this.learn(now - this.submitted, moving);
@@ -318,7 +318,7 @@ export class PageApp implements App {
     }
     try {
       const scene = this.scene();
-      // The last picture stands, and the page stays alive, until the new one can be drawn.
+      // The last picture stays, and the page stays responsive, until the new one can be drawn.
       if (!this.renderer.ready(scene)) return this.schedule();
       this.resize(moving && this.slow ? 2 : 1);
       if (this.dirty) this.renderer.invalidate();
@@ -330,13 +330,13 @@ export class PageApp implements App {
       this.resolveReady();
       this.onRefresh("picture");
       if (moving || !this.renderer.done(scene) || this.inspector.due(true)) this.schedule();
-      this.mended();
+      this.clearFault();
     } catch (error) {
       this.fail(error);
     }
   }
 
-  /** No picture can be drawn: that is said until one can. */
+  /** Reports that no picture can be drawn, until one can. */
   private fail(error: unknown): void {
     const what = error instanceof Error ? error.message : String(error);
     console.error(what);
@@ -346,7 +346,7 @@ export class PageApp implements App {
     this.rejectReady(error);
   }
 
-  private mended(): void {
+  private clearFault(): void {
     if (!this.failed) return;
     this.failed = false;
     this.onFault(null);
@@ -360,7 +360,7 @@ export class PageApp implements App {
     this.onFlaws(text);
   }
 
-  /** Canvas and sums, these by so much coarser. */
+  /** Sizes canvas and sums, the sums coarser by this factor. */
   private resize(coarse: number): void {
     const [width, height] = this.size();
     if (this.canvas.width !== width || this.canvas.height !== height) {
@@ -377,7 +377,7 @@ export class PageApp implements App {
     this.gl.flush();
   }
 
-  /** How long the last picture took decides how coarse the next in motion is, and how many samples one at rest gets. */
+  /** The last picture's time determines the resolution of the next one in motion and the samples of one at rest. */
   private learn(took: number, moving: boolean): void {
     if (this.fence) this.gl.deleteSync(this.fence);
     this.fence = null;
@@ -386,8 +386,8 @@ export class PageApp implements App {
   }
 
   /**
-   * Draws until the picture is done or has so many samples, begun anew where it has more already: one state and one
-   * number of samples give one picture, to the bit.
+   * Draws until the picture is complete or has this many samples, restarting if it already has more: one state and one
+   * number of samples determine the picture bit for bit.
    */
   async converge(samples = Infinity): Promise<Picture> {
     const { renderer } = this;
@@ -404,7 +404,7 @@ export class PageApp implements App {
           if (renderer.ready(scene)) for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
           await new Promise((resolve) => setTimeout(resolve));
         }
-      } while (this.dirty); // changed meanwhile: the picture is that of the state it is returned with
+      } while (this.dirty); // the state changed meanwhile
     } finally {
       this.converging = false;
     }
@@ -428,11 +428,11 @@ export class PageApp implements App {
     if (this.presenter) this.redraw();
   }
 
-  /** PNG of what is on the canvas; drawn anew, since a canvas is empty after it was shown. */
+  /** PNG of the canvas; drawn again first, since a canvas is empty after it was presented. */
   screenshot(): Promise<Blob> {
     this.renderer.present(this.scene(), this.presenter, this.canvas.width, this.canvas.height);
     return new Promise((resolve, reject) =>
-      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The browser made no picture."))), "image/png"),
+      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The browser could not encode the picture."))), "image/png"),
     );
   }
 
@@ -455,7 +455,7 @@ export class PageApp implements App {
     this.repick();
   }
 
-  /** The same point of the selected ball, under the state of now; the ball's middle where nothing was clicked. */
+  /** The same point of the selected ball under the current state; the ball's default point if nothing was clicked. */
   private repick(): void {
     const { selection } = this.state;
     const balls = this.balls();
@@ -464,7 +464,7 @@ export class PageApp implements App {
     const { eye } = cameraFrame(this.state.camera);
     let hit = this.lastHit;
     if (!hit || hit.ball.slot !== ball.slot || hit.ball.ball !== ball.ball) {
-      // Halfway to the rim, where wo is oblique: seen straight on every lobe looks alike.
+      // Halfway to the rim, where wo is oblique: at normal incidence all lobes look alike.
       const toward = normalize(sub(eye, ball.center));
       const aside = normalize(cross([0, 1, 0], toward));
       const [c, s] = [Math.cos(Math.PI / 4), Math.sin(Math.PI / 4)];
@@ -526,7 +526,7 @@ export class PageApp implements App {
       try {
         history.replaceState(null, "", this.link());
       } catch {
-        // A page inside another (a notebook) may not write its address; "copy link" still gives it.
+        // A page inside another (a notebook) may not change its address; "copy link" still works.
       }
     }, 300);
   }

@@ -1,4 +1,4 @@
-/** Orbit by mouse, touch and keys; a click that does not drag picks. */
+/** Orbit camera for mouse, touch and keys; a click without a drag picks a point. */
 import type { Store } from "./state";
 import { add, cameraFrame, scale } from "./vectors";
 
@@ -6,8 +6,8 @@ const STEEPEST = Math.PI / 2 - 0.02;
 
 export function orbit(store: Store, by: number, up: number): void {
   store.update("camera", ({ camera }) => {
-    const turned = camera.azimuth - by;
-    camera.azimuth = Math.atan2(Math.sin(turned), Math.cos(turned));
+    const azimuth = camera.azimuth - by;
+    camera.azimuth = Math.atan2(Math.sin(azimuth), Math.cos(azimuth));
     camera.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, camera.elevation + up));
   });
 }
@@ -18,7 +18,7 @@ export function zoom(store: Store, factor: number): void {
   });
 }
 
-/** Moves the target in the picture's plane, in fractions of the picture's height. */
+/** Moves the target in the image plane, in fractions of the picture's height. */
 export function pan(store: Store, x: number, y: number): void {
   store.update("camera", ({ camera }) => {
     const frame = cameraFrame(camera);
@@ -33,16 +33,16 @@ export function resetCamera(store: Store): void {
   });
 }
 
-/** `pick` gets the position of a click in CSS pixels of the canvas. */
+/** `pick` receives the position of a click in CSS pixels of the canvas. */
 export function attachCamera(canvas: HTMLElement, store: Store, pick: (x: number, y: number) => void): void {
   const pointers = new Map<number, { x: number; y: number }>();
-  let travelled = 0;
+  let dragged = 0;
   let spread = 0;
 
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (pointers.size === 1) travelled = 0;
+    if (pointers.size === 1) dragged = 0;
     spread = 0;
   });
 
@@ -51,8 +51,8 @@ export function attachCamera(canvas: HTMLElement, store: Store, pick: (x: number
     if (!last) return;
     const [dx, dy] = [event.clientX - last.x, event.clientY - last.y];
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    travelled += Math.abs(dx) + Math.abs(dy);
-    if (travelled < 4) return; // a finger or a hand is never quite still
+    dragged += Math.abs(dx) + Math.abs(dy);
+    if (dragged < 4) return; // tolerance for an unsteady hand
     const height = canvas.clientHeight || 1;
     if (pointers.size === 2) {
       const [a, b] = [...pointers.values()] as [{ x: number; y: number }, { x: number; y: number }];
@@ -67,7 +67,7 @@ export function attachCamera(canvas: HTMLElement, store: Store, pick: (x: number
   const release = (event: PointerEvent) => {
     if (!pointers.delete(event.pointerId)) return;
     spread = 0;
-    if (event.type === "pointerup" && pointers.size === 0 && travelled < 4 && event.button === 0) {
+    if (event.type === "pointerup" && pointers.size === 0 && dragged < 4 && event.button === 0) {
       const box = canvas.getBoundingClientRect();
       pick(event.clientX - box.left, event.clientY - box.top);
     }

@@ -6,7 +6,7 @@
  */
 
 export type Value = number | number[] | string | boolean;
-/** Values by parameter path, e.g. {"base.alpha": [0.04, 0.04]}: only those that differ from the declaration's. */
+/** Values by parameter path, e.g. {"base.alpha": [0.04, 0.04]}: only those that differ from the declared ones. */
 export type Values = Record<string, Value>;
 export type Choices = Record<string, string | boolean>;
 export type Rgb = [number, number, number];
@@ -33,13 +33,13 @@ export interface Parameter {
   symbol: string;
   choices?: Record<string, string> | null;
   /**
-   * The struct's field that holds it; null for choices and flags, which shape the code and so pick a variant, and for
-   * a weight that this variant was written without.
+   * The struct's field of this parameter; null for choices and flags, which select a variant of the code, and for a
+   * weight that this variant was written without.
    */
   field: string | null;
-  /** The value at which what a weight weighs is not there; null where there is none. */
+  /** The value of a weight at which its part vanishes; null if there is none. */
   off: number | null;
-  /** Whether tables were found from its value: another value needs another variant. */
+  /** Whether tables depend on its value: another value needs another variant. */
   fixed: boolean;
 }
 
@@ -49,7 +49,7 @@ export interface TableTexture {
   size: number[];
   channels: 1 | 2 | 4;
   file: string;
-  /** What runs along x, y, z, and what a texel holds, where the page's maker knows. */
+  /** Quantities along x, y and z, and the quantity in a texel, where known. */
   axes?: string[];
   doc?: string;
 }
@@ -76,14 +76,14 @@ export interface Manifest {
 }
 
 export interface Variant {
-  /** Same key, same text and tables. */
+  /** Equal keys imply equal text and tables. */
   key: string;
   choices: Choices;
-  /** Weights that it was written without: it does for balls that have them off. */
+  /** Weights that the variant was written without: it fits balls at which they are off. */
   off: string[];
-  /** Values that its tables were found from: it does for balls that have them so. */
+  /** Values that its tables were computed from: it fits balls with these values. */
   fixed: Record<string, number | number[]>;
-  /** Distribution and masking of the facets that reflect in it; null where none do. */
+  /** Distribution and masking of the microfacets that reflect; null if there are none. */
   facets: [string, string] | null;
   manifest: Manifest;
   text: string;
@@ -91,7 +91,7 @@ export interface Variant {
   tables: Record<string, string>;
 }
 
-/** A and B of the split sum of some facets, over mu (x) and roughness (y), at texel centres. */
+/** A and B of the split sum of a microfacet model, over mu (x) and roughness (y), at texel centers. */
 export interface SplitSum {
   facets: [string, string];
   size: [number, number];
@@ -127,7 +127,7 @@ export interface Row {
 export interface EnvironmentImage {
   width: number;
   height: number;
-  /** Base64 float16 RGBA, top row first; a light that names an uploaded picture holds its key instead. */
+  /** Base64 float16 RGBA, top row first; a light that refers to an uploaded picture has its key instead. */
   data: string | null;
 }
 
@@ -172,12 +172,12 @@ export interface PageData {
   title: string;
   mode: "export" | "live";
   socket: string | null;
-  /** How often the materials were made anew since the server began: a user's file was saved. */
+  /** How often the materials were reloaded since the server started, each time because the user's file was saved. */
   revision: number;
   materials: Material[];
   scene: { rows: Row[]; lights: SceneLight[]; camera: Camera; spacing: number; mesh: string };
   display: { tone: Tone; exposure: number };
-  /** What the reader should know of this scene, a line each. */
+  /** Notes for the reader of this scene, one line each. */
   notes?: string[];
   dfg: SplitSum[];
 }
@@ -185,7 +185,7 @@ export interface PageData {
 /** Reads the JSON that page.py wrote into the document. */
 export function readPageData(): PageData {
   const element = document.getElementById("gonio-data");
-  if (!element?.textContent) throw new Error("This page holds no data: it is the template. Make one with: gonio view MODEL --export page.html");
+  if (!element?.textContent) throw new Error("This page is the template without data. Make a page with: gonio view MODEL --export page.html");
   const data = JSON.parse(element.textContent) as PageData;
   if (data.version !== 1) throw new Error(`The page data has version ${data.version}; this script reads version 1.`);
   return data;
@@ -198,7 +198,7 @@ export function decodeBase64(text: string): Uint8Array {
   return bytes;
 }
 
-/** Float32 from base64; the page's numbers are little-endian, as is every machine that runs a browser today. */
+/** Float32 from base64; the page's numbers are little-endian, as are all machines that run browsers today. */
 export function decodeFloats(text: string): Float32Array {
   return new Float32Array(decodeBase64(text).buffer as ArrayBuffer);
 }

@@ -1,8 +1,8 @@
 /**
- * What follows from a material's parameters alone: computed once a draw and handed to every pixel.
+ * Values that depend on a material's parameters alone: computed once per draw and passed to every pixel.
  *
- * A little travels from the vertex shader. What is more than fits between the stages is computed by a pass of its own
- * into a row of float texels; where a browser cannot draw into floats, every pixel computes it again.
+ * A few of them travel as varyings from the vertex shader. If they exceed the varyings, a separate pass computes them
+ * into a row of float texels; in a browser that cannot render to float textures, every pixel computes them.
  */
 import type { Manifest, Values } from "./data";
 import { HEADER, type Program, type Source } from "./programs";
@@ -11,12 +11,12 @@ import { isLong } from "./size";
 
 const SIZES = { float: 1, vec2: 2, vec3: 3 } as const;
 
-/** Flat varyings: WebGL 2 promises 15 vectors a stage, of which a mesh needs four. */
-const MOST_VARYINGS = 11;
-/** Rows of texels kept, one for each set of parameters: more than there are balls in a picture. */
-const MOST_KEPT = 256;
+/** Flat varyings: WebGL 2 guarantees 15 vectors per stage, of which a mesh needs four. */
+const MAX_VARYINGS = 11;
+/** Cached rows of texels, one per set of parameters: more than there are balls in a picture. */
+const MAX_ROWS = 256;
 
-/** In as few vec4 as will hold it: what each holds, and the struct made again of `derived_0`, `derived_1`, ... */
+/** Packs the struct into as few vec4 as possible: the contents of each, and the struct rebuilt from `derived_0`, ... */
 function packed(manifest: Manifest): { vectors: string[]; unpack: string } {
   const parts: string[] = [];
   const arguments_: string[] = [];
@@ -34,12 +34,12 @@ function packed(manifest: Manifest): { vectors: string[]; unpack: string } {
   return { vectors, unpack: `${manifest.derived?.struct}(${arguments_.join(", ")})` };
 }
 
-/** Whether it is more than fits between the stages. */
-export const derivesMuch = (manifest: Manifest): boolean => packed(manifest).vectors.length > MOST_VARYINGS;
+/** Whether the values exceed the varyings. */
+export const derivesMuch = (manifest: Manifest): boolean => packed(manifest).vectors.length > MAX_VARYINGS;
 
 const computed = ({ derived, functions }: Manifest) => `  ${derived?.struct} derived = ${functions.derive}(material);\n`;
 
-/** For a vertex shader that has the material's text: what it hands on, and the lines that compute it. */
+/** For a vertex shader that includes the material's text: its outputs, and the statements that compute them. */
 export function derivedOut(shader: Shader): { declarations: string; body: string } | null {
   const { manifest } = shader;
   if (!manifest.derived || !manifest.functions.derive || derivesMuch(manifest)) return null;
@@ -51,9 +51,9 @@ export function derivedOut(shader: Shader): { declarations: string; body: string
 }
 
 /**
- * For a fragment shader: what it reads, and the lines by which `derived` is there.
+ * For a fragment shader: its inputs, and the statements that define `derived`.
  *
- * `handed`: whether its vertex shader hands on what there is.
+ * `handed`: whether its vertex shader passes the values on.
  */
 export function derivedIn(shader: Shader, handed: boolean): { declarations: string; body: string } {
   const { manifest } = shader;
@@ -68,19 +68,19 @@ export function derivedIn(shader: Shader, handed: boolean): { declarations: stri
   return { declarations: vectors.map((_, v) => `flat in vec4 derived_${v};\n`).join(""), body: made };
 }
 
-/** Rows of texels by shader and parameters. */
+/** Cache of texel rows by shader and parameters. */
 export class DerivedTables {
-  private readonly kept = new Map<string, WebGLTexture>();
+  private readonly rows = new Map<string, WebGLTexture>();
   private vao: WebGLVertexArrayObject | null = null;
 
   constructor(private readonly gl: WebGL2RenderingContext) {}
 
-  /** Whether a browser can draw them. */
+  /** Whether a browser can render them. */
   static possible(gl: WebGL2RenderingContext): boolean {
     return Boolean(gl.getExtension("EXT_color_buffer_float"));
   }
 
-  /** What computes the rows of a shader. */
+  /** The program that computes the rows of a shader. */
   source(shader: Shader): Source {
     const { manifest, code, text } = shader;
     return {
@@ -105,14 +105,14 @@ ${computed(manifest)}  vec4 all[${vectors.length}] = vec4[${vectors.length}](${v
   /** The row of a shader's parameters, once it is drawn. */
   row(shader: Shader, values: Values): WebGLTexture | null {
     const key = keyOf(shader, values);
-    const known = this.kept.get(key);
+    const known = this.rows.get(key);
     if (!known) return null;
-    this.kept.delete(key); // and last in line again
-    this.kept.set(key, known);
+    this.rows.delete(key); // moved to the end of the queue
+    this.rows.set(key, known);
     return known;
   }
 
-  /** Draws a row by the program of `source`; `bind` sets its uniforms and tables. */
+  /** Draws a row with the program of `source`; `bind` sets its uniforms and tables. */
   draw(shader: Shader, values: Values, program: Program, bind: () => void): void {
     const { gl } = this;
     const width = packed(shader.manifest).vectors.length;
@@ -133,20 +133,20 @@ ${computed(manifest)}  vec4 all[${vectors.length}] = vec4[${vectors.length}](${v
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.deleteFramebuffer(framebuffer);
-    this.kept.set(keyOf(shader, values), texture);
-    for (const [old, one] of this.kept) {
-      if (this.kept.size <= MOST_KEPT) break;
+    this.rows.set(keyOf(shader, values), texture);
+    for (const [old, one] of this.rows) {
+      if (this.rows.size <= MAX_ROWS) break;
       gl.deleteTexture(one);
-      this.kept.delete(old);
+      this.rows.delete(old);
     }
   }
 
-  /** Drops the rows of shaders that the page has no more. */
+  /** Drops the rows of shaders that the page no longer uses. */
   forget(keys: readonly string[]): void {
-    for (const [key, texture] of this.kept)
+    for (const [key, texture] of this.rows)
       if (!keys.some((known) => key.startsWith(known))) {
         this.gl.deleteTexture(texture);
-        this.kept.delete(key);
+        this.rows.delete(key);
       }
   }
 }

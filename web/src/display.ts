@@ -1,14 +1,14 @@
-/** From linear radiance to the screen: exposure, tone curve, sRGB; in a pass of its own, over what was summed. */
+/** From linear radiance to the screen: exposure, tone curve, sRGB; in a separate pass over the sums. */
 import type { Tone } from "./data";
 import { HEADER, link, type Program } from "./programs";
 
 export const TONES: Record<Tone, { index: number; doc: string }> = {
   none: { index: 0, doc: "Clipped at 1, then sRGB." },
-  reinhard: { index: 1, doc: "x / (1 + x), as the homework has it, then sRGB." },
+  reinhard: { index: 1, doc: "x / (1 + x), per channel, then sRGB." },
   filmic: { index: 2, doc: "Fit of the ACES curve (Narkowicz 2016), then sRGB." },
 };
 
-/** `vec3 tone_mapped(vec3 linear, int curve)` and `vec3 srgb(vec3)`: for whoever draws a picture to the screen. */
+/** `vec3 tone_mapped(vec3 linear, int curve)` and `vec3 srgb(vec3)`, for all programs that draw to the screen. */
 export const TONE_GLSL = `
 vec3 srgb(vec3 c) {
   c = clamp(c, 0.0, 1.0);
@@ -23,8 +23,8 @@ vec3 tone_mapped(vec3 c, int curve) {
 `;
 
 /**
- * `page_finite(vec3)`, and `page_broken(vec3)`: not a number, which is what a picture holds of all that is not finite.
- * Tests of bits stay where a compiler takes every value for a number.
+ * `page_finite(vec3)` and `page_broken(vec3)`: a NaN, which replaces all values that are not finite in a picture.
+ * The tests are of bits, since compilers may assume that no value is NaN.
  */
 export const BROKEN_GLSL = `
 bool page_finite(vec3 v) {
@@ -35,7 +35,7 @@ bool page_broken(vec3 v) {
 }
 `;
 
-/** The pattern that stands for what is no light. */
+/** The pattern that marks values that are not finite. */
 export const CHECKER_GLSL = `
 vec3 page_checker() {
   ivec2 cell = ivec2(gl_FragCoord.xy) / 6;
@@ -48,23 +48,23 @@ void main() { gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float
 `;
 
 /** Boxes of balls that are known to be black by a fault. */
-export const MOST_BLACK = 64;
+export const MAX_BLACK = 64;
 
 const FRAGMENT = `${HEADER}${TONE_GLSL}${BROKEN_GLSL}${CHECKER_GLSL}
 uniform sampler2D picture;      // sums
-uniform sampler2D early;        // what counts beside them while they are few: see renderer.ts
+uniform sampler2D early;        // first samples, used while there are few: see renderer.ts
 uniform float samples, early_share, exposure;
 uniform int curve;
-uniform bool has_sign;          // a difference: what is negative is blue, what is positive orange
-uniform vec3 theme;             // colour behind the balls, sRGB
+uniform bool has_sign;          // a difference: negative values are blue, positive ones orange
+uniform vec3 theme;             // color behind the balls, sRGB
 uniform bool in_environment;
 uniform sampler2D environment_map;
 uniform float has_map, environment_scale, environment_rotation;
 uniform vec3 environment_constant, right, up, back;
 uniform vec2 half_size, size;
-uniform bool has_broken;        // values that are no numbers: each is drawn as large as can be seen
+uniform bool has_broken;        // values that are not finite: each is enlarged to be visible
 uniform int black_count;
-uniform vec4 black_boxes[${MOST_BLACK}];
+uniform vec4 black_boxes[${MAX_BLACK}];
 out vec4 color;
 
 bool wrong(vec2 position) {
@@ -108,7 +108,7 @@ void main() {
     color = vec4(tone_mapped(light * exposure, curve), 1.0);
     return;
   }
-  // The theme's colour is paper, not light: it is mixed in on the screen, so that rims stay smooth.
+  // The theme's color is not light: it is mixed in after the tone curve, so that rims stay smooth.
   vec3 ball = tone_mapped(mean * exposure, curve);
   color = vec4(mix(theme, ball, min(sum.a, 1.0)), 1.0);
 }

@@ -1,6 +1,6 @@
 /**
- * What an edit of a parameter, a preset or a choice does to the state: to a row, or to one ball of it, and, where rows
- * are linked, to the parameter of the same name in the others.
+ * How an edit of a parameter, a preset or a choice changes the state: of a row, or of one ball of it, and, if rows are
+ * linked, of the parameter of the same name in the others.
  */
 import type { PageApp } from "./app";
 import type { Material, Parameter, Preset, Value } from "./data";
@@ -8,13 +8,13 @@ import { sameNumbers, variantChoice } from "./shaders";
 import type { Slot, State } from "./state";
 import { short } from "./ui/dom";
 
-/** A compensated material holds its base: "base.alpha" there is "alpha" of a plain one. */
+/** A compensated material contains its base: "base.alpha" corresponds to "alpha" of the material without compensation. */
 export const bare = (path: string): string => path.replace(/^(base\.)+/, "");
 
-/** Whether the balls of the row differ in this parameter: then an edit goes to the selected ball alone. */
+/** Whether the balls of the row differ in this parameter: an edit then applies to the selected ball alone. */
 export const perBall = (slot: Slot, path: string): boolean => slot.balls.some((ball) => path in ball.set);
 
-/** The parameter of the same name in another row: of its material, of its base, or the only one of that name inside. */
+/** The parameter of the same name in another row: of its material, of its base, or the only nested one of that name. */
 function twin(app: PageApp, slot: number, path: string): string | null {
   const paths = app.shaderOf(slot).manifest.parameters.map((p) => p.path);
   const name = path.split(".").at(-1);
@@ -22,10 +22,10 @@ function twin(app: PageApp, slot: number, path: string): string | null {
   return paths.find((one) => one === path) ?? paths.find((one) => bare(one) === bare(path)) ?? (inside.length === 1 ? (inside[0] as string) : null);
 }
 
-/** Puts a row in its place, unless this page has no server and holds no shader for it: then it says so. */
+/** Replaces a row, unless the page has no server and no shader for it, which it then reports. */
 function commit(app: PageApp, state: State, index: number, row: Slot): void {
   if (app.possible(row)) state.slots[index] = row;
-  else app.say(`Row ${String.fromCharCode(65 + index)} stays as it is: this page holds no shader for that. \`gonio view\` has them all.`);
+  else app.say(`Row ${String.fromCharCode(65 + index)} is unchanged: this page contains no shader for it. \`gonio view\` has them all.`);
 }
 
 const others = (app: PageApp, slot: number): number[] => (app.state.linked ? app.state.slots.map((_, i) => i).filter((i) => i !== slot) : []);
@@ -53,7 +53,7 @@ export function setParameter(app: PageApp, slot: number, path: string, value: Va
 
 const kindOf = (app: PageApp, slot: number, path: string) => app.shaderOf(slot).manifest.parameters.find((p) => p.path === path)?.kind;
 
-/** Values of one ball, the selected one, whatever the others of its row have. */
+/** Values of the selected ball, independent of the other balls of its row. */
 export function setBall(app: PageApp, slot: number, values: Record<string, Value>, label: string): void {
   const { ball } = app.state.selection;
   app.store.update("slots", (state) => {
@@ -65,24 +65,22 @@ export function setBall(app: PageApp, slot: number, values: Record<string, Value
   });
 }
 
-/** "roughness .55", from what sets a ball apart; the page's first labels are written the same way. */
+/** "roughness 0.55", from the parameters that differ per ball; page.py formats the first labels in the same way. */
 function labelOf(set: Record<string, Value>): string {
   const bits = Object.entries(set).map(([path, value]) => {
     const name = bare(path);
     const numbers = [value].flat();
     if (name.endsWith("alpha")) {
-      const roughness = numbers.map((a) => trim(Math.sqrt(a as number)));
+      const roughness = numbers.map((a) => short(Math.sqrt(a as number)));
       return `roughness ${roughness[0] === roughness[1] || roughness.length < 2 ? roughness[0] : roughness.join(" × ")}`;
     }
     const same = numbers.every((v) => v === numbers[0]);
-    return `${name} ${(same ? numbers.slice(0, 1) : numbers).map((v) => (typeof v === "number" ? trim(v) : String(v))).join(", ")}`;
+    return `${name} ${(same ? numbers.slice(0, 1) : numbers).map((v) => (typeof v === "number" ? short(v) : String(v))).join(", ")}`;
   });
   return bits.join(", ");
 }
 
-const trim = (value: number) => short(value).replace(/^0\./, ".");
-
-/** What a double click brings back: the ball's own first value, or the declared one. */
+/** The value that a double click restores: the ball's own first value, or the declared one. */
 export function initialValue(app: PageApp, slot: number, parameter: Parameter): Value {
   const row = app.state.slots[slot];
   const first = app.store.initial.slots[slot];
@@ -112,7 +110,7 @@ export function applyPreset(app: PageApp, slot: number, preset: Preset): void {
   });
 }
 
-/** Whether this page can show a preset on a row; asked of hundreds at every change. */
+/** Whether this page can show a preset on a row; evaluated for hundreds of presets at every change. */
 export function possiblePreset(app: PageApp, slot: number, preset: Preset): boolean {
   const row = app.slot(slot);
   const parameters = app.shaders.material(row.material).variants[0]?.manifest.parameters ?? [];
@@ -145,7 +143,7 @@ export function currentChoice(app: PageApp, slot: number, path: string): string 
   return app.state.slots[slot]?.choices[path] ?? variantChoice(app.shaderOf(slot).variant, path);
 }
 
-/** Values of a choice that the page holds shaders for, the other choices staying as they are. */
+/** Values of a choice for which the page has shaders, with the other choices fixed. */
 export function possibleChoices(app: PageApp, slot: number, parameter: Parameter): { value: string; doc: string; here: boolean }[] {
   const row = app.slot(slot);
   const names = parameter.kind === "flag" ? { true: "on", false: "off" } : (parameter.choices ?? {});
@@ -177,14 +175,14 @@ export function setMaterial(app: PageApp, slot: number, id: string): void {
     const first = app.shaders.material(id).variants[0];
     row.material = id;
     row.choices = { ...first?.choices };
-    // What the old material and the new one both call by a name stays; the rest would mean nothing.
+    // Values of parameters that both materials have under one name are kept; the others would be meaningless.
     const paths = new Map((first?.manifest.parameters ?? []).map((p) => [bare(p.path), p.path]));
-    const kept = (set: Record<string, Value>) =>
+    const shared = (set: Record<string, Value>) =>
       Object.fromEntries(Object.entries(set).flatMap(([path, value]) => (paths.has(bare(path)) ? [[paths.get(bare(path)) as string, value]] : [])));
-    row.values = kept(row.values);
-    for (const ball of row.balls) ball.set = kept(ball.set);
+    row.values = shared(row.values);
+    for (const ball of row.balls) ball.set = shared(ball.set);
     row.label = app.shaders.material(id).title;
-    // Values that this page's tables were not found from cannot stay.
+    // Values that differ from those that this page's tables were computed from cannot be kept.
     if (!app.possible(row)) for (const set of [row.values, ...row.balls.map((ball) => ball.set)]) Object.assign(set, first?.fixed);
   });
 }

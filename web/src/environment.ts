@@ -1,9 +1,9 @@
 /**
- * The picture around the balls, and what is made of it on the GPU by the materials' own sampling: the albedo E(mu)
- * of every ball and, for the split sum, the environment blurred by the lobe at a few widths.
+ * The environment picture and what the GPU computes from it by the materials' own sampling: the albedo E(mu) of every
+ * ball and, for the split sum, the environment blurred by the lobe at several widths.
  */
 import { type Values, decodeBase64 } from "./data";
-import { SAMPLES_VERTEX, albedoText, prefilterText } from "./glsl";
+import { SAMPLES_VERTEX, albedoText, prefilterText } from "./environment-glsl";
 import { distribution } from "./importance";
 import type { Source } from "./programs";
 import type { Shader, ShaderLibrary } from "./shaders";
@@ -11,14 +11,14 @@ import { isLong } from "./size";
 import { createTarget, floatToHalf, sequence, type Target } from "./targets";
 
 export interface EnvironmentPicture {
-  /** Changes with the picture: what was made of the old one is made anew. */
+  /** Changes with the picture: results of an earlier one are recomputed. */
   key: string;
   width: number;
   height: number;
   texture: WebGLTexture;
-  /** Where it is bright: see importance.ts. */
+  /** Importance sampling of its bright parts: see importance.ts. */
   sums: WebGLTexture;
-  /** Float16 RGBA, top row first, as a live server wants it. */
+  /** Float16 RGBA, top row first, as a live server expects it. */
   half: Uint16Array;
 }
 
@@ -40,7 +40,7 @@ export function createEnvironment(gl: WebGL2RenderingContext, width: number, hei
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
   made += 1;
-  // Unlike any other page's: a server may know several.
+  // Distinct from the keys of other pages: a server may know several.
   return { key: `environment${made}-${Math.random().toString(36).slice(2)}`, width, height, texture, sums, half };
 }
 
@@ -48,7 +48,7 @@ export function environmentFromData(gl: WebGL2RenderingContext, width: number, h
   return createEnvironment(gl, width, height, new Uint16Array(decodeBase64(data).buffer as ArrayBuffer));
 }
 
-/** From float RGB(A), largest side 2048: more than that the eye does not see in a ball. */
+/** From float RGB(A), reduced to 2048 on the longer side: more detail is not visible in a ball. */
 export function environmentFromFloats(gl: WebGL2RenderingContext, width: number, height: number, floats: Float32Array, channels: 3 | 4): EnvironmentPicture {
   const step = Math.max(1, Math.ceil(width / 2048));
   const [w, h] = [Math.floor(width / step), Math.floor(height / step)];
@@ -70,9 +70,9 @@ export function environmentFromFloats(gl: WebGL2RenderingContext, width: number,
 const ALBEDO_WIDTH = 64;
 const ALBEDO_ROWS = 64;
 const ALBEDO_SAMPLES = 128;
-const ALBEDO_PASSES = 48; // 6,144 points a node: E(mu) to a few 1e-4, far below the 1/255 that a screen shows
+const ALBEDO_PASSES = 48; // 6,144 points per node: E(mu) to a few 1e-4, far below the 1/255 that a screen shows
 
-/** E(mu) of many balls, a row each, summed up over passes. */
+/** E(mu) of many balls, one row each, accumulated over passes. */
 export class AlbedoTables {
   private target: Target | null = null;
   private rows = new Map<string, { row: number; passes: number; used: number }>();
@@ -88,7 +88,7 @@ export class AlbedoTables {
     return this.target?.texture ?? null;
   }
 
-  /** What sums up the rows of a shader. */
+  /** The program that accumulates the rows of a shader. */
   source(shader: Shader): Source {
     return {
       key: `albedo ${shader.code}`,
@@ -138,11 +138,11 @@ export class AlbedoTables {
     return { row: entry.row, complete: entry.passes >= limit, finished: before < limit && entry.passes >= limit };
   }
 
-  /** An unused row, or the one that was not asked for the longest. */
+  /** An unused row, or the least recently used one. */
   private freeRow(): number {
     if (this.rows.size < ALBEDO_ROWS) {
-      const taken = new Set([...this.rows.values()].map((e) => e.row));
-      for (let row = 0; row < ALBEDO_ROWS; row++) if (!taken.has(row)) return row;
+      const used = new Set([...this.rows.values()].map((e) => e.row));
+      for (let row = 0; row < ALBEDO_ROWS; row++) if (!used.has(row)) return row;
     }
     const [oldest, entry] = [...this.rows].reduce((a, b) => (a[1].used <= b[1].used ? a : b));
     this.rows.delete(oldest);
@@ -150,10 +150,10 @@ export class AlbedoTables {
   }
 }
 
-/** Path of the width that roughness means for this material, or null. */
+/** Path of the parameter that sets a material's roughness, or null. */
 export const alphaOf = (shader: Shader): string | null => shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null)?.path ?? null;
 
-/** Root of the width, of the geometric mean of two; null where the material has none. */
+/** Square root of the width, or of the geometric mean of two widths; null if the material has none. */
 export function roughnessOf(shader: Shader, values: Values): number | null {
   const path = alphaOf(shader);
   if (!path) return null;
@@ -162,10 +162,10 @@ export function roughnessOf(shader: Shader, values: Values): number | null {
 }
 
 const LEVELS = 7;
-const LEVEL_WIDTH = 512; // of the sharpest; the last is 8 texels wide
+const LEVEL_WIDTH = 512; // of the sharpest level; the last one is 8 texels wide
 const LEVEL_SAMPLES = 16;
 const LEVEL_PASSES = 16;
-const SHARP_PASSES = [1, 4]; // of the first levels: the lobe is all but a mirror's, and they have the most texels
+const SHARP_PASSES = [1, 4]; // of the first levels: their lobe is nearly a mirror's, and they have the most texels
 
 export interface PrefilteredLevel {
   texture: WebGLTexture;
@@ -181,7 +181,7 @@ interface Prefiltered {
   passes: number;
 }
 
-/** The environment blurred by a material's lobe, one mip level a width: roughness 0 to 1 over the levels. */
+/** The environment blurred by a material's lobe, one mip level per width: roughness 0 to 1 over the levels. */
 export class PrefilteredEnvironments {
   private made = new Map<string, Prefiltered>();
 
@@ -191,7 +191,7 @@ export class PrefilteredEnvironments {
     private full: boolean,
   ) {}
 
-  /** What blurs by the lobe of a shader. */
+  /** The program that blurs by the lobe of a shader. */
   source(shader: Shader): Source {
     return {
       key: `prefilter ${shader.code}`,
@@ -202,12 +202,12 @@ export class PrefilteredEnvironments {
     };
   }
 
-  /** Texture and level for a ball; null where nothing was made for it yet and it is not to be made now. */
+  /** Texture and level for a ball; null if none is computed yet and none is to be computed now. */
   of(shader: Shader, values: Values, picture: EnvironmentPicture, make = true): PrefilteredLevel | null {
     const alpha = alphaOf(shader);
     const rest = { ...values };
     if (alpha) delete rest[alpha];
-    // Maps are made in the environment's own frame, so turning it makes nothing anew.
+    // Maps are in the environment's own frame, so a rotation invalidates none of them.
     const key = `${shader.key} ${picture.key} ${JSON.stringify(rest)}`;
     let entry = this.made.get(key);
     if (!make && !entry) return null;

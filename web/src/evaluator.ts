@@ -1,10 +1,10 @@
 /**
- * A material's emitted functions as functions of arrays: the GPU computes, floats come back.
+ * A material's emitted functions applied to arrays on the GPU; results are floats.
  *
- * Directions go in as float32 textures, one texel a query; a fragment a query calls the emitted text; results leave
- * through RGBA32F targets and a pixel buffer, so that the page does not wait for the GPU (fenceSync). What depends on
- * the parameters alone (`derive`) is computed once a call, not once a query (`derived.ts`).
- * All values on this page that are not pixels of the picture come from here: no formula of a material is typed in web/.
+ * Directions are passed as float32 textures, one texel per query; one fragment per query calls the emitted function;
+ * results are read through RGBA32F targets and a pixel buffer, so that the page does not wait for the GPU (fenceSync).
+ * Values that depend on the parameters alone (`derive`) are computed once per call, not per query (`derived.ts`).
+ * All values on this page that are not pixels of the picture come from here: web/ contains no formula of a material.
  */
 import type { Values } from "./data";
 import { derivedIn, derivedOut } from "./derived";
@@ -13,7 +13,7 @@ import type { Shader, ShaderLibrary } from "./shaders";
 import { isLong } from "./size";
 import { SOBOL_WIDTH, sobolTexels } from "./sobol";
 
-/** One entry a query; `value` is f(wo, wi) |cos theta_i| in 1/sr per channel, interleaved RGB. */
+/** One entry per query; `value` is f(wo, wi) |cos theta_i| in 1/sr per channel, interleaved RGB. */
 export interface Evaluated {
   value: Float32Array;
   pdf: Float32Array;
@@ -36,11 +36,11 @@ export interface AlbedoEstimate {
 
 type Floats = Float32Array | readonly number[];
 
-/** Queries a row of the target; targets are as tall as they must be. */
+/** Queries per row of the target; the target's height follows from their number. */
 const WIDTH = 1024;
-/** Independent digital shifts: their scatter gives the standard error (15 degrees of freedom). */
+/** Independent digital shifts: their variance gives the standard error (15 degrees of freedom). */
 const REPLICATES = 16;
-/** Points of a shift in one pass, a fragment each: few enough that a pass on a software rasteriser stays near 50 ms. */
+/** Points of a shift per pass, one fragment each: few enough for about 50 ms per pass on a software rasterizer. */
 const POINTS = 64;
 
 const VERTEX_MAIN = `
@@ -54,7 +54,7 @@ export class Evaluator {
   constructor(private readonly library: ShaderLibrary) {
     this.gl = library.gl;
     if (!this.gl.getExtension("EXT_color_buffer_float"))
-      throw new Error("This browser's WebGL cannot draw into float textures (EXT_color_buffer_float): no plots.");
+      throw new Error("This browser's WebGL cannot render to float textures (EXT_color_buffer_float); plots are not available.");
     this.vao = this.gl.createVertexArray();
   }
 
@@ -75,7 +75,7 @@ export class Evaluator {
     return { value, pdf: density };
   }
 
-  /** `u`: three uniform numbers a query, in [0, 1). */
+  /** `u`: three uniform numbers per query, in [0, 1). */
   async sample(shader: Shader, values: Values, wo: Floats, u: Floats): Promise<Sampled> {
     const body = `
   Sample drawn = ${needed(shader, "sample")}(${self(shader)}, first, second);
@@ -88,12 +88,12 @@ export class Evaluator {
     return { wi: triples(a, count), weight: triples(b, count), pdf: column(a, 3), delta: Uint8Array.from(column(c, 0)), eta: column(c, 1) };
   }
 
-  /** The named parts (D, G, F, single, multi) by name: one float a query, or RGB, as the manifest says. */
+  /** The terms (D, G, F, single, multi) by name: one float per query, or RGB, as declared in the manifest. */
   async terms(shader: Shader, values: Values, wo: Floats, wi: Floats): Promise<Record<string, Float32Array>> {
     const terms = shader.manifest.terms ?? [];
     const count = rows(wo, wi);
     const read: Record<string, Float32Array> = {};
-    // WebGL2 promises four targets; a model with more terms is asked more than once.
+    // WebGL2 guarantees four targets; a model with more terms needs several passes.
     for (let from = 0; from < terms.length; from += 4) {
       const some = terms.slice(from, from + 4);
       const lines = some.map((t, i) => `result${i} = vec4(${t.type === "vec3" ? `terms.${t.name}` : `vec3(terms.${t.name})`}, 0.0);`);
@@ -110,12 +110,12 @@ export class Evaluator {
   }
 
   /**
-   * Share of the power arriving along each `wo` that the material gives back: the mean weight of the emitted sample().
+   * Fraction of the power arriving along each `wo` that the material scatters: the mean weight of the emitted sample().
    *
-   * Sobol points, digitally shifted in 16 independent ways; goes on until the largest standard error over directions
-   * and channels is at most `error`, or `limit` points a direction are spent. `progress` hears every pass; where it
-   * returns false the estimate ends.
-   * A sample's weight is of radiance; eta^2, the index on wi's side over that on wo's, brings it to power.
+   * Sobol points, digitally shifted in 16 independent ways. It ends when the largest standard error over directions and
+   * channels is at most `error`, after `limit` points per direction, or when `progress`, called after every pass,
+   * returns false.
+   * A sample's weight is of radiance; eta^2, the index on wi's side over that on wo's, converts it to power.
    */
   async albedo(
     shader: Shader,
@@ -129,7 +129,7 @@ export class Evaluator {
   int at = start + int(gl_FragCoord.y) % ${POINTS};
   vec3 wo = texelFetch(first_rows, ivec2(int(gl_FragCoord.x), 0), 0).xyz;
   uvec3 point = texelFetch(sobol, ivec2(at % ${SOBOL_WIDTH}, at / ${SOBOL_WIDTH}), 0).xyz ^ shift;
-  // 24 bits: the most that a float below 1 can hold without rounding up to 1.
+  // 24 bits: the most that a float below 1 can represent without rounding up to 1.
   Sample drawn = ${needed(shader, "sample")}(${self(shader)}, wo, vec3(point >> 8u) * (1.0 / 16777216.0));
   result0 = vec4(drawn.weight * (drawn.eta * drawn.eta), 0.0);`;
     const extra = `
@@ -165,7 +165,7 @@ uniform int start;`;
       const estimate = summarise(sums, count, points);
       const worst = estimate.error.reduce((a, b) => Math.max(a, b), 0);
       const go = progress ? progress(estimate) : true;
-      // Four passes at least: the scatter of a few shifts of few points can be small by luck.
+      // At least four passes: the variance over a few points can be small by chance.
       if (!go || points * REPLICATES >= limit || (points >= 4 * POINTS && worst <= error)) return estimate;
     }
   }
@@ -279,7 +279,7 @@ uniform sampler2D second_rows;
 ${declarations}
 ${derived.declarations}${Array.from({ length: outputs }, (_, i) => `layout(location = ${i}) out vec4 result${i};`).join("\n")}
 vec3 row_of(sampler2D rows) {
-  // A texture of one texel stands for one direction shared by all queries.
+  // A texture of one texel contains one direction shared by all queries.
   return texelFetch(rows, min(ivec2(gl_FragCoord.xy), textureSize(rows, 0) - 1), 0).xyz;
 }
 void main() {
@@ -291,15 +291,15 @@ ${derived.body}${body}
 const self = (shader: Shader) => (shader.manifest.derived ? "material, derived" : "material");
 
 function needed(shader: Shader, name: "sample" | "terms"): string {
-  const found = shader.manifest.functions[name];
-  if (!found) throw new Error(`The page's shader of ${shader.manifest.title} has no ${name}().`);
-  return found;
+  const called = shader.manifest.functions[name];
+  if (!called) throw new Error(`The page's shader of ${shader.manifest.title} has no ${name}().`);
+  return called;
 }
 
 function rows(a: Floats, b: Floats): number {
   const [m, n] = [a.length / 3, b.length / 3];
   if (!Number.isInteger(m) || !Number.isInteger(n) || (m !== n && m !== 1 && n !== 1) || m * n === 0)
-    throw new Error(`${a.length} and ${b.length} numbers given: three a direction, as many of both or one of one expected.`);
+    throw new Error(`${a.length} and ${b.length} numbers given: expected three per direction, and equally many directions or a single one.`);
   return Math.max(m, n);
 }
 
@@ -336,7 +336,7 @@ function texture(
   return made;
 }
 
-/** Resolves when all that was drawn so far is done, without blocking the page. */
+/** Resolves when everything drawn so far is complete, without blocking the page. */
 async function finished(gl: WebGL2RenderingContext): Promise<void> {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
@@ -364,7 +364,7 @@ function shiftsOf(count: number): Uint32Array {
   });
 }
 
-/** Mean over the shifts, and the standard error of that mean from their scatter. */
+/** Mean over the shifts, and its standard error from their variance. */
 function summarise(sums: Float64Array, count: number, points: number): AlbedoEstimate {
   const value = new Float64Array(3 * count);
   const error = new Float64Array(3 * count);

@@ -1,8 +1,8 @@
 /**
- * What is wrong with a picture, so that it is said and not shown as if it were light: values that are no finite numbers,
- * and balls that stay black although light falls on them that their material scatters.
+ * Detects faults in a picture, so that they are reported instead of displayed as light: values that are not finite,
+ * and balls that are black although light that their material scatters falls on them.
  *
- * A shader that is wrong by a driver's fault, or one of a user's own, would else look like a dark material.
+ * Otherwise a shader with an error, of a driver or of the user, would look like a dark material.
  */
 import type { Vec3 } from "./data";
 import { BROKEN_GLSL, FULLSCREEN_VERTEX } from "./display";
@@ -22,7 +22,7 @@ export interface Flaw {
   pixels: number;
 }
 
-/** Of the pixels that a ball may cover: how many hold no number, how many are covered, the largest value. */
+/** Of the pixels that a ball may cover: the number without a finite value, the number covered, the largest value. */
 interface Counted {
   broken: number;
   covered: number;
@@ -36,23 +36,23 @@ export const boxOf = (frame: Frame, center: Vec3, aspect: number): Box | null =>
 const COLUMNS = 64;
 const COUNT = `${HEADER}${BROKEN_GLSL}
 uniform sampler2D picture;
-uniform ivec4 box;   // of pixels
+uniform ivec4 box;   // in pixels
 layout(location = 0) out vec4 color;
 void main() {
-  vec3 found = vec3(0.0);
+  vec3 counts = vec3(0.0);
   for (int x = box.x + int(gl_FragCoord.x); x < box.z; x += ${COLUMNS})
     for (int y = box.y; y < box.w; y++) {
       vec4 sum = texelFetch(picture, ivec2(x, y), 0);
       bool broken = page_broken(sum.rgb);
-      found.x += broken ? 1.0 : 0.0;
-      found.y += sum.a > 0.0 ? 1.0 : 0.0;
-      found.z = max(found.z, broken ? 0.0 : max(abs(sum.r), max(abs(sum.g), abs(sum.b))));
+      counts.x += broken ? 1.0 : 0.0;
+      counts.y += sum.a > 0.0 ? 1.0 : 0.0;
+      counts.z = max(counts.z, broken ? 0.0 : max(abs(sum.r), max(abs(sum.g), abs(sum.b))));
     }
-  color = vec4(found, 1.0);
+  color = vec4(counts, 1.0);
 }
 `;
 
-/** What lies in each box of a picture of sums; waits for the GPU. */
+/** Statistics of each box of a picture of sums; waits for the GPU. */
 export function count(gl: WebGL2RenderingContext, shaders: ShaderLibrary, picture: Target, boxes: (Box | null)[]): Counted[] {
   const { width, height } = picture;
   const program = shaders.program({ key: "count", title: "count", long: false, vertex: () => FULLSCREEN_VERTEX, fragment: () => COUNT });
@@ -75,22 +75,22 @@ export function count(gl: WebGL2RenderingContext, shaders: ShaderLibrary, pictur
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   deleteTarget(gl, target);
   return boxes.map((_, row) => {
-    const found = { broken: 0, covered: 0, largest: 0 };
+    const counts = { broken: 0, covered: 0, largest: 0 };
     for (let i = 4 * COLUMNS * row; i < 4 * COLUMNS * (row + 1); i += 4) {
-      found.broken += floats[i] as number;
-      found.covered += floats[i + 1] as number;
-      found.largest = Math.max(found.largest, floats[i + 2] as number);
+      counts.broken += floats[i] as number;
+      counts.covered += floats[i + 1] as number;
+      counts.largest = Math.max(counts.largest, floats[i + 2] as number);
     }
-    return found;
+    return counts;
   });
 }
 
 /** Points of the visible half of a ball, as many across as up. */
 const ACROSS = 8;
-/** Less than that of a lamp's irradiance may be black in a picture. */
+/** Less than this fraction of a lamp's irradiance may appear black in a picture. */
 const FAINT = 1e-6;
 
-/** Whether a ball sends light to the eye, by its material's functions, called apart from any picture. */
+/** Whether a ball scatters light to the camera, by calls of its material's functions outside any picture. */
 export async function shines(evaluator: Evaluator, state: State, frame: Frame, { shader, values, center }: DrawnBall): Promise<boolean> {
   const lights = actingLights(state);
   const [outward, inward]: [number[], number[]] = [[], []];
@@ -125,7 +125,7 @@ export async function shines(evaluator: Evaluator, state: State, frame: Frame, {
   return weight.some((v) => v > FAINT);
 }
 
-/** As a line for the user: "A 3, 4 and B 3: 12 pixels hold no finite number". */
+/** As a line for the user: "A 3, 4 and B 3: 12 pixels have no finite value". */
 export function described(flaws: readonly Flaw[]): string {
   const of = (kind: Flaw["kind"]) => flaws.filter((flaw) => flaw.kind === kind);
   const names = (some: Flaw[]) =>
@@ -133,7 +133,7 @@ export function described(flaws: readonly Flaw[]): string {
   const [broken, black] = [of("no number"), of("black")];
   const pixels = broken.reduce((sum, flaw) => sum + flaw.pixels, 0);
   return [
-    ...(broken.length ? [`${names(broken)}: ${pixels} ${pixels === 1 ? "pixel holds" : "pixels hold"} no finite number`] : []),
-    ...(black.length ? [`${names(black)}: black, though the material scatters the light that falls on it`] : []),
+    ...(broken.length ? [`${names(broken)}: ${pixels} ${pixels === 1 ? "pixel has" : "pixels have"} no finite value`] : []),
+    ...(black.length ? [`${names(black)}: black, although the material scatters the incident light`] : []),
   ].join("; ");
 }

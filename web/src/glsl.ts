@@ -1,7 +1,7 @@
 /**
- * The shader text around a material: where the surface is, which light falls on it, what of it is shown.
+ * The shader text around a material: the surface's position, the incident light, the terms to show.
  *
- * How the surface scatters is never written here; it is called by the names that the manifest gives.
+ * No scattering is computed here; the material's functions are called by the names in the manifest.
  */
 import type { Manifest } from "./data";
 import { derivedIn, derivedOut } from "./derived";
@@ -14,23 +14,23 @@ import type { Term } from "./state";
 
 export const MAX_LIGHTS = 8;
 
-/** How an environment acts on the surface; "mapped" is "sampled" where there is a picture to sample too. */
+/** How an environment is integrated; "mapped" is "sampled" with a picture to sample as well. */
 export type EnvironmentUse = "none" | "sampled" | "mapped" | "albedo" | "split-sum" | "dfg";
 
 export interface ShadingKey {
   geometry: "sphere" | "mesh";
-  /** 0: none; else how many times the light's part is written (`copies`). */
+  /** 0: none; else how many times the lights' code is written (`copies`). */
   lights: number;
   environment: EnvironmentUse;
-  /** What is taken off again, to see by how much two ways differ. */
+  /** The integral that is subtracted, to show the difference of two ways. */
   minus: EnvironmentUse;
   term: Term;
 }
 
-/** How many times the part of a light is written for so many: once, in a loop, or for each. */
+/** How many times the lights' code is written for this number: once, in a loop, or for each. */
 export const copies = (shader: Shader, lights: number): number => (fitsLoop(shader, "eval") ? Math.min(lights, 1) : lights);
 
-/** The material's text, its uniform, and `call("eval", "wo, wi")` with the arguments that its functions want: `derived` among them. */
+/** The material's text, its uniform, and `call("eval", "wo, wi")`, which adds further arguments such as `derived`. */
 export function materialText(shader: Shader): { text: string; call: (name: "eval" | "pdf" | "sample" | "terms", rest: string) => string } {
   const { manifest } = shader;
   const extra = manifest.derived ? ", derived" : "";
@@ -52,14 +52,14 @@ uniform vec3 ball_center;
 `;
 
 const DEPTH_RANGE = `
-// z toward the viewer, negative in front of the camera; near and far chosen for balls of radius 1
+// z toward the viewer, negative in front of the camera; near and far suit balls of radius 1
 float page_depth(float z) {
   const float near = 0.05, far = 1000.0;
   return (far + near + 2.0 * far * near / z) / (far - near);
 }
 `;
 
-/** For the pass that finds what of a mesh is in front: depth alone, the same positions to the bit. */
+/** For the pass that determines the visible surface of a mesh: depth only, with bit-identical positions. */
 export const DEPTH_VERTEX = `${HEADER}${CAMERA}${DEPTH_RANGE}
 layout(location = 0) in vec3 mesh_position;
 invariant gl_Position;
@@ -105,7 +105,7 @@ ${body}  world = mesh_position + ball_center;
 `;
 }
 
-const ENVIRONMENT = `
+export const ENVIRONMENT = `
 uniform sampler2D environment_map;
 uniform float has_map;
 uniform vec3 environment_constant;
@@ -122,11 +122,11 @@ vec3 environment_radiance(vec3 d) {
 }
 `;
 
-const RANDOM = `
-uniform vec3 random_point;       // of a low-discrepancy sequence, this picture's
+export const RANDOM = `
+uniform vec3 random_point;       // this picture's point of a low-discrepancy sequence
 uniform vec2 area_point;
 
-// PCG in three dimensions (Jarzynski and Olano 2020): a shift of the sequence for every pixel
+// PCG in three dimensions (Jarzynski and Olano 2020): a shift of the sequence per pixel
 vec3 page_shift(uvec2 pixel, uint salt) {
   uvec3 v = uvec3(pixel, salt) * 1664525u + 1013904223u;
   v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
@@ -139,11 +139,11 @@ vec3 page_shift(uvec2 pixel, uint salt) {
 const LIGHTS = `
 uniform int light_count;
 uniform ivec4 light_kind[${MAX_LIGHTS}];   // x: 0 directional, 1 point, 2 area
-uniform vec3 light_place[${MAX_LIGHTS}];   // direction, position or centre
+uniform vec3 light_place[${MAX_LIGHTS}];   // direction, position or center
 uniform vec3 light_power[${MAX_LIGHTS}];   // irradiance, intensity or radiance
 uniform vec3 light_u[${MAX_LIGHTS}], light_v[${MAX_LIGHTS}];
 
-// What a light sends to the point: direction toward it, and irradiance at perpendicular incidence.
+// What a light contributes at the point: direction toward it, and irradiance at perpendicular incidence.
 vec3 page_light_at(int i, vec3 where, out vec3 direction) {
   int kind = light_kind[i].x;
   if (kind == 0) { direction = light_place[i]; return light_power[i]; }
@@ -162,7 +162,7 @@ vec3 page_light_at(int i, vec3 where, out vec3 direction) {
 `;
 
 const ALBEDO = `
-uniform sampler2D albedo_table;   // x: sqrt(mu) at texel centres, y: ball; sums over alpha samples
+uniform sampler2D albedo_table;   // x: sqrt(mu) at texel centers, y: ball; sums over alpha samples
 uniform float albedo_row;
 
 vec3 page_albedo(float mu) {
@@ -186,10 +186,10 @@ vec3 prefiltered_radiance(vec3 d) {
 `;
 
 const DFG = `
-uniform sampler2D dfg_table;      // A, B over mu (x) and roughness (y), at texel centres
+uniform sampler2D dfg_table;      // A, B over mu (x) and roughness (y), at texel centers
 uniform float dfg_roughness;
 
-// Scale and bias of the reflectance at normal incidence (Karis2013), bilinear between texel centres
+// Scale and bias of the reflectance at normal incidence (Karis2013), bilinear between texel centers
 vec2 page_dfg(float mu) {
   vec2 size = vec2(textureSize(dfg_table, 0));
   vec2 at = clamp(vec2(mu, dfg_roughness) * size - 0.5, vec2(0.0), size - 1.0);
@@ -201,7 +201,7 @@ vec2 page_dfg(float mu) {
 }
 `;
 
-/** What of the scattering a term shows, as the value of eval would be: expression over `wo` and `wi`. */
+/** The part of the scattering that a term shows, in place of eval's value: expression over `wo` and `wi`. */
 function scattered(shader: Shader, term: Term): string {
   const { call } = materialText(shader);
   const has = (name: string) => shader.manifest.terms?.some((t) => t.name === name) ?? false;
@@ -211,18 +211,18 @@ function scattered(shader: Shader, term: Term): string {
   return call("eval", "wo, wi");
 }
 
-/** D, G and F are numbers at a half vector, not light: the page shows the number itself. */
+/** D, G and F are functions of a half vector rather than light: the page shows their values. */
 export const isFactor = (term: Term): term is "D" | "G" | "F" => term === "D" || term === "G" || term === "F";
 
-/** Differences, below zero as well as above. */
+/** Differences, which may be negative. */
 export const isSigned = (term: Term): boolean => term === "difference" || term === "split-error";
 
-/** Terms of everything that a material scatters. */
+/** Terms that cover the whole scattering of a material. */
 export const isWhole = (term: Term): boolean => ["full", "compensated", "rows", "split", "split-error"].includes(term);
 
 /**
- * Whether the split sum means anything for a material: one lobe of microfacets about the mirrored direction, alike
- * all round. Light that passes through, or a lobe about the normal, would be looked up in the wrong place.
+ * Whether the split sum is valid for a material: one isotropic microfacet lobe about the mirror direction. For
+ * transmitted light, or a lobe about the normal, the lookup would be in the wrong place.
  */
 export const splits = (manifest: Manifest): boolean =>
   manifest.isotropic && !manifest.stochastic && !manifest.transmits && Boolean(manifest.functions.terms && manifest.terms?.some((t) => t.name === "D"));
@@ -234,7 +234,7 @@ export function hasTerm(manifest: Manifest, term: Term): boolean {
   return Boolean(manifest.functions.terms && manifest.terms?.some((t) => t.name === name));
 }
 
-/** Statements that add what an environment gives by one way of integrating it, or take it off. */
+/** Statements that add an environment's contribution by one way of integrating it, or subtract it. */
 function environmentBody(shader: Shader, use: EnvironmentUse, term: Term, add: "+=" | "-="): string[] {
   if (use === "none") return [];
   const { call } = materialText(shader);
@@ -253,10 +253,10 @@ function environmentBody(shader: Shader, use: EnvironmentUse, term: Term, add: "
     `    Sample s = ${call("sample", "wo, u")};`,
     "    vec3 wi = s.wi;",
     `    vec3 weight = ${weight};`,
-    // A sample that goes nowhere has weight 0 and may have any direction.
+    // A rejected sample has weight 0 and an arbitrary direction.
     "    if (any(notEqual(weight, vec3(0.0)))) {",
     "      vec3 d = normalize(frame * wi);",
-    // Both ways to find a direction are weighed by their densities (balance heuristic, Veach1997): the sun by its own, gloss by its own.
+    // Both ways to sample a direction, by the picture and by the material, are weighted by their densities (Veach1997).
     ...(mapped ? ["      if (!s.delta) weight *= s.pdf / (s.pdf + page_bright_density(d));"] : []),
     `      radiance ${add} weight * environment_radiance(d);`,
     "    }",
@@ -306,7 +306,7 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
   }
   const place =
     key.geometry === "sphere"
-      ? `  // Nearest hit with the unit sphere at the centre; from the closest approach, which loses fewer bits than b^2 - c.
+      ? `  // Nearest hit with the unit sphere at the center; from the closest approach, which is more accurate than b^2 - c.
   vec3 toward = normalize(ray);
   vec3 from = eye - ball_center;
   float along = -dot(from, toward);
@@ -322,7 +322,7 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
       : `  vec3 surface = world;
   vec3 n = normalize(world_normal);
   vec3 outward = normalize(eye - surface);
-  // Interpolated normals may turn away from the viewer at the rim: the side seen is the outside.
+  // Interpolated normals may face away from the viewer at the rim: the visible side is the outside.
   if (dot(n, outward) < 0.0) n = normalize(n - 1.001 * dot(n, outward) * outward);
   vec3 tangent = page_across(world_tangent, n);`;
   const inputs = key.geometry === "sphere" ? "in vec3 ray;\nuniform float draw_gain, draw_cover, nearer;\n" : `in vec3 world, world_normal, world_tangent;
@@ -341,71 +341,9 @@ ${place}
   vec3 wo = outward * frame;
   vec3 radiance = vec3(0.0);
 ${derived.body}${body.join("\n")}
-  // What is no finite number stays in the sum for good, and is shown as such: left out, it would pass for a dark material.
+  // Values that are not finite are kept in the sum and shown as such: without them it would look like a dark material.
   if (!page_finite(radiance)) radiance = vec3(uintBitsToFloat(0x7fc00000u));
   color = vec4(draw_gain * radiance, draw_cover);
-}
-`;
-}
-
-/**
- * Covers the target once a sample: a draw of as many instances adds them up, and no shader has a loop around a material,
- * which software would compile for minutes.
- */
-export const SAMPLES_VERTEX = `${HEADER}
-flat out int index;
-void main() {
-  index = gl_InstanceID;
-  gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float(gl_VertexID >> 1) - 1.0, 0.0, 1.0);
-}
-`;
-
-// R3 (Roberts 2018) from a start
-const POINT = "fract(START + float(index) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703))";
-
-/** E(mu) of a ball, by the material's own sampling: rows of the albedo table. */
-export function albedoText(shader: Shader): string {
-  const { text, call } = materialText(shader);
-  const derived = derivedIn(shader, false);
-  return `${HEADER}${text}${derived.declarations}
-uniform vec3 random_point;   // the page moves the starting point on from pass to pass
-uniform float width;
-flat in int index;
-layout(location = 0) out vec4 color;
-void main() {
-${derived.body}  float t = gl_FragCoord.x / width;
-  float mu = t * t;
-  vec3 wo = vec3(sqrt(max(1.0 - mu * mu, 0.0)), 0.0, mu);
-  vec3 u = ${POINT.replace("START", "random_point")};
-  color = vec4(${call("sample", "wo, u")}.weight, 1.0);
-}
-`;
-}
-
-/** One level of the prefiltered environment: seen straight on, where the lobe goes, with the weights normalised. */
-export function prefilterText(shader: Shader): string {
-  const { text, call } = materialText(shader);
-  const derived = derivedIn(shader, false);
-  return `${HEADER}${text}${derived.declarations}${RANDOM}${ENVIRONMENT}
-uniform vec2 size;
-uniform float points;   // over all passes
-flat in int index;
-layout(location = 0) out vec4 color;
-void main() {
-${derived.body}  vec2 uv = gl_FragCoord.xy / size;
-  float p = 6.283185307179586 * uv.x + environment_rotation, theta = 3.141592653589793 * uv.y;
-  vec3 n = vec3(sin(theta) * sin(p), cos(theta), sin(theta) * cos(p));
-  vec3 t = normalize(abs(n.y) < 0.99 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0) - n.x * n);
-  mat3 frame = mat3(t, cross(n, t), n);
-  vec3 u = ${POINT.replace("START", "random_point + page_shift(uvec2(gl_FragCoord.xy), 11u)")};
-  Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
-  float weight = dot(s.weight, vec3(1.0 / 3.0));
-  // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
-  // would else be hit by few samples and leave blotches.
-  float share = 1.0 / (points * max(s.pdf, 1e-6));
-  vec2 texels = vec2(textureSize(environment_map, 0));
-  float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
-  color = weight > 0.0 ? weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0) : vec4(0.0);
 }
 `;
 }

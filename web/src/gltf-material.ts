@@ -1,4 +1,4 @@
-/** The numbers of a glTF file's material, and what they are on the sliders of the page's own models. */
+/** The parameters of a glTF file's material, converted to those of the page's models. */
 import type { PageApp } from "./app";
 import type { Parameter, Value, Values } from "./data";
 import * as edits from "./edits";
@@ -13,20 +13,20 @@ export interface Factors {
   transmission: number;
   clearcoat: number;
   clearcoatRoughness: number;
-  /** Whether pictures vary some of it, which the page leaves aside. */
+  /** Whether textures vary some of it, which the page ignores. */
   pictured: boolean;
 }
 
 type Json = Record<string, unknown>;
 
 const member = (of: unknown, key: string): Json => {
-  const found = (of as Json | undefined)?.[key];
-  return typeof found === "object" && found !== null ? (found as Json) : {};
+  const nested = (of as Json | undefined)?.[key];
+  return typeof nested === "object" && nested !== null ? (nested as Json) : {};
 };
 const share = (value: unknown, otherwise: number): number =>
   typeof value === "number" && Number.isFinite(value) ? Math.min(Math.max(value, 0), 1) : otherwise;
 
-/** Of the material that the file's first mesh has, else of its first; null where it has none or is no glTF. */
+/** The material of the file's first mesh, else its first material; null if it has none or is not glTF. */
 export function readFactors(bytes: Uint8Array): Factors | null {
   let file: Json;
   try {
@@ -35,18 +35,18 @@ export function readFactors(bytes: Uint8Array): Factors | null {
     return null;
   }
   const list = (key: string) => (Array.isArray(file[key]) ? (file[key] as Json[]) : []);
-  const worn = list("meshes").flatMap((mesh) => (Array.isArray(mesh?.primitives) ? (mesh.primitives as Json[]) : []));
-  const index = worn.map((primitive) => primitive?.material).find((i) => typeof i === "number") ?? 0;
+  const primitives = list("meshes").flatMap((mesh) => (Array.isArray(mesh?.primitives) ? (mesh.primitives as Json[]) : []));
+  const index = primitives.map((primitive) => primitive?.material).find((i) => typeof i === "number") ?? 0;
   const material = list("materials")[index as number];
   if (!material) return null;
   const pbr = member(material, "pbrMetallicRoughness");
   const extension = (name: string) => member(member(material, "extensions"), `KHR_materials_${name}`);
-  const colour = Array.isArray(pbr.baseColorFactor) ? (pbr.baseColorFactor as unknown[]) : [];
+  const color = Array.isArray(pbr.baseColorFactor) ? (pbr.baseColorFactor as unknown[]) : [];
   const ior = extension("ior").ior;
   const coat = extension("clearcoat");
   return {
     name: typeof material.name === "string" ? material.name.slice(0, 60) : "",
-    base: [share(colour[0], 1), share(colour[1], 1), share(colour[2], 1)],
+    base: [share(color[0], 1), share(color[1], 1), share(color[2], 1)],
     metallic: share(pbr.metallicFactor, 1),
     roughness: share(pbr.roughnessFactor, 1),
     index: typeof ior === "number" && ior >= 1 && ior <= 3 ? ior : 1.5,
@@ -63,7 +63,7 @@ function jsonOf(bytes: Uint8Array): Uint8Array {
   return bytes.byteLength >= 20 && view.getUint32(0, true) === 0x46546c67 ? bytes.subarray(20, 20 + view.getUint32(12, true)) : bytes;
 }
 
-/** What a model calls the numbers, by its name; what it cannot say is left as it stands. */
+/** A model's parameters by name; parameters that glTF lacks keep their values. */
 const WORDS: Record<string, (f: Factors) => Values> = {
   openpbr: (f) => ({
     base_color: f.base,
@@ -102,32 +102,32 @@ function fitting(f: Factors): string[] {
   return ["openpbr", "disney", "coat", "lambert", "eon", "oren-nayar"];
 }
 
-/** Gives the selected ball the numbers, by its own model or another of the page that fits; a line that says so. */
-export function wear(app: PageApp, factors: Factors): string {
+/** Applies the parameters to the selected ball, by its own model or another of the page; returns a report of one line. */
+export function applyFactors(app: PageApp, factors: Factors): string {
   const { slot } = app.state.selection;
   const called = factors.name ? `its material "${factors.name}"` : "its material";
   const here = app.state.slots[slot]?.material;
   const known = app.data.materials.map(({ id, title, variants }) => ({ id, title, model: innermost(variants[0]?.manifest.parameters ?? [], variants[0]?.manifest.model ?? "") }));
-  const found = fitting(factors)
+  const fit = fitting(factors)
     .flatMap((name) => known.filter(({ model }) => model === name))
     .sort((a, b) => Number(b.id === here) - Number(a.id === here))[0];
-  if (!found) return `the page has no model for ${called}.`;
-  if (found.id !== here) edits.setMaterial(app, slot, found.id);
-  const words = (WORDS[found.model] as (f: Factors) => Values)(factors);
+  if (!fit) return `the page has no model for ${called}.`;
+  if (fit.id !== here) edits.setMaterial(app, slot, fit.id);
+  const words = (WORDS[fit.model] as (f: Factors) => Values)(factors);
   const set: Record<string, Value> = {};
-  for (const parameter of app.shaders.at(app.shaders.material(found.id), 0).manifest.parameters) {
+  for (const parameter of app.shaders.at(app.shaders.material(fit.id), 0).manifest.parameters) {
     const value = words[edits.bare(parameter.path)];
     if (isNumeric(parameter) && value !== undefined) set[parameter.path] = spread(parameter.kind, value);
   }
-  edits.setBall(app, slot, set, factors.name || found.title);
-  return `${called} is ${found.title} on the selected ball${factors.pictured ? ", without its pictures" : ""}.`;
+  edits.setBall(app, slot, set, factors.name || fit.title);
+  return `${called} is applied as ${fit.title} to the selected ball${factors.pictured ? ", without its textures" : ""}.`;
 }
 
-/** A compensated metal holds its metal as "base": it is known by what that one's parameters are called. */
+/** A compensated metal contains its metal as "base": it is identified by its base's parameters. */
 const innermost = (parameters: readonly { path: string }[], model: string): string =>
   model in WORDS ? model : parameters.some(({ path }) => path === "base.eta") && parameters.some(({ path }) => path === "base.k") ? "conductor" : model;
 
-/** A number stands for as many as the parameter has. */
+/** A single number applies to every component of the parameter. */
 const spread = (kind: Parameter["kind"], value: Value): Value => {
   const count = { alpha: 2, spectrum: 3 }[kind as string];
   return count && typeof value === "number" ? Array.from({ length: count }, () => value) : value;

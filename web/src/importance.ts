@@ -1,17 +1,17 @@
 /**
- * Drawing directions where an environment is bright: distribution over its texels, by luminance and solid angle, and
- * the GLSL that draws from it. A small sun is found at every sample instead of once in a hundred.
+ * Importance sampling of an environment: a distribution over its texels, by luminance and solid angle, and the GLSL
+ * that samples it. A small sun is found by every sample instead of by one in a hundred.
  */
 import { halfToFloat } from "./targets";
 
 export interface Distribution {
   width: number;
   height: number;
-  /** Inclusive sums: of each row in its columns, of the rows themselves in one column more. */
+  /** Inclusive sums: of each row over its columns, and of the rows in one additional column. */
   sums: Float32Array;
 }
 
-/** Share of directions that are drawn evenly: bilinear lookups see light where a texel's mean is dark. */
+/** Fraction of directions that are drawn uniformly: bilinear lookups have light where a texel's mean is dark. */
 const EVEN = 0.02;
 
 export function distribution(half: Uint16Array, width: number, height: number): Distribution {
@@ -53,7 +53,7 @@ export function distribution(half: Uint16Array, width: number, height: number): 
 export const IMPORTANCE_GLSL = `
 uniform sampler2D environment_sums;   // see importance.ts
 
-float page_sum(int i, int row) {      // row < 0: of the rows themselves
+float page_sum(int i, int row) {      // row < 0: sums of the rows
   if (i < 0) return 0.0;
   int last = textureSize(environment_sums, 0).x - 1;
   return texelFetch(environment_sums, row < 0 ? ivec2(last, i) : ivec2(i, row), 0).r;
@@ -68,7 +68,7 @@ int page_find(int count, int row, float u) {
   return low;
 }
 
-// 1/sr of a cell that holds (share of the row) x (share of the column), seen at this height
+// 1/sr of a cell with probability (share of the row) x (share of the column), at this elevation
 float page_density(float share, ivec2 cells, float v) {
   return share * float(cells.x * cells.y) / (19.739208802178716 * max(sin(3.141592653589793 * v), 1e-6));
 }

@@ -1,11 +1,11 @@
-/** Looks at pictures for flaws, twice a state: at its first picture at rest, and when it is done. */
+/** Inspects pictures for faults twice per state: the first picture at rest, and the complete one. */
 import type { Evaluator } from "./evaluator";
 import { type Flaw, shines } from "./flaws";
 import type { DrawnBall, Renderer, Scene } from "./renderer";
 import type { Term } from "./state";
 import { cameraFrame } from "./vectors";
 
-/** Terms of which a ball in the light is never black. */
+/** Terms in which an illuminated ball is never black. */
 const LIT: readonly Term[] = ["full", "compensated", "split"];
 
 interface Watched {
@@ -24,18 +24,18 @@ export class Inspector {
     private readonly report: (flaws: Flaw[]) => void,
   ) {}
 
-  /** The picture is of another state from now on. What was found stands until that is looked at. */
+  /** Marks the state as changed. The last report remains until the new picture is inspected. */
   changed(): void {
     this.state += 1;
     this.looked = 0;
   }
 
-  /** Whether a look at the picture as it is, done or not, may find what the last one did not. */
+  /** Whether an inspection of the current picture, complete or not, may differ from the last one. */
   due(done: boolean): boolean {
     return this.looked < (done ? 2 : 1);
   }
 
-  /** Looks now: the GPU should have drawn what it was asked to. */
+  /** Inspects now: the GPU should have drawn the picture. */
   async look(done: boolean): Promise<void> {
     const { app, state } = this;
     const scene = app.scene();
@@ -57,7 +57,7 @@ export class Inspector {
     try {
       return await shines(this.app.evaluator, scene.state, cameraFrame(scene.state.camera), ball);
     } catch {
-      return false; // a browser that evaluates nothing tells nothing
+      return false; // without an evaluator nothing is known
     }
   }
 }

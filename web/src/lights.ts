@@ -1,4 +1,4 @@
-/** The lights that act, and how the shaders hear of them. */
+/** The active lights, and how they are passed to the shaders. */
 import type { AreaLight, DirectionalLight, EnvironmentLight, PointLight, Vec3 } from "./data";
 import { MAX_LIGHTS } from "./glsl";
 import type { Program } from "./programs";
@@ -15,7 +15,7 @@ export const FURNACE: Light = {
   name: "White furnace",
 };
 
-/** Every light that acts, in the order of the list; the furnace replaces them all. */
+/** Every active light, in the order of the list; the furnace replaces them all. */
 export function actingLights(state: State): Light[] {
   return state.furnace ? [FURNACE] : state.lights.filter((light) => light.on);
 }
@@ -29,7 +29,7 @@ export const environmentOf = (lights: Light[]): (EnvironmentLight & { on: boolea
   lights.find((l): l is EnvironmentLight & { on: boolean; name: string } => l.type === "environment") ?? null;
 
 export function bindLights(gl: WebGL2RenderingContext, program: Program, lights: LocalLight[]): void {
-  // A shader that is called for each light in no loop has no count; what a program lacks, a driver leaves aside.
+  // Shaders without a loop over lights have no count; drivers ignore uniforms that a program lacks.
   gl.uniform1i(program.uniform("light_count"), lights.length);
   const kinds = new Int32Array(4 * MAX_LIGHTS);
   const [place, power, u, v] = [0, 0, 0, 0].map(() => new Float32Array(3 * MAX_LIGHTS)) as [Float32Array, Float32Array, Float32Array, Float32Array];

@@ -1,8 +1,8 @@
 /**
- * The live reference: tells the server what is shown, takes its frames, asks for shaders that the page lacks.
+ * The live reference: sends the server what is shown, receives its frames, and requests shaders that the page lacks.
  *
- * One frame is in flight: the next comes after the ack of the last. A newer scene ends the older one; frames of older
- * scenes that still arrive are dropped. The connection comes back by itself, later and later.
+ * One frame is in flight: the next is sent after the ack of the last. A newer scene ends the older one; frames of older
+ * scenes that still arrive are dropped. A lost connection is retried at growing intervals.
  */
 import type { Fault, PageApp } from "./app";
 import type { PageData, SplitSum, Variant } from "./data";
@@ -31,10 +31,10 @@ interface FrameHeader {
   done: boolean;
 }
 
-const QUIET = 40; // ms without a change before the scene is sent: a slider sends sixty changes a second
+const QUIET = 40; // ms without a change before the scene is sent: a slider causes sixty changes per second
 const TARGET = 1024;
-const MOST_PIXELS = 1_000_000;
-const MOST_ASKED = 8; // shaders at a time: a server has other pages
+const MAX_PIXELS = 1_000_000;
+const MAX_REQUESTS = 8; // shaders at a time, since a server may have other pages
 
 export class Live {
   readonly status: LiveState = { connected: false, device: "", samples: 0, target: TARGET, done: false, seconds: 0, message: "connecting" };
@@ -47,7 +47,7 @@ export class Live {
   private timer = 0;
   private wait = 500;
   private uploaded = new Set<string>();
-  private asked = new Map<number, { wish: string; place: string; title: string }>();
+  private requests = new Map<number, { wish: string; place: string; title: string }>();
   private waiting = new Set<string>();
 
   constructor(
@@ -85,7 +85,7 @@ export class Live {
     });
     socket.addEventListener("close", () => {
       if (this.socket !== socket) return;
-      Object.assign(this.status, { connected: false, message: "the server is gone; trying again" });
+      Object.assign(this.status, { connected: false, message: "the connection to the server is lost; reconnecting" });
       this.onStatus();
       setTimeout(() => this.connect(), this.wait);
       this.wait = Math.min(this.wait * 2, 15_000);
@@ -97,17 +97,17 @@ export class Live {
   }
 
   private later(): void {
-    // At once: what is on its way is of the new scene, what is on the screen of the old one.
+    // Immediately: frames on their way belong to the new scene, the one on the screen to the old scene.
     const { reference } = this.app;
     if (reference && !reference.stale && this.sent && this.scene() !== this.sent) this.app.setReference({ ...reference, stale: true });
     clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.send(), QUIET);
   }
 
-  /** The canvas's size over a whole number, so that a pixel of the reference is a block of the raster's. */
+  /** The canvas's size over an integer, so that a pixel of the reference is a block of pixels of the raster picture. */
   private size(): [number, number] {
     const [width, height] = this.app.size();
-    const factor = [1, 2, 4].find((k) => (width / k) * (height / k) <= MOST_PIXELS) ?? 4;
+    const factor = [1, 2, 4].find((k) => (width / k) * (height / k) <= MAX_PIXELS) ?? 4;
     return [width / factor, height / factor];
   }
 
@@ -116,18 +116,18 @@ export class Live {
     if (this.socket?.readyState !== WebSocket.OPEN) return;
     if (app.frames === this.awaited) return this.later();
     const { state } = app;
-    // The server traces whole materials on balls: beside a single term or another shape its picture would mislead.
-    const whole = ["full", "compensated", "split"].includes(state.view.term);
-    this.status.message = !whole ? "of whole materials only" : state.view.mesh !== "sphere" ? "of spheres only" : "";
+    // The server renders whole materials on balls: its picture would not match a single term or another shape.
+    const supported = ["full", "compensated", "split"].includes(state.view.term);
+    this.status.message = !supported ? "of whole materials only" : state.view.mesh !== "sphere" ? "of spheres only" : "";
     if (this.status.message) {
       this.sent = "";
-      this.id += 1; // frames that are still under way are of no use
+      this.id += 1; // frames of older scenes that still arrive are dropped
       if (app.reference) app.setReference(null);
       return this.onStatus();
     }
     const text = this.scene();
     if (text === this.sent) {
-      // There and back within a moment: the picture is of what is shown after all.
+      // Changed back within the delay: the picture is again of what is shown.
       if (app.reference?.stale && this.status.samples > 0) app.setReference({ ...app.reference, stale: false });
       return;
     }
@@ -139,7 +139,7 @@ export class Live {
     this.onStatus();
   }
 
-  /** What the server is told of the state, as text. */
+  /** What the server receives of the state, as text. */
   private scene(): string {
     const { app } = this;
     const { state } = app;
@@ -160,7 +160,7 @@ export class Live {
     return JSON.stringify({ state: { rows, lights, camera, spacing: state.view.spacing }, width, height, spp: TARGET });
   }
 
-  /** Sends the picture of the environment once; lights name it by its key. */
+  /** Sends the environment picture once; lights refer to it by its key. */
   private upload(): string | null {
     const picture = this.app.environment;
     if (!picture) return null;
@@ -173,8 +173,8 @@ export class Live {
   }
 
   /**
-   * Asks for the shaders that the balls of a row lack. One that comes brings the page back here, so what is wanted by
-   * then is asked for then: of a slider that moves on, not every value.
+   * Requests the shaders that the balls of a row lack. The arrival of one leads to the next call, which requests what is
+   * needed by then: while a slider moves, not every value is requested.
    */
   private ask(slot: number): void {
     const { app } = this;
@@ -186,26 +186,26 @@ export class Live {
       const paths = app.shaders.material(row.material).variants[0]?.manifest.parameters.filter((p) => p.fixed).map((p) => p.path) ?? [];
       const fixed = Object.fromEntries(paths.map((path) => [path, values[path]]));
       const wish = JSON.stringify([row.material, row.choices, on, fixed]);
-      const busy = [...this.asked.values()].some((one) => one.place === place);
-      if (this.waiting.has(wish) || busy || this.asked.size >= MOST_ASKED) continue;
+      const busy = [...this.requests.values()].some((one) => one.place === place);
+      if (this.waiting.has(wish) || busy || this.requests.size >= MAX_REQUESTS) continue;
       this.waiting.add(wish);
       this.wishes += 1;
-      this.asked.set(this.wishes, { wish, place, title: app.shaders.material(row.material).title });
+      this.requests.set(this.wishes, { wish, place, title: app.shaders.material(row.material).title });
       this.text({ type: "choice", id: this.wishes, revision: app.data.revision, material: row.material, choices: row.choices, on, fixed });
     }
     this.showWaiting();
   }
 
-  /** A layer or a choice whose shader the server writes: until it is here, the picture is that of before. */
+  /** A layer or a choice whose shader the server is writing: the picture is the earlier one until it arrives. */
   private showWaiting(): void {
-    const titles = new Set([...this.asked.values()].map(({ title }) => title));
+    const titles = new Set([...this.requests.values()].map(({ title }) => title));
     this.app.onBusy("server", titles.size ? `The server writes the shader of ${[...titles].join(", ")}` : null);
   }
 
-  /** What was asked for: nobody answers any more. */
+  /** Drops all requests, which will not be answered. */
   private forget(): void {
     this.waiting.clear();
-    this.asked.clear();
+    this.requests.clear();
     this.showWaiting();
   }
 
@@ -215,7 +215,7 @@ export class Live {
       this.status.device = String(message["device"] ?? "");
     } else if (message.type === "error") {
       this.status.message = String(message["what"]);
-      if (this.asked.delete(Number(message["id"]))) this.showWaiting(); // not asked for again: the answer would be the same
+      if (this.requests.delete(Number(message["id"]))) this.showWaiting(); // no retry: the answer would be the same
       this.app.say([message["what"], message["where"], message["hint"]].filter(Boolean).join(" — "), "error");
     } else if (message.type === "stage") {
       this.renew(message as unknown as Pick<PageData, "revision" | "materials" | "scene" | "dfg">);
@@ -226,22 +226,22 @@ export class Live {
       material.variants.push(message["variant"] as Variant);
       const dfg = message["dfg"] as SplitSum | null;
       if (dfg && !this.app.data.dfg.some(({ facets }) => facets.join() === dfg.facets.join())) this.app.data.dfg.push(dfg);
-      const asked = this.asked.get(Number(message["id"]));
-      if (asked) this.waiting.delete(asked.wish);
-      this.asked.delete(Number(message["id"]));
+      const request = this.requests.get(Number(message["id"]));
+      if (request) this.waiting.delete(request.wish);
+      this.requests.delete(Number(message["id"]));
       this.showWaiting();
       this.app.store.update("slots", () => {});
     }
     this.onStatus();
   }
 
-  /** A saved file: everything that was asked for is asked for anew. */
+  /** After the file was saved, everything that was requested is requested again. */
   private renew(made: Pick<PageData, "revision" | "materials" | "scene" | "dfg">): void {
     const { app } = this;
     this.sent = "";
     this.id += 1;
     this.forget();
-    this.awaited = app.frames; // the page's own picture comes first: both want all of a small machine
+    this.awaited = app.frames; // the page's own picture first: both would compete for the processor
     if (app.reference) app.setReference({ ...app.reference, stale: true });
     app.renew(made);
     app.onFault(null);
@@ -256,7 +256,7 @@ export class Live {
       this.app.setReference({ width: header.width, height: header.height, data, samples: header.spp, done: header.done });
       this.onStatus();
     }
-    // After the next picture, not before: a page that cannot keep up is not sent more.
+    // After the next picture, not before: a slow page is not sent more.
     requestAnimationFrame(() => this.text({ type: "ack", frame: header.frame }));
   }
 }

@@ -1,4 +1,4 @@
-/** Builds the page from the data that stands in the document. */
+/** Builds the page from the data in the document. */
 import "./app.css";
 import { PageApp } from "./app";
 import { readPageData } from "./data";
@@ -21,7 +21,7 @@ function start(host: HTMLElement): void {
   app.store.subscribe((change) => layout.update(change));
   for (const panel of panels) layout.dock.add(panel);
   installMarker(app, layout.dock.panels);
-  // Such as a panel from outside that cannot be loaded. (Browsers also tell of observers that they put off, without an error.)
+  // Such as an external panel that fails to load. (Browsers also report deferred observers here, without an error.)
   addEventListener("error", ({ error, message }) => {
     if (error) app.say(message, "error");
   });
@@ -30,7 +30,7 @@ function start(host: HTMLElement): void {
     layout.live = new Live(app, data.socket);
     layout.live.onStatus = () => layout.showStatus();
   }
-  // What panels from outside call, and what tests and people at the console drive the page by.
+  // The interface for external panels, tests and the console.
   Object.assign(window, {
     gonio: {
       app,

@@ -1,37 +1,37 @@
-/** glTF and OBJ files as one geometry, by three.js' own readers. */
+/** glTF and OBJ files as one geometry, read by three.js. */
 import { BufferAttribute, BufferGeometry, LoadingManager, Mesh, MeshBasicMaterial, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 
-/** `beside`: files that came with it, where a .gltf keeps its data in a .bin. */
-export async function parseMesh(file: File, beside: readonly File[]): Promise<BufferGeometry> {
-  const root = /\.obj$/i.test(file.name) ? new OBJLoader().parse(await file.text()) : await parseGltf(file, beside);
+/** `companions`: the files dropped with it; a .gltf may have its data in a .bin. */
+export async function parseMesh(file: File, companions: readonly File[]): Promise<BufferGeometry> {
+  const root = /\.obj$/i.test(file.name) ? new OBJLoader().parse(await file.text()) : await parseGltf(file, companions);
   return merged(root, file.name);
 }
 
-async function parseGltf(file: File, beside: readonly File[]): Promise<Object3D> {
-  const given: string[] = [];
-  let lacking = "";
+async function parseGltf(file: File, companions: readonly File[]): Promise<Object3D> {
+  const urls: string[] = [];
+  let missing = "";
   const manager = new LoadingManager();
   manager.setURLModifier((address) => {
     if (/^(data|blob):/.test(address)) return address;
     const name = decodeURIComponent(address).split("/").pop() as string;
-    const found = beside.find((other) => other.name === name);
-    if (!found) lacking ||= name;
-    given.push(URL.createObjectURL(found ?? new Blob()));
-    return given[given.length - 1] as string;
+    const match = companions.find((other) => other.name === name);
+    if (!match) missing ||= name;
+    urls.push(URL.createObjectURL(match ?? new Blob()));
+    return urls[urls.length - 1] as string;
   });
   const loader = new GLTFLoader(manager);
-  // The page brings its own materials: nothing of the file's is read, its pictures least of all.
+  // The page has its own materials: the file's textures are not loaded.
   const material = new MeshBasicMaterial();
   loader.register(() => ({ name: "no-materials", loadMaterial: () => Promise.resolve(material) }));
   try {
     return (await loader.parseAsync(await file.arrayBuffer(), "")).scene;
   } catch (error) {
-    if (lacking) throw new Error(`${file.name} keeps its data in ${lacking}: drop both together, or a .glb.`);
+    if (missing) throw new Error(`${file.name} refers to ${missing}: drop both files together, or a .glb.`);
     throw new Error(`${file.name} cannot be read: ${error instanceof Error ? error.message.replace(/^THREE\.\w+: /, "") : String(error)}`);
   } finally {
-    for (const address of given) URL.revokeObjectURL(address);
+    for (const address of urls) URL.revokeObjectURL(address);
   }
 }
 
@@ -51,7 +51,7 @@ function merged(root: Object3D, name: string): BufferGeometry {
     const position = geometry.getAttribute("position");
     const normal = geometry.getAttribute("normal");
     const uv = geometry.getAttribute("uv");
-    if (!position.array.every(Number.isFinite)) throw new Error(`${name}: a corner of a face is missing or not a number.`);
+    if (!position.array.every(Number.isFinite)) throw new Error(`${name}: a vertex of a face is missing or not a number.`);
     everyUv &&= Boolean(uv);
     for (let i = 0; i < position.count; i++) {
       point.fromBufferAttribute(position, i).applyMatrix4(object.matrixWorld);
@@ -61,7 +61,7 @@ function merged(root: Object3D, name: string): BufferGeometry {
       uvs.push(uv?.getX(i) ?? 0, uv?.getY(i) ?? 0);
     }
   });
-  if (positions.length === 0) throw new Error(`${name} holds no mesh.`);
+  if (positions.length === 0) throw new Error(`${name} contains no mesh.`);
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(positions), 3));
   geometry.setAttribute("normal", new BufferAttribute(new Float32Array(normals), 3));

@@ -1,4 +1,4 @@
-/** What stands in the place of the balls: a torus, a shader ball, or a dropped file; fitted into the unit sphere. */
+/** Shapes that replace the balls: a torus, a shader ball, or a dropped file, scaled to the unit sphere. */
 import type { BufferGeometry } from "three";
 
 export interface Mesh {
@@ -76,7 +76,7 @@ const finish = (grid: Grid): Mesh => ({
 export function torus(): Mesh {
   const grid = empty();
   const [large, small] = [0.68, 0.32];
-  const tilt = 0.9; // seen from the front a torus should show its hole and its inner side
+  const tilt = 0.9; // the front view shows the hole of the torus and its inner side
   addGrid(grid, 96, 48, (u, v) => {
     const [a, b] = [2 * Math.PI * u, 2 * Math.PI * v];
     const r = large + small * Math.cos(b);
@@ -86,10 +86,10 @@ export function torus(): Mesh {
   return finish(grid);
 }
 
-/** A ball on a foot, with a groove around it that shows concave edges, and a rounded collar. */
+/** A ball on a foot, with a groove that shows concave edges, and a rounded collar. */
 export function shaderBall(): Mesh {
   const grid = empty();
-  const turned = (profile: (v: number) => [number, number], rows: number) =>
+  const revolve = (profile: (v: number) => [number, number], rows: number) =>
     addGrid(grid, 96, rows, (u, v) => {
       const [r, y] = profile(v);
       const a = 2 * Math.PI * u;
@@ -98,14 +98,14 @@ export function shaderBall(): Mesh {
   const radius = 0.74;
   const middle = 0.24;
   // From the foot's pole upward, so that dp/du x dp/dv points out.
-  turned((v) => {
+  revolve((v) => {
     const polar = Math.PI * (1 - Math.min(Math.max(v, 1e-3), 1 - 1e-3));
     const groove = 0.07 * Math.exp(-(((polar - 1.15) / 0.055) ** 2));
     const r = radius - groove;
     return [r * Math.sin(polar), middle + r * Math.cos(polar)];
   }, 120);
   const collar: [number, number][] = [[0.001, -0.84], [0.46, -0.84], [0.5, -0.82], [0.5, -0.76], [0.46, -0.73], [0.34, -0.71], [0.27, -0.64], [0.25, -0.52], [0.25, -0.4]];
-  turned((v) => smooth(collar, v), 64);
+  revolve((v) => smooth(collar, v), 64);
   return finish(grid);
 }
 
@@ -123,14 +123,14 @@ function smooth(points: [number, number][], v: number): [number, number] {
 
 const LARGEST_FILE = 64 * 1024 * 1024;
 
-/** A dropped .glb, .gltf (with its .bin `beside` it, where it has one) or .obj. */
-export async function readMesh(file: File, beside: readonly File[] = []): Promise<Mesh> {
-  for (const each of [file, ...beside]) if (each.size > LARGEST_FILE) throw new Error(`${each.name} is larger than 64 MB.`);
+/** A dropped .glb, .gltf (with its .bin `companions` it, if it has one) or .obj. */
+export async function readMesh(file: File, companions: readonly File[] = []): Promise<Mesh> {
+  for (const each of [file, ...companions]) if (each.size > LARGEST_FILE) throw new Error(`${each.name} is larger than 64 MB.`);
   const { parseMesh } = await import("./mesh-files");
-  return fromGeometry(await parseMesh(file, beside));
+  return fromGeometry(await parseMesh(file, companions));
 }
 
-/** Centred and scaled into the unit sphere; tangents along u where there are texture coordinates. */
+/** Centered and scaled to the unit sphere; tangents along u if there are texture coordinates. */
 export function fromGeometry(geometry: BufferGeometry): Mesh {
   const position = geometry.getAttribute("position");
   const count = position.count;
@@ -151,14 +151,14 @@ export function fromGeometry(geometry: BufferGeometry): Mesh {
     normals.set([normal.getX(i), normal.getY(i), normal.getZ(i)], 3 * i);
     if (uv) uvs.set([uv.getX(i), uv.getY(i)], 2 * i);
   }
-  if (positions.some((x) => !Number.isFinite(x)) || count === 0) throw new Error("The mesh has no finite points.");
+  if (positions.some((x) => !Number.isFinite(x)) || count === 0) throw new Error("The mesh is empty or has vertices that are not finite.");
   const indices = index ? Uint32Array.from(index.array) : Uint32Array.from({ length: count }, (_, i) => i);
   const tangents = new Float32Array(3 * count);
   if (uv) tangentsAlongU(positions, uvs, indices, tangents);
   return { positions, normals, tangents, uvs, indices };
 }
 
-/** Adds up dp/du of every triangle at its corners; where the sum is zero the shader takes the sphere's tangent. */
+/** Sums dp/du of every triangle at its vertices; where the sum is zero the shader takes the sphere's tangent. */
 function tangentsAlongU(positions: Float32Array, uvs: Float32Array, indices: Uint32Array, out: Float32Array): void {
   const at = (array: Float32Array, i: number) => array[i] as number;
   for (let t = 0; t + 2 < indices.length; t += 3) {

@@ -1,10 +1,10 @@
 /**
- * What a panel of the dock is, and what the page gives it.
+ * The interface of a panel of the dock, and what the page provides to it.
  *
- * A panel lives in one tab. `mount` runs once, when its tab is first opened; `update` runs after every change of the
+ * A panel is one tab. `mount` runs once, when its tab is first opened; `update` runs after every change of the
  * state while it is open, and when it opens again.
  *
- * A panel that comes from outside calls `gonio.addPanel` with such an object; docs/viewer.md shows one.
+ * An external panel calls `gonio.addPanel` with such an object; docs/viewer.md shows one.
  */
 import type { PageData, Values, Vec3 } from "./data";
 import type { Evaluator } from "./evaluator";
@@ -17,11 +17,11 @@ export interface Panel {
   readonly title: string;
   /** One line for the tab's tooltip. */
   readonly doc?: string;
-  /** Tabs stand in this order; those that give none come last, by title. */
+  /** Order of the tabs; panels without a number come last, by title. */
   readonly order?: number;
-  /** Whether it speaks of the clicked point, which is then marked on its ball. */
+  /** Whether it refers to the clicked point, which is then marked on its ball. */
   readonly marksPoint?: boolean;
-  /** Runs once when the page stands, though the tab may never be opened. */
+  /** Runs once when the page is complete, even if the tab is never opened. */
   install?(app: App): void;
   mount(host: HTMLElement, app: App): void;
   update?(change: Change): void;
@@ -29,7 +29,7 @@ export interface Panel {
   refresh?(what: "picture" | "reference" | "picked" | "theme"): void;
 }
 
-/** Linear radiance, RGBA float32, top row first; alpha is the coverage by balls, colour is premultiplied by it. */
+/** Linear radiance, RGBA float32, top row first; alpha is the coverage by balls, color is premultiplied by it. */
 export interface Picture {
   width: number;
   height: number;
@@ -37,7 +37,7 @@ export interface Picture {
   /** Samples per pixel so far. */
   samples: number;
   done: boolean;
-  /** A reference of what was shown before: the newer one is on its way. */
+  /** A reference of an earlier state: the newer one is being rendered. */
   stale?: boolean;
 }
 
@@ -45,7 +45,7 @@ export interface Picked {
   slot: number;
   ball: number;
   shader: Shader;
-  /** Values of every field of the shader's struct, by path, as the ball has them. */
+  /** Values of every field of the shader's struct for this ball, by path. */
   values: Values;
   /** Toward the camera, local frame. */
   wo: Vec3;
@@ -56,7 +56,7 @@ export interface Picked {
   uv: [number, number];
 }
 
-/** Draws over the canvas in the place of the page's own tone mapping (wipe, difference). */
+/** Draws over the canvas instead of the page's own tone mapping (wipe, difference). */
 export interface Presenter {
   /** Returns false to let the page draw its own picture. `raster` is a texture of sums: divide by `samples`. */
   present(gl: WebGL2RenderingContext, raster: WebGLTexture, samples: number, width: number, height: number): boolean;
@@ -66,17 +66,17 @@ export interface App {
   readonly data: PageData;
   readonly store: Store;
   readonly state: State;
-  /** One context for all. Who uses it binds what it needs and leaves no VAO, framebuffer or scissor bound. */
+  /** One context for all. Callers bind what they need and leave no VAO, framebuffer or scissor bound. */
   readonly gl: WebGL2RenderingContext;
   readonly shaders: ShaderLibrary;
-  /** What the materials' own shaders say: eval, pdf, samples, terms, albedo, as arrays of float32. */
+  /** Results of the materials' own shaders: eval, pdf, samples, terms, albedo, as arrays of float32. */
   readonly evaluator: Evaluator;
   readonly canvas: HTMLCanvasElement;
   /** The element over the canvas for handles, marks and labels (pointer-events: none; children may switch it on). */
   readonly overlay: HTMLElement;
-  /** The shader that draws a ball; without one, the selected ball of the slot, or its first. */
+  /** The shader that draws a ball; if it has none, that of the selected ball of the slot, else of its first. */
   shaderOf(slot: number, ball?: number): Shader;
-  /** Every field's value of one ball, as its shader draws it: declared, then the row's, then the ball's own. */
+  /** Every field's value of one ball, as drawn: the declared one, overridden by the row's, overridden by the ball's. */
   valuesOf(slot: number, ball: number): Values;
   /** Slots that are shown now: all, or the solo one. */
   visibleSlots(): number[];
@@ -85,13 +85,13 @@ export interface App {
   referencePicture(): Picture | null;
   readonly picked: Picked;
   presenter: Presenter | null;
-  /** Draws again without starting the accumulation anew. */
+  /** Draws again without restarting the accumulation. */
   redraw(): void;
   theme(): "light" | "dark";
-  /** A colour of the theme by its CSS variable, e.g. cssColor("--accent"). */
+  /** A color of the theme by its CSS variable, e.g. cssColor("--accent"). */
   cssColor(name: string): string;
-  /** The fixed colour of slot A, B, C... */
+  /** The fixed color of slot A, B, C... */
   slotColor(slot: number): string;
-  /** A line for the user that goes away by itself. */
+  /** Shows a message to the user that disappears by itself. */
   say(text: string, kind?: "info" | "error"): void;
 }

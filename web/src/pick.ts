@@ -1,4 +1,4 @@
-/** What lies under a pixel: which ball, and the frame of its surface there. */
+/** Picking: the ball under a pixel, and the frame of its surface there. */
 import type { Vec3 } from "./data";
 import type { Mesh } from "./meshes";
 import type { DrawnBall } from "./renderer";
@@ -19,7 +19,7 @@ export function hitBalls(balls: DrawnBall[], mesh: Mesh | null, eye: Vec3, ray: 
     const from = sub(eye, ball.center);
     const b = dot(from, ray);
     const inside = b * b - dot(from, from) + 1;
-    if (inside < 0) continue; // meshes lie in the unit sphere too
+    if (inside < 0) continue; // meshes are inside the unit sphere too
     const hit = mesh ? hitMesh(mesh, from, ray) : hitSphere(from, ray, -b - Math.sqrt(inside));
     if (hit && hit.distance > 0 && hit.distance < (best?.distance ?? Infinity)) best = { ball, ...hit, position: add(ball.center, hit.position) };
   }
@@ -42,7 +42,7 @@ export function hitSphere(from: Vec3, ray: Vec3, distance: number): Omit<Hit, "b
 function hitMesh(mesh: Mesh, from: Vec3, ray: Vec3): Omit<Hit, "ball"> | null {
   const { positions, normals, tangents, uvs, indices } = mesh;
   const vector = (array: Float32Array, i: number): Vec3 => [array[3 * i] as number, array[3 * i + 1] as number, array[3 * i + 2] as number];
-  let found: { t: number; u: number; v: number; corner: number } | null = null;
+  let nearest: { t: number; u: number; v: number; corner: number } | null = null;
   for (let corner = 0; corner + 2 < indices.length; corner += 3) {
     const a = vector(positions, indices[corner] as number);
     const e1 = sub(vector(positions, indices[corner + 1] as number), a);
@@ -57,10 +57,10 @@ function hitMesh(mesh: Mesh, from: Vec3, ray: Vec3): Omit<Hit, "ball"> | null {
     const v = dot(ray, q) / determinant;
     if (v < 0 || u + v > 1) continue;
     const t = dot(e2, q) / determinant;
-    if (t > 1e-6 && t < (found?.t ?? Infinity)) found = { t, u, v, corner };
+    if (t > 1e-6 && t < (nearest?.t ?? Infinity)) nearest = { t, u, v, corner };
   }
-  if (!found) return null;
-  const { t, u, v, corner } = found;
+  if (!nearest) return null;
+  const { t, u, v, corner } = nearest;
   const weights = [1 - u - v, u, v];
   const blend = (array: Float32Array): Vec3 =>
     weights.reduce<Vec3>((sum, w, k) => add(sum, scale(vector(array, indices[corner + k] as number), w)), [0, 0, 0]);

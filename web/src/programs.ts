@@ -1,8 +1,8 @@
 /**
- * Programs by key, each made once, without stopping the page where the browser allows that.
+ * Programs by key, each compiled once, without blocking the page if the browser allows that.
  *
- * A long shader may take a browser half a minute, in which it draws nothing, not even the page's own text. So the page
- * first says that it is at work, lets that be painted, and only then begins.
+ * A browser may compile a long shader for half a minute without painting. The page therefore first reports the work,
+ * lets the report be painted, and then starts.
  */
 
 export const HEADER = `#version 300 es
@@ -12,13 +12,13 @@ precision highp sampler2D;
 precision highp sampler3D;
 `;
 
-/** What a program is made of. Texts are functions: a known program needs none. */
+/** The source of a program. Texts are functions, which a cached program does not call. */
 export interface Source {
-  /** Names all that the texts depend on. */
+  /** Identifies everything that the texts depend on. */
   key: string;
-  /** Whose it is, for the user to read. */
+  /** The material's title, for messages. */
   title: string;
-  /** Whether the browser may be busy with it for long, by what it holds of a material's text. */
+  /** Whether compiling may take long, by the material's functions that it includes. */
   long: boolean;
   vertex: () => string;
   fragment: () => string;
@@ -30,7 +30,7 @@ export interface Program {
   uniform(name: string): WebGLUniformLocation | null;
 }
 
-/** Frames between saying that a long program is made and beginning: the browser has painted it by then. */
+/** Frames between the report of a long compilation and its start: the browser has painted the report by then. */
 const FRAMES_TO_PAINT = 3;
 
 interface Started {
@@ -44,7 +44,7 @@ export class Programs {
   private readonly started = new Map<string, Started>();
   private announced = new Map<string, number>();
   private readonly parallel: { COMPLETION_STATUS_KHR: number } | null;
-  /** Hears whose programs are being made; nothing any more by an empty list. */
+  /** Called with the titles of the programs that are being compiled; with an empty list when there are none. */
   onMaking: (titles: string[]) => void = () => {};
 
   constructor(private readonly gl: WebGL2RenderingContext) {
@@ -52,13 +52,13 @@ export class Programs {
   }
 
   /**
-   * Whether programs can be used at once; begins to make those that cannot. To be asked once a frame: a long one is
-   * begun when it was asked for in a few.
+   * Whether all programs can be used now; starts compiling those that cannot. Called once per frame: a long compilation
+   * starts after a few calls.
    */
   ready(sources: Source[]): boolean {
     const missing = sources.filter((source) => !this.linked.has(source.key) && !this.complete(source));
     if (missing.length === 0) {
-      // All of them before the first draws: asked later, a browser answers when that is done, and the page stands still.
+      // All of them before the first draws: a later query blocks the page until the browser is done.
       for (const source of sources) this.program(source);
       return true;
     }
@@ -72,13 +72,13 @@ export class Programs {
     return false;
   }
 
-  /** `program`, as soon as it can be used. */
+  /** Resolves with the program as soon as it can be used. */
   async made(source: Source): Promise<Program> {
     while (!this.ready([source])) await new Promise((resolve) => requestAnimationFrame(resolve));
     return this.program(source);
   }
 
-  /** The program; waits for the browser where it is not ready yet. */
+  /** The program; waits for the browser if it is not ready yet. */
   program(source: Source): Program {
     const known = this.linked.get(source.key);
     if (known) return known;
@@ -90,18 +90,18 @@ export class Programs {
     return program;
   }
 
-  /** The GPU has drawn with what was made; some drivers compile only then. Others that wait say so again. */
+  /** Called when the GPU has drawn with new programs; some drivers compile only then. Pending ones report again. */
   drawn(): void {
     this.onMaking([]);
   }
 
-  /** Drops those whose key is gone. */
+  /** Drops programs whose key is no longer used. */
   forget(gone: (key: string) => boolean): void {
-    for (const kept of [this.linked, this.started])
-      for (const [key, { handle }] of kept)
+    for (const programs of [this.linked, this.started])
+      for (const [key, { handle }] of programs)
         if (gone(key)) {
           this.gl.deleteProgram(handle);
-          kept.delete(key);
+          programs.delete(key);
         }
   }
 
@@ -109,7 +109,7 @@ export class Programs {
     if (!this.started.has(source.key)) this.started.set(source.key, start(this.gl, source));
   }
 
-  /** Whether what was begun is done, as far as the browser tells. */
+  /** Whether compilation is complete, as far as the browser reports. */
   private complete({ key }: Source): boolean {
     const started = this.started.get(key);
     return started !== undefined && (!this.parallel || this.gl.isContextLost() || Boolean(this.gl.getProgramParameter(started.handle, this.parallel.COMPLETION_STATUS_KHR)));
@@ -149,6 +149,6 @@ function finish(gl: WebGL2RenderingContext, { handle, source, stages }: Started)
   };
 }
 
-/** A short program of the page itself, at once. */
+/** A short program of the page itself, compiled at once. */
 export const link = (gl: WebGL2RenderingContext, key: string, vertex: string, fragment: string): Program =>
   finish(gl, start(gl, { key, title: key, long: false, vertex: () => vertex, fragment: () => fragment }));

@@ -1,6 +1,6 @@
 /**
- * Radiance pictures (.hdr): header lines, then rows of RGBE, plain or run-length coded (Ward 1991). A file from a
- * stranger is read with care: sizes are bounded before anything is allocated, and every row must be whole.
+ * Radiance pictures (.hdr): header lines, then rows of RGBE, plain or run-length coded (Ward 1991). Files are
+ * untrusted: sizes are bounded before anything is allocated, and every row must be complete.
  */
 
 export interface RadiancePicture {
@@ -28,12 +28,12 @@ export function readRadiance(bytes: Uint8Array, name: string): RadiancePicture {
   };
   if (!line().startsWith("#?")) fail("not a Radiance picture (#?RADIANCE is missing).");
   for (let header = line(); header !== ""; header = line())
-    if (header.startsWith("FORMAT=") && !header.includes("32-bit_rle_rgbe")) fail(`${header.slice(7)} is not read, only 32-bit_rle_rgbe.`);
-  const size = /^-Y (\d+) \+X (\d+)\s*$/.exec(line()) ?? fail("only pictures with rows from top to bottom (-Y N +X M) are read.");
+    if (header.startsWith("FORMAT=") && !header.includes("32-bit_rle_rgbe")) fail(`${header.slice(7)} is not supported, only 32-bit_rle_rgbe.`);
+  const size = /^-Y (\d+) \+X (\d+)\s*$/.exec(line()) ?? fail("only pictures with rows from top to bottom (-Y N +X M) are supported.");
   const [height, width] = [Number(size[1]), Number(size[2])];
-  if (!(width > 0 && height > 0 && width <= LARGEST && height <= LARGEST)) fail(`${width} x ${height} pixels; the largest is ${LARGEST} x ${LARGEST}.`);
-  // Run lengths of 127 are the best the coding can do: a shorter file cannot hold so many rows.
-  if ((bytes.length - at) * 64 < width * height * 2) fail("the file is cut off.");
+  if (!(width > 0 && height > 0 && width <= LARGEST && height <= LARGEST)) fail(`${width} x ${height} pixels; the limit is ${LARGEST} x ${LARGEST}.`);
+  // Runs of 127 are the best possible compression: a shorter file cannot contain that many rows.
+  if ((bytes.length - at) * 64 < width * height * 2) fail("the file is truncated.");
   const data = new Float32Array(3 * width * height);
   const row = new Uint8Array(4 * width);
   for (let y = 0; y < height; y++) {
@@ -42,7 +42,7 @@ export function readRadiance(bytes: Uint8Array, name: string): RadiancePicture {
       at += 4;
       for (let channel = 0; channel < 4; channel++)
         for (let x = 0; x < width; ) {
-          if (at + 1 >= bytes.length) fail("the file is cut off.");
+          if (at + 1 >= bytes.length) fail("the file is truncated.");
           let count = bytes[at++] as number;
           const run = count > 128;
           if (run) count -= 128;
@@ -51,7 +51,7 @@ export function readRadiance(bytes: Uint8Array, name: string): RadiancePicture {
           at += run ? 1 : count;
         }
     } else {
-      if (at + 4 * width > bytes.length) fail("the file is cut off.");
+      if (at + 4 * width > bytes.length) fail("the file is truncated.");
       row.set(bytes.subarray(at, at + 4 * width));
       at += 4 * width;
     }

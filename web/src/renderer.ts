@@ -1,11 +1,11 @@
 /**
- * Draws the balls into a float picture of sums, one sample a pixel at a time, and that picture to the screen.
+ * Renders the balls into a float picture of sums, one sample per pixel at a time, and that picture to the screen.
  *
- * A sample's position in the pixel and its random numbers come from low-discrepancy sequences, so that the sum tends
- * to the box-filtered picture that a path tracer makes. Only the pixels that a ball may cover are visited.
+ * A sample's position in the pixel and its random numbers come from low-discrepancy sequences, so that the sum converges
+ * to the box-filtered picture of a path tracer. Only the pixels that a ball may cover are drawn.
  */
 import type { Values, Vec3 } from "./data";
-import { MOST_BLACK, TONES, displayProgram } from "./display";
+import { MAX_BLACK, TONES, displayProgram } from "./display";
 import { AlbedoTables, type EnvironmentPicture, type PrefilteredLevel, PrefilteredEnvironments, alphaOf, roughnessOf } from "./environment";
 import { type Box, type Flaw, boxOf, count } from "./flaws";
 import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, copies, fragmentText, hasTerm, isFactor, isSigned, isWhole, splits, vertexText } from "./glsl";
@@ -27,17 +27,17 @@ export interface DrawnBall {
   center: Vec3;
 }
 
-/** What the page shows now, resolved: the renderer knows nothing of rows or links. */
+/** What the page shows now, resolved: the renderer is independent of rows and links. */
 export interface Scene {
   state: State;
   balls: DrawnBall[];
-  /** Balls of the row that the others are subtracted from; empty unless that is shown. */
+  /** Balls of the row that the others are subtracted from; empty for any other term. */
   minuend: DrawnBall[];
   environment: EnvironmentPicture | null;
   mesh: MeshBuffers | null;
   /** sRGB of the page behind the balls. */
   paper: Vec3;
-  /** What is wrong with the last picture of them. */
+  /** Faults found in the last picture of them. */
   flaws: readonly Flaw[];
 }
 
@@ -47,15 +47,15 @@ interface Draw extends DrawnBall {
   nearer: number;
 }
 
-/** A sum of positions in the pixel is done sooner than one of random directions. */
+/** A sum over positions in the pixel converges sooner than one over directions. */
 const SAMPLES_STILL = 256;
 const SAMPLES_RANDOM = 4096;
-const SAMPLES_HALF = 64; // float16 sums: at 64 a sample is still 16 units in the last place
+const SAMPLES_HALF = 64; // float16 sums: at 64, one sample is still 16 units in the last place
 
-/** From so many samples on the split sum no longer counts beside them: docs/viewer.md, "Light of an environment". */
+/** From this number of samples on, the split sum no longer contributes: docs/viewer.md, "Light of an environment". */
 const EARLY_END = 64;
 
-/** How an environment is integrated, and what is taken off. */
+/** How an environment is integrated, and which integral is subtracted. */
 type Uses = Pick<ShadingKey, "environment" | "minus">;
 const SPLIT_SUM: Uses = { environment: "split-sum", minus: "none" };
 
@@ -64,7 +64,7 @@ interface Prepared {
   program: Program;
   row: number;
   level: PrefilteredLevel | null;
-  /** Whether its tables are complete, and whether they became so just now. */
+  /** Whether its tables are complete, and whether they have just become so. */
   complete: boolean;
   finished: boolean;
 }
@@ -74,7 +74,7 @@ export class Renderer {
   /** Draw calls and pictures since the page was loaded, for tests and the status line. */
   frames = 0;
   private target: Target | null = null;
-  /** The split sum times what it counts for, while the sum in `target` is still noisy. */
+  /** The weighted split sum, shown while the sum in `target` is still noisy. */
   private early: Target | null = null;
   private hasEarly = false;
   private readonly full: boolean;
@@ -82,7 +82,7 @@ export class Renderer {
   private readonly prefiltered: PrefilteredEnvironments;
   private readonly empty: WebGLVertexArrayObject;
   private black: WebGLTexture;
-  /** False while tables that the picture is made of still refine. */
+  /** False while tables that the picture depends on are still being refined. */
   settled = true;
 
   constructor(
@@ -92,7 +92,7 @@ export class Renderer {
     this.full = floatBlending(gl);
     this.albedo = new AlbedoTables(gl, shaders, this.full);
     this.prefiltered = new PrefilteredEnvironments(gl, shaders, this.full);
-    // Vertex shaders that count vertices need no buffers, but a default VAO that others may have changed will not do.
+    // Vertex shaders that count vertices need no buffers; the default VAO may have been changed by others.
     this.empty = gl.createVertexArray();
     this.black = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.black);
@@ -136,13 +136,13 @@ export class Renderer {
     return this.samples >= this.limit(scene);
   }
 
-  /** Adds one sample to every pixel. `hurry` leaves tables that refine over time for later. */
+  /** Adds one sample to every pixel. `hurry` postpones tables that are refined over time. */
   step(scene: Scene, hurry: boolean): void {
     const { target } = this;
     if (!target) return;
     const frame = cameraFrame(scene.state.camera);
     const draws = this.draws(scene, frame);
-    // Tables first: they have their own framebuffers.
+    // Tables first: they are drawn into framebuffers of their own.
     const prepared = draws.map((draw) => this.prepare(scene, draw, this.uses(scene, draw.shader), hurry));
     this.settled = prepared.every(({ complete }) => complete);
     if (prepared.some(({ finished }) => finished)) this.samples = 0;
@@ -153,7 +153,7 @@ export class Renderer {
     this.frames += 1;
   }
 
-  /** The split sum in place of what is sampled, as soon as its tables are there. */
+  /** The split sum instead of the sampled integral, as soon as its tables are available. */
   private drawEarly(scene: Scene, frame: Frame, prepared: Prepared[], hurry: boolean): void {
     const { state, environment } = scene;
     if (!environment || state.environment !== "sampled" || !["full", "compensated"].includes(state.view.term)) return;
@@ -168,7 +168,7 @@ export class Renderer {
       }
       if (!this.shaders.programs.ready(this.sources(scene, draw.shader, SPLIT_SUM))) return;
       if (!this.prefiltered.of(draw.shader, draw.values, environment, !hurry)?.complete) return;
-      // Samples that it is worth: the smoother the ball, the less it errs. At every number of them the picture is nearer the truth.
+      // Samples that it is equivalent to: its error is smaller on smoother balls. The mean is closer to the truth for any number.
       const weight = 4 / Math.max(roughness, 0.25) ** 2;
       draws.push(this.prepare(scene, { ...draw, gain: weight, cover: weight }, SPLIT_SUM, true));
     }
@@ -178,7 +178,7 @@ export class Renderer {
     this.sum(scene, frame, this.early, draws, true);
   }
 
-  private sum(scene: Scene, frame: Frame, target: Target, prepared: Prepared[], anew: boolean): void {
+  private sum(scene: Scene, frame: Frame, target: Target, prepared: Prepared[], restart: boolean): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.viewport(0, 0, target.width, target.height);
@@ -189,10 +189,10 @@ export class Renderer {
     gl.depthFunc(gl.LEQUAL);
     gl.clearColor(0, 0, 0, 0);
     gl.clearDepth(1);
-    gl.clear(gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT | (anew ? gl.COLOR_BUFFER_BIT : 0));
+    gl.clear(gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT | (restart ? gl.COLOR_BUFFER_BIT : 0));
     if (scene.mesh) {
       this.depthPass(scene.mesh, prepared.map(({ draw }) => draw), frame);
-      // Two triangles at one depth would both add their light: the first counts.
+      // Two triangles at one depth would both add their light: only the first is drawn.
       gl.enable(gl.STENCIL_TEST);
       gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     }
@@ -207,25 +207,25 @@ export class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   }
 
-  /** Front to back, since a sum cannot take back what a nearer ball hides. */
+  /** Front to back, since a sum cannot remove what a nearer ball hides. */
   private draws(scene: Scene, frame: Frame): Draw[] {
     const sorted = [...scene.balls].sort((a, b) => length(sub(a.center, frame.eye)) - length(sub(b.center, frame.eye)));
     const plain = (ball: DrawnBall): Draw => ({ ...ball, gain: 1, cover: 1, nearer: 0 });
     return sorted.flatMap((ball) => {
       const above = scene.minuend.find((b) => b.ball === ball.ball);
       if (!above) return [plain(ball)];
-      // The second draw of one ball must not lose the depth test to the first by a rounding.
+      // Rounding must not make the second draw of one ball fail the depth test against the first.
       return [plain({ ...above, center: ball.center }), { ...ball, gain: -1, cover: 0, nearer: 1e-5 }];
     });
   }
 
-  /** How the environment is integrated, and what is taken off again. */
+  /** How the environment is integrated, and which integral is subtracted. */
   environmentUse(scene: Scene, shader: Shader): Uses {
     const { view } = scene.state;
     const splitting = view.term === "split" || view.term === "split-error";
     const environment = this.integral(scene, shader, splitting);
     if (view.term !== "split-error") return { environment, minus: "none" };
-    // Where there is no split sum nothing differs.
+    // Without a split sum there is no difference.
     return environment === "sampled" ? { environment: "none", minus: "none" } : { environment, minus: environment === "none" ? "none" : "sampled" };
   }
 
@@ -234,18 +234,18 @@ export class Renderer {
     const { manifest } = shader;
     const light = environmentOf(actingLights(state));
     if (!light) return "none";
-    // Where the albedo depends on the angle to the normal alone, the sum over directions need not be done per pixel.
+    // If the albedo depends on the angle to the normal alone, no sum over directions is needed per pixel.
     if (!manifest.isotropic || manifest.stochastic || !isWhole(state.view.term)) return "sampled";
     if (!light.image || !scene.environment) return "albedo";
     const method = splitting && state.environment === "sampled" ? "split-sum" : state.environment;
     if (method !== "dfg") return splits(manifest) ? method : "sampled";
-    // The two numbers hold single scattering and multiply a reflectance at normal incidence: a compensated material,
+    // The two numbers describe single scattering and multiply a reflectance at normal incidence: a compensated material,
     // or one without Fresnel's term, takes its own albedo instead.
     const single = hasTerm(manifest, "F") && !hasTerm(manifest, "multi");
     return !splits(manifest) ? "sampled" : this.shaders.splitSum(shader) && single && alphaOf(shader) ? "dfg" : "split-sum";
   }
 
-  /** `environmentUse`, with what is sampled by a picture where there is one. */
+  /** `environmentUse`, including importance sampling of a picture if there is one. */
   private uses(scene: Scene, shader: Shader): Uses {
     if (isFactor(scene.state.view.term)) return { environment: "none", minus: "none" };
     const { environment, minus } = this.environmentUse(scene, shader);
@@ -254,7 +254,7 @@ export class Renderer {
     return { environment: way(environment), minus: way(minus) };
   }
 
-  /** Whether the next picture can be drawn without waiting for a program; begins to make those that are missing. */
+  /** Whether the next picture can be drawn without waiting for a program; starts compiling those that are missing. */
   ready(scene: Scene): boolean {
     const shown = [...scene.balls, ...scene.minuend].map(({ shader }) => shader);
     return this.shaders.programs.ready([...new Set(shown)].flatMap((shader) => this.sources(scene, shader, this.uses(scene, shader))));
@@ -269,10 +269,10 @@ export class Renderer {
     return [...this.shaders.derivingSources(shader), ...tables, this.shading(scene, shader, uses)];
   }
 
-  /** What draws a ball. */
+  /** The program that draws a ball. */
   private shading(scene: Scene, shader: Shader, uses: Uses): Source {
     const { term } = scene.state.view;
-    // Lights that are no environment are summed exactly: between two integrals of it nothing of them is left.
+    // Lights other than environments are summed exactly: they cancel in the difference of two integrals of an environment.
     const lights = term === "split-error" ? 0 : copies(shader, localLights(actingLights(scene.state)).length);
     const key: ShadingKey = { geometry: scene.mesh ? "mesh" : "sphere", lights, ...uses, term };
     return {
@@ -284,7 +284,7 @@ export class Renderer {
     };
   }
 
-  /** What a ball's draw needs besides its program: tables are drawn into framebuffers of their own. */
+  /** Prepares a ball's draw apart from its program: tables are drawn into framebuffers of their own. */
   private prepare(scene: Scene, draw: Draw, uses: Uses, hurry: boolean): Prepared {
     const { gl } = this;
     const { environment: use } = uses;
@@ -357,7 +357,7 @@ export class Renderer {
     gl.uniform1f(program.uniform("albedo_row"), row);
     texture("prefiltered", level?.texture ?? null);
     gl.uniform1f(program.uniform("prefiltered_level"), level?.level ?? 0);
-    gl.activeTexture(gl.TEXTURE0 + unit); // where one that is made only now may be bound
+    gl.activeTexture(gl.TEXTURE0 + unit); // the unit to which a new table may be bound
     if (program.uniform("dfg_table")) texture("dfg_table", this.shaders.splitSumTexture(draw.shader));
     const width = alphaOf(draw.shader);
     if (width) gl.uniform1f(program.uniform("dfg_roughness"), Math.sqrt(([draw.values[width]].flat() as number[])[0] ?? 0));
@@ -373,7 +373,7 @@ export class Renderer {
       gl.drawElements(gl.TRIANGLES, scene.mesh.count, gl.UNSIGNED_INT, 0);
       return;
     }
-    // A pixel more on each side: its centre may lie outside where a jittered ray still hits.
+    // One more pixel on each side: its center may be outside although a jittered ray still hits.
     const [x0, y0, x1, y1] = bounds as [number, number, number, number];
     const [dx, dy] = [2 / target.width, 2 / target.height];
     gl.uniform4f(program.uniform("bounds"), x0 - dx, y0 - dy, x1 + dx, y1 + dy);
@@ -393,19 +393,19 @@ export class Renderer {
     gl.uniform1f(program.uniform("environment_rotation"), light?.rotation ?? 0);
   }
 
-  /** How much of `early` is shown now. */
+  /** Weight of `early` now. */
   get earlyShare(): number {
     return this.hasEarly ? Math.max(0, 1 - this.samples / EARLY_END) / Math.sqrt(this.samples) : 0;
   }
 
-  /** What the sum holds of each ball; waits for the GPU. Null where floats cannot be read back, or a mesh hides where balls are. */
+  /** Statistics of the sum per ball; waits for the GPU. Null if floats cannot be read back, or if a mesh replaces the balls. */
   inspect(scene: Scene): ReturnType<typeof count> | null {
     const { gl, target } = this;
     if (!target || this.samples === 0 || !gl.getExtension("EXT_color_buffer_float")) return null;
     gl.bindVertexArray(this.empty);
-    const found = count(gl, this.shaders, target, this.boxes(scene));
+    const counts = count(gl, this.shaders, target, this.boxes(scene));
     gl.bindVertexArray(null);
-    return found;
+    return counts;
   }
 
   private boxes(scene: Scene): (Box | null)[] {
@@ -414,7 +414,7 @@ export class Renderer {
     return scene.balls.map(({ center }) => boxOf(frame, center, width / height));
   }
 
-  /** Draws the sum to the canvas, or lets a panel draw it its own way. */
+  /** Draws the sum to the canvas, or lets a panel draw it. */
   present(scene: Scene, presenter: Presenter | null, width: number, height: number): void {
     const { gl, target } = this;
     if (!target || this.samples === 0) return;
@@ -444,7 +444,7 @@ export class Renderer {
     gl.uniform3fv(program.uniform("theme"), scene.paper);
     const shown = environmentOf(actingLights(state)) !== null && (state.furnace || state.view.background === "environment");
     const boxes = scene.flaws.length ? this.boxes(scene) : [];
-    const black = scene.balls.flatMap(({ slot, ball }, i) => (boxes[i] && scene.flaws.some((f) => f.kind === "black" && f.slot === slot && f.ball === ball) ? [boxes[i]] : [])).slice(0, MOST_BLACK);
+    const black = scene.balls.flatMap(({ slot, ball }, i) => (boxes[i] && scene.flaws.some((f) => f.kind === "black" && f.slot === slot && f.ball === ball) ? [boxes[i]] : [])).slice(0, MAX_BLACK);
     gl.uniform1i(program.uniform("has_broken"), scene.flaws.some((flaw) => flaw.kind === "no number") ? 1 : 0);
     gl.uniform1i(program.uniform("black_count"), black.length);
     if (black.length) gl.uniform4fv(program.uniform("black_boxes"), black.flat());

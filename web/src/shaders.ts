@@ -1,7 +1,7 @@
 /**
- * The emitted shaders of the page's materials: which one a slot uses, its program, its uniforms and tables.
+ * The emitted shaders of the page's materials: the selection per slot, the program, its uniforms and tables.
  *
- * Nothing here knows a formula. The text, the struct's fields and the table list come from the manifest.
+ * No formula is contained here. The text, the struct's fields and the table list come from the manifest.
  */
 import type { Choices, Field, Manifest, Material, PageData, Parameter, SplitSum, Value, Values, Variant } from "./data";
 import { decodeFloats } from "./data";
@@ -9,28 +9,28 @@ import { DerivedTables, derivesMuch } from "./derived";
 import { type Program, Programs, type Source } from "./programs";
 
 export interface Shader {
-  /** The variant's: tables are kept by it. */
+  /** Key of the variant, which identifies its tables. */
   key: string;
-  /** The same for variants of one text, which differ in their tables: programs are kept by it. */
+  /** Key of the text, shared by variants that differ only in their tables; it identifies programs. */
   code: string;
   material: Material;
   variant: Variant;
   manifest: Manifest;
   text: string;
-  /** Whether what it derives stands in a row of texels (`derived.ts`). */
+  /** Whether its derived values are in a row of texels (`derived.ts`). */
   tabled: boolean;
 }
 
 /** Whether a parameter has sliders: a number, also of a layer that this variant was written without. */
 export const isNumeric = (parameter: Parameter): boolean => parameter.field !== null || parameter.off !== null;
 
-/** What a variant's choices are: those it was made for, and the model's own for the rest. */
+/** The choices of a variant: those it was written for, and the model's defaults for the rest. */
 export function variantChoice(variant: Variant, path: string): string | boolean | undefined {
   const own = variant.choices[path];
   return own !== undefined ? own : (variant.manifest.parameters.find((p) => p.path === path)?.value as string | boolean | undefined);
 }
 
-/** Whether two numbers, or as many, are the same; one stands for all where the other side has several. */
+/** Whether two values are equal; a number equals a vector all components of which equal it. */
 export function sameNumbers(one: Value, other: Value): boolean {
   const [x, y] = [[one].flat(), [other].flat()] as [number[], number[]];
   return (x.length > y.length ? x : y).every((_, i) => {
@@ -66,24 +66,24 @@ export class ShaderLibrary {
     return material;
   }
 
-  /** The values of a material that nothing was set of. */
+  /** The values of a material before any edit. */
   declared(id: string): Values {
     const parameters = this.material(id).variants[0]?.manifest.parameters ?? [];
     return Object.fromEntries(parameters.filter(isNumeric).map((parameter) => [parameter.path, parameter.value]));
   }
 
   /**
-   * The shortest variant that fits all choices and the values that tables are found from, and has the weights that are
-   * on, or null where the page lacks it (a live page asks the server for it).
+   * The shortest variant that matches all choices and the values that its tables depend on, and includes all nonzero
+   * weights; null if the page has none (a live page requests it from the server).
    */
   find(id: string, choices: Choices, values: Values, on: readonly string[] = []): Shader | null {
     const material = this.material(id);
-    let found: number | null = null;
+    let best: number | null = null;
     material.variants.forEach((variant, index) => {
       if (!fits(variant, choices, values) || on.some((path) => variant.off.includes(path))) return;
-      if (found === null || variant.off.length > (material.variants[found] as Variant).off.length) found = index;
+      if (best === null || variant.off.length > (material.variants[best] as Variant).off.length) best = index;
     });
-    return found === null ? null : this.at(material, found);
+    return best === null ? null : this.at(material, best);
   }
 
   at(material: Material, index: number): Shader {
@@ -94,7 +94,7 @@ export class ShaderLibrary {
     return { key, code, material, variant, manifest, text, tabled: this.tables && derivesMuch(manifest) };
   }
 
-  /** The split sum of a shader's facets, by its own distribution and masking; null where the page has none. */
+  /** The split sum of a shader's microfacet model, by its distribution and masking; null if the page has none. */
   splitSum(shader: Shader): SplitSum | null {
     const { facets } = shader.variant;
     return (facets && this.data.dfg.find((table) => table.facets.join() === facets.join())) ?? null;
@@ -106,7 +106,7 @@ export class ShaderLibrary {
     return table && this.texture(`split sum ${table.facets.join()}`, table.size, 2, table.data);
   }
 
-  /** Drops the programs and tables of shaders that the page has no more. */
+  /** Drops the programs and tables of shaders that the page no longer uses. */
   forget(): void {
     const keys = this.data.materials.flatMap((material) => material.variants.map((variant) => variant.key));
     const gone = (name: string) => /[0-9a-f]{16}/.test(name) && !keys.some((key) => name.includes(key));
@@ -124,12 +124,12 @@ export class ShaderLibrary {
     return this.programs.program(source);
   }
 
-  /** The programs by which `derive` does so: one or none. */
+  /** The programs that `derive` runs: one or none. */
   derivingSources(shader: Shader): Source[] {
     return shader.tabled ? [this.derived.source(shader)] : [];
   }
 
-  /** Computes what follows from a ball's values alone, where that is a pass of its own: before the draw that binds them. */
+  /** Computes a ball's derived values if they need a pass of their own: before the draw that binds them. */
   derive(shader: Shader, values: Values): void {
     if (!shader.tabled || this.derived.row(shader, values)) return;
     const program = this.program(this.derived.source(shader));
@@ -169,11 +169,11 @@ export class ShaderLibrary {
   private table(shader: Shader, uniform: string): WebGLTexture {
     const table = shader.manifest.textures.find((t) => t.uniform === uniform);
     const data = shader.variant.tables[uniform];
-    if (!table || data === undefined) throw new Error(`${shader.manifest.title} needs the table '${uniform}'; the page does not hold it.`);
+    if (!table || data === undefined) throw new Error(`${shader.manifest.title} needs the table '${uniform}', which the page lacks.`);
     return this.texture(`${shader.key}/${uniform}`, table.dimension === 3 ? table.size : table.size.slice(0, 2), table.channels, data);
   }
 
-  /** A table as a texture: float32, nearest, since the shader reads texels and blends them itself. */
+  /** A table as a texture: float32, nearest, since the shader fetches texels and interpolates them itself. */
   private texture(key: string, size: number[], channels: 1 | 2 | 4, data: string): WebGLTexture {
     const known = this.textures.get(key);
     if (known) return known;
@@ -195,7 +195,7 @@ export class ShaderLibrary {
   }
 }
 
-/** What a field holds for these values. An angle's field is (cos, sin); its value in the state is the angle. */
+/** A field's value for these parameter values. An angle's field is (cos, sin); its value in the state is the angle. */
 export function fieldValue(field: Field, manifest: Manifest, values: Values): number[] {
   const value = values[field.path];
   if (value === undefined) return [field.value].flat();
@@ -203,7 +203,7 @@ export function fieldValue(field: Field, manifest: Manifest, values: Values): nu
   if (kind === "angle" && typeof value === "number") return [Math.cos(value), Math.sin(value)];
   const size = { float: 1, vec2: 2, vec3: 3 }[field.type];
   if (typeof value === "number" && Number.isFinite(value)) return Array<number>(size).fill(value);
-  // A link may say anything: what does not fit counts as not said.
+  // Links are untrusted: values that do not fit are ignored.
   return Array.isArray(value) && value.length === size && value.every(Number.isFinite) ? value : [field.value].flat();
 }
 

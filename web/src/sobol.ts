@@ -1,5 +1,5 @@
 /**
- * The first three dimensions of Sobol's sequence as 32-bit integers, for textures: 4 numbers a point, the last unused.
+ * The first three dimensions of Sobol's sequence as 32-bit integers, for textures: 4 numbers per point, the last unused.
  *
  * Direction numbers of Joe and Kuo, "Constructing Sobol sequences with better two-dimensional projections", 2008,
  * table new-joe-kuo-6: degree s, polynomial a, first m; the first dimension is the radical inverse in base 2.
@@ -9,7 +9,7 @@ const DIMENSIONS = [
   { s: 2, a: 1, m: [1, 3] },
 ];
 export const SOBOL_WIDTH = 256;
-/** Points of the sequence that the page holds: the most that one shift of an albedo estimate uses. */
+/** Number of points available: the most that one shift of an albedo estimate uses. */
 export const SOBOL_POINTS = 4096;
 
 function directionNumbers(): Uint32Array[] {

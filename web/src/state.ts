@@ -1,8 +1,8 @@
 /**
- * The whole state of the page as one plain object: what the URL holds, what undoing means, what a test sets.
+ * The whole state of the page as one plain object: the contents of the URL, of undo steps and of tests.
  *
- * `Store.set` and `Store.update` are the only writers. Everyone else reads `store.state` and hears of a change through
- * `subscribe`, which runs once per frame with the paths that changed since.
+ * `Store.set` and `Store.update` are the only writers. All other code reads `store.state` and is notified of changes
+ * through `subscribe`, which runs once per frame with the paths that changed since.
  */
 import type { Camera, Choices, PageData, SceneLight, Tone, Values } from "./data";
 
@@ -13,7 +13,7 @@ export interface Slot {
   label: string;
   material: string;
   choices: Choices;
-  /** What differs from the declared values, for the whole row. */
+  /** Values that differ from the declared ones, for the whole row. */
   values: Values;
   balls: { label: string; set: Values }[];
   visible: boolean;
@@ -22,7 +22,7 @@ export interface Slot {
 export const TERMS = ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "split", "split-error", "rows"] as const;
 export type Term = (typeof TERMS)[number];
 export type MeshName = "sphere" | "shaderball" | "torus" | "file";
-/** Brute force; albedo of the material itself times the blurred picture; the two-number table times it. */
+/** Brute force; the blurred picture times the material's own albedo; times the two-number table. */
 export type EnvironmentMethod = "sampled" | "split-sum" | "dfg";
 export type Background = "theme" | "environment";
 export type CompareMode = "off" | "side" | "wipe" | "difference";
@@ -33,7 +33,7 @@ export interface State {
   /** Index of the only slot shown, or null for all. */
   solo: number | null;
   selection: { slot: number; ball: number };
-  /** An edit of one row goes to the same parameter of the others. */
+  /** An edit of one row also applies to the same parameter of the others. */
   linked: boolean;
   lights: Light[];
   /** White furnace: all lights replaced by one constant environment of radiance 1. */
@@ -43,14 +43,14 @@ export interface State {
   view: { mesh: MeshName; term: Term; background: Background; labels: boolean; spacing: number };
   display: { tone: Tone; exposure: number; theme: Theme };
   compare: { mode: CompareMode; wipe: number };
-  /** What panels keep, by panel id, and which tab is open. */
+  /** State of the panels, by panel id, and the open tab. */
   dock: { open: string | null; height: number };
   panels: Record<string, Record<string, unknown>>;
 }
 
 type Primitive = string | number | boolean | null | undefined;
 type Join<K, P> = K extends string | number ? (P extends string | number ? `${K}.${P}` : never) : never;
-/** Dotted paths of an object, four steps deep at most; array elements by index. */
+/** Dotted paths of an object, at most four levels deep; array elements by index. */
 export type Path<T, Depth extends unknown[] = []> = Depth["length"] extends 4
   ? never
   : T extends Primitive
@@ -72,7 +72,7 @@ export type At<T, P extends string> = P extends `${infer K}.${infer Rest}`
 
 export class Change {
   constructor(readonly paths: ReadonlySet<string>) {}
-  /** True when something at, above or below one of the paths changed. */
+  /** True if something at, above or below one of the paths changed. */
   touches(...paths: string[]): boolean {
     for (const changed of this.paths)
       for (const path of paths)
@@ -85,7 +85,7 @@ export type Listener = (change: Change) => void;
 
 export class Store {
   state: State;
-  /** What the page data says: the target of reset, and what the URL is written against. */
+  /** The state of the page data: the target of reset, and the base of the URL's patch. */
   initial: State;
   private listeners = new Set<Listener>();
   private pending = new Set<string>();
@@ -111,7 +111,7 @@ export class Store {
     this.notify(path);
   }
 
-  /** Several writes at once; `paths` names what they touch ("" for everything). */
+  /** Several writes at once; `paths` names the changed parts ("" for everything). */
   update(paths: string | string[], write: (state: State) => void): void {
     write(this.state);
     for (const path of [paths].flat()) this.notify(path);
@@ -126,7 +126,7 @@ export class Store {
     this.replace(structuredClone(this.initial));
   }
 
-  /** What one panel keeps, created from `defaults` on first use. Write through `setPanel`. */
+  /** State of one panel, created from `defaults` on first use. Write through `setPanel`. */
   panel<T extends Record<string, unknown>>(id: string, defaults: T): T {
     return { ...defaults, ...(this.state.panels[id] as Partial<T> | undefined) };
   }
@@ -140,7 +140,7 @@ export class Store {
     this.pending.add(path);
     if (this.scheduled) return;
     this.scheduled = true;
-    // A microtask: many writes of one event make one change, and the change still lands before the next frame.
+    // A microtask: several writes in one event make one change, delivered before the next frame.
     queueMicrotask(() => {
       this.scheduled = false;
       const change = new Change(new Set(this.pending));
@@ -166,9 +166,9 @@ export function initialState(data: PageData): State {
     };
   });
   const lights = scene.lights.map((light): Light => {
-    // The picture of an environment stays in the page data: the URL would not hold it.
-    const kept = light.type === "environment" ? { ...light, image: light.image ? { ...light.image, data: null } : null } : light;
-    return { ...structuredClone(kept), on: true, name: LIGHT_NAMES[light.type] };
+    // The picture of an environment stays in the page data: it is too large for the URL.
+    const stored = light.type === "environment" ? { ...light, image: light.image ? { ...light.image, data: null } : null } : light;
+    return { ...structuredClone(stored), on: true, name: LIGHT_NAMES[light.type] };
   });
   return {
     slots,

@@ -1,4 +1,4 @@
-/** Float render targets, half floats, and the low-discrepancy points that pictures are summed over. */
+/** Float and half-float render targets, and the low-discrepancy points of the samples. */
 
 export interface Target {
   framebuffer: WebGLFramebuffer;
@@ -8,7 +8,7 @@ export interface Target {
   height: number;
 }
 
-/** Whether sums can be kept in 32 bits: needs rendering to and blending of float32. Phones often have only 16. */
+/** Whether sums can be stored in 32 bits: needs rendering to and blending of float32. Phones often support only 16. */
 export function floatBlending(gl: WebGL2RenderingContext): boolean {
   return Boolean(gl.getExtension("EXT_color_buffer_float") && gl.getExtension("EXT_float_blend"));
 }
@@ -31,7 +31,7 @@ export function createTarget(gl: WebGL2RenderingContext, width: number, height: 
   }
   const status = gl.checkFramebufferStatus(gl.FRAMEBUFFER);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  if (status !== gl.FRAMEBUFFER_COMPLETE) throw new Error("This browser cannot draw into float pictures (EXT_color_buffer_float is missing).");
+  if (status !== gl.FRAMEBUFFER_COMPLETE) throw new Error("This browser cannot render to float textures (EXT_color_buffer_float is missing).");
   return { framebuffer, texture, depth, width, height };
 }
 
@@ -55,18 +55,18 @@ export function readTarget(gl: WebGL2RenderingContext, target: Target): Float32A
   return down;
 }
 
-/** Kronecker sequences of the generalised golden ratios (Roberts 2018), in double precision: point n of dimension d. */
+/** Kronecker sequences of the generalized golden ratios (Roberts 2018), in double precision: point n of dimension d. */
 const RATIOS: Record<number, number[]> = {
   2: [0.7548776662466927, 0.5698402909980532],
   3: [0.8191725133961645, 0.6710436067037893, 0.5497004779019703],
 };
 export const sequence = (dimension: 2 | 3, n: number): number[] => (RATIOS[dimension] as number[]).map((a) => (0.5 + n * a) % 1);
-/** Two more dimensions, independent of the others over the rationals. */
+/** Two more dimensions, linearly independent of the others over the rationals. */
 export const areaSequence = (n: number): [number, number] => [(n * Math.SQRT2) % 1, (n * Math.sqrt(3)) % 1];
 
 const HALF = new Float32Array(65536);
 let halfReady = false;
-/** float16 bits to float32, by a table of all 65,536: a frame of a live picture is a few million of them. */
+/** float16 bits to float32, by a table of all 65,536: a frame of a live picture has a few million of them. */
 export function halfToFloat(bits: Uint16Array, out = new Float32Array(bits.length)): Float32Array {
   if (!halfReady) {
     for (let i = 0; i < 65536; i++) {
@@ -83,7 +83,7 @@ export function halfToFloat(bits: Uint16Array, out = new Float32Array(bits.lengt
 
 const FLOAT = new Float32Array(1);
 const BITS = new Uint32Array(FLOAT.buffer);
-/** float32 to the nearest float16; what is too large becomes the largest one, since light is never infinite. */
+/** float32 to the nearest float16; larger values become the largest finite one. */
 export function floatToHalf(value: number): number {
   FLOAT[0] = Math.max(-65504, Math.min(65504, value || 0));
   const bits = BITS[0] as number;

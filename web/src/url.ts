@@ -1,4 +1,4 @@
-/** The state in the URL's fragment: what differs from the page's initial state, as JSON in base64url. */
+/** The state in the URL's fragment: the difference from the page's initial state, as JSON in base64url. */
 import { newLight } from "./lights";
 import type { Material, Parameter, Values } from "./data";
 import { type Light, type State, TERMS } from "./state";
@@ -15,8 +15,8 @@ export function encodeState(state: State, initial: State): string {
 }
 
 /**
- * The initial state with the fragment's patch; whatever does not fit (a newer page's, a stranger's) is left out.
- * `materials` are those of the page: a link may speak of no others.
+ * The initial state with the fragment's patch; whatever does not fit (a newer page's, an untrusted one) is ignored.
+ * `materials` are those of the page: a link may refer to no others.
  */
 export function decodeState(fragment: string, initial: State, materials: readonly Material[]): State {
   const match = /(?:^#?|&)s=([A-Za-z0-9_-]+)/.exec(fragment);
@@ -31,7 +31,7 @@ export function decodeState(fragment: string, initial: State, materials: readonl
   }
 }
 
-/** Types fit by now; here what a type does not say: names that exist, numbers that can be drawn. */
+/** Types are correct here; this checks what types do not express: names that exist, numbers that can be drawn. */
 function bounded(state: State, initial: State, materials: readonly Material[]): State {
   const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
   state.slots.forEach((slot, index) => {
@@ -63,7 +63,7 @@ function bounded(state: State, initial: State, materials: readonly Material[]): 
   state.display.exposure = clamp(state.display.exposure, -30, 30);
   state.dock.height = clamp(state.dock.height, 100, 4000);
   state.compare.wipe = clamp(state.compare.wipe, 0, 1);
-  // A dropped file, be it shape or picture, is not in the link.
+  // A dropped shape or picture is not in the link.
   const pictured = initial.lights.some((light) => light.type === "environment" && light.image);
   for (const light of state.lights) if (light.type === "environment" && !pictured) light.image = null;
   const named: [holder: object, key: string, values: string[]][] = [
@@ -76,30 +76,30 @@ function bounded(state: State, initial: State, materials: readonly Material[]): 
     [state.compare, "mode", ["off", "side", "wipe", "difference"]],
   ];
   for (const [holder, key, values] of named) {
-    const given = holder as Record<string, string>;
-    if (!values.includes(given[key] as string)) given[key] = values[0] as string;
+    const record = holder as Record<string, string>;
+    if (!values.includes(record[key] as string)) record[key] = values[0] as string;
   }
   return state;
 }
 
-/** Numbers within what the parameters declare, of their shape; the rest is as if it were not said. */
+/** Numbers within the parameters' declared ranges and of their shape; others are ignored. */
 function inRange(values: Values, parameters: readonly Parameter[]): Values {
-  const kept: Values = {};
+  const valid: Values = {};
   for (const parameter of parameters) {
     const value = values[parameter.path];
     if (value === undefined) continue;
     const numbers = [value].flat() as unknown[];
     const size = parameter.kind === "spectrum" ? 3 : parameter.kind === "alpha" ? 2 : 1;
     if ((numbers.length !== 1 && numbers.length !== size) || !numbers.every((v) => typeof v === "number" && Number.isFinite(v))) continue;
-    // A number where three are declared stays one: it stands for all.
+    // A number for a parameter of three components stays one: it applies to all.
     const { low, high } = parameter;
-    const held = (numbers as number[]).map((v) => Math.min(high ?? Infinity, Math.max(low ?? -Infinity, v)));
-    kept[parameter.path] = Array.isArray(value) ? held : (held[0] as number);
+    const clamped = (numbers as number[]).map((v) => Math.min(high ?? Infinity, Math.max(low ?? -Infinity, v)));
+    valid[parameter.path] = Array.isArray(value) ? clamped : (clamped[0] as number);
   }
-  return kept;
+  return valid;
 }
 
-/** A light of the link over a new one of its kind, so that every value it needs is there. */
+/** A light of the link over a new one of its kind, which supplies missing values. */
 function lightFrom(patch: Json): Json[] {
   const type = isObject(patch) ? patch["type"] : null;
   if (type !== "directional" && type !== "point" && type !== "area" && type !== "environment") return [];
@@ -118,7 +118,7 @@ function lightFrom(patch: Json): Json[] {
 const isObject = (value: unknown): value is { [key: string]: Json } =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 
-/** What `after` has that `before` has not; undefined when they are equal. Arrays of one length go by index. */
+/** The difference of `after` from `before`; undefined if they are equal. Arrays of equal length are compared by index. */
 function difference(before: Json | undefined, after: Json): Json | undefined {
   if (Array.isArray(after) && Array.isArray(before) && after.length === before.length && after.some(isObject)) {
     const changed: { [key: string]: Json } = {};
@@ -131,7 +131,7 @@ function difference(before: Json | undefined, after: Json): Json | undefined {
   if (isObject(after) && isObject(before)) {
     const changed: { [key: string]: Json } = {};
     for (const key of Object.keys(after)) {
-      // Lights come and go: a list of them is written whole.
+      // Lights can be added and removed: a list of another length is written in full.
       if (key === "lights") {
         if (JSON.stringify(before[key]) !== JSON.stringify(after[key])) changed[key] = after[key] as Json;
         continue;
@@ -139,14 +139,14 @@ function difference(before: Json | undefined, after: Json): Json | undefined {
       const inner = difference(before[key], after[key] as Json);
       if (inner !== undefined) changed[key] = inner;
     }
-    // A key that is gone (a value set back to its declaration) is written as null.
+    // A removed key (a value set back to its declaration) is written as null.
     for (const key of Object.keys(before)) if (!(key in after)) changed[key] = null;
     return Object.keys(changed).length ? changed : undefined;
   }
   return JSON.stringify(before) === JSON.stringify(after) ? undefined : after;
 }
 
-/** Objects with free keys: values by parameter path, choices, what panels keep. */
+/** Objects with free keys: values by parameter path, choices, panels' state. */
 const FREE = /(^|\.)(values|choices|set|panels)(\.|$)/;
 const FORBIDDEN = new Set(["__proto__", "constructor", "prototype"]);
 
@@ -171,7 +171,7 @@ function merge(base: Json, patch: Json, path: string): Json {
     }
     return merged;
   }
-  // null stands for "none" in these, which may take a value and give it back.
+  // null means "none" for these, which may change to a value and back.
   if (path === "solo") return patch === null || (typeof patch === "number" && Number.isFinite(patch)) ? patch : base;
   if (path === "dock.open") return patch === null || typeof patch === "string" ? patch : base;
   if (FREE.test(path) && !isObject(patch)) return patch;

@@ -1,4 +1,4 @@
-/** Three-vectors and the camera's frame: as much linear algebra as the page needs. */
+/** Three-vectors and the camera's frame: the linear algebra that the page needs. */
 import type { Camera, Vec3 } from "./data";
 
 export const add = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
@@ -13,7 +13,7 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
 export const length = (a: Vec3): number => Math.hypot(a[0], a[1], a[2]);
 export const normalize = (a: Vec3): Vec3 => scale(a, 1 / (length(a) || 1));
 
-/** The sphere's dp/du with its axis along +y; at the poles, where there is none, x. */
+/** The sphere's dp/du with its axis along +y; x at the poles, where it is undefined. */
 export function sphereTangent(normal: Vec3): Vec3 {
   const l = Math.hypot(normal[0], normal[2]);
   return l > 1e-9 ? [normal[2] / l, 0, -normal[0] / l] : [1, 0, 0];
@@ -48,7 +48,7 @@ export function cameraFrame(camera: Camera): Frame {
 
 /**
  * Tangent of half the vertical field of view in a picture of this shape. Scenes are framed for 16 : 9; a narrower
- * picture keeps what that shows from side to side, so that on a phone no ball is cut off.
+ * picture has the same horizontal extent, so that no ball is cut off on a phone.
  */
 export const fitted = (half: number, aspect: number): number => half * Math.max(1, 16 / 9 / aspect);
 
@@ -75,8 +75,8 @@ export function pixelRay(frame: Frame, x: number, y: number, width: number, heig
 }
 
 /**
- * What a sphere covers of the picture, in normalised device coordinates [x0, y0, x1, y1]; null where it is behind.
- * Exact: the tangent planes through the eye that hold an axis of the picture.
+ * Bounds of a sphere in the picture, in normalized device coordinates [x0, y0, x1, y1]; null if it is behind the camera.
+ * Exact: the tangent planes through the eye that contain an axis of the picture.
  */
 export function sphereBounds(frame: Frame, center: Vec3, radius: number, aspect: number): [number, number, number, number] | null {
   const [x, y, z] = toView(frame, center);

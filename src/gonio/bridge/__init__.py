@@ -1,1 +1,5 @@
 """The only importer of Mitsuba: its engine, adapter, native BSDFs and scene files."""
+
+from ..files import check_current_folder
+
+check_current_folder()  # where it has been deleted, importing Mitsuba ends the process

@@ -1,4 +1,4 @@
-"""An answer to one way of asking a BSDF, as the verifier's law of calls takes it."""
+"""The result of one kind of query to a BSDF, for the verifier's `calls` law."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Rows = tuple[str, str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Answer(NamedTuple):
-    """What was asked, and what came.
+    """A query and its result.
 
     what   the call, "eval_pdf"
-    wrong  what is wrong with the answer, "" where nothing is
-    share  of the reflected light by which it is wrong, where a picture shows it
+    wrong  what is wrong with the result, "" if nothing is
+    share  fraction of the reflected light that is wrong, if it shows in a picture
     worst  the same for a single pair of directions
-    rows   two values that should be one: their names, wo, wi, (N, 3), and the values, (N, channels)
+    rows   two values that should be equal: their names, wo, wi, (N, 3), and the values, (N, channels)
     """
 
     what: str

@@ -1,8 +1,8 @@
-"""What Mitsuba's integrators call of a BSDF besides eval, pdf and sample, held against those three.
+"""The calls of Mitsuba's integrators other than eval, pdf and sample, compared with those three.
 
-Path tracers call `eval_pdf` and `eval_pdf_sample`, switch lanes off by `active`, ask for single components and types,
-read flags before they ask for anything, and denoisers take `eval_diffuse_reflectance`. A plugin that writes one of them
-anew can be right in every test of the others.
+Path tracers call `eval_pdf` and `eval_pdf_sample`, switch lanes off with `active`, request single components and types,
+and read flags first; denoisers call `eval_diffuse_reflectance`. A plugin that implements one of these separately can
+pass every test of the others.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from .answers import Answer
 from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceInteraction
 
 COUNT = 4096
-SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
-FEW = 0.002  # share of rows that rounding may carry over an edge
+SAME = 1e-4  # relative: float32, and kernels that are fused differently
+FEW = 0.002  # fraction of rows that rounding may move across a discontinuity
 
 
 def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
-    """Every way of asking, at the given surface interaction (COUNT wide), whose wi is replaced."""
+    """The result of every call at the given surface interaction (COUNT wide), whose wi is replaced."""
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
         ("eval_pdf", trial.eval_pdf),
@@ -32,23 +32,23 @@ def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Ans
         ("flags", trial.flags),
         ("components", trial.components),
         ("types", trial.types),
-        ("shading frame", trial.turned_frame),
+        ("shading frame", trial.rotated_frame),
         ("eval_diffuse_reflectance", trial.diffuse_reflectance),
     ):
         trial.difference = None
         wrong = asked()
-        if wrong and what in SEEN and trial.difference is not None:
+        if wrong and what in BY_PATH_TRACERS and trial.difference is not None:
             yield trial.difference.answer(what, wrong)
         else:
             yield Answer(what, wrong)
 
 
-# what path tracers call, so that a picture changes where it is wrong
-SEEN = ("eval_pdf", "eval_pdf_sample", "shading frame")
+# Calls of path tracers: an error in them changes pictures.
+BY_PATH_TRACERS = ("eval_pdf", "eval_pdf_sample", "shading frame")
 
 
 class _Difference(NamedTuple):
-    """Two values that should be one, (N, channels), their names, and the directions, (N, 3)."""
+    """Two values that should be equal, (N, channels), their names, and the directions, (N, 3)."""
 
     name: str
     other: str
@@ -62,12 +62,12 @@ class _Difference(NamedTuple):
         off = np.nan_to_num(np.abs(self.got - self.expected), nan=0.0)
         share = float(np.sum(off)) / total if total > 0.0 else 1.0
         worst = float(np.max(off / np.maximum(np.abs(self.expected), 1e-3 * np.abs(self.expected).max()), initial=0.0))
-        # Mitsuba's wi is where light goes to
+        # Mitsuba's wi points to the viewer
         return Answer(what, wrong, share, worst, (self.name, self.other, self.wi, self.wo, self.got, self.expected))
 
 
 class _Trial:
-    """A plugin, and what it answers at COUNT pairs of directions."""
+    """A plugin and its values at COUNT pairs of directions."""
 
     def __init__(self, bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> None:
         self.bsdf, self.si, self.ctx = bsdf, si, mi.BSDFContext()
@@ -79,7 +79,7 @@ class _Trial:
         u = rng.random((3, COUNT), dtype=np.float32)
         self.wo, self.u = _vector(wo), (mi.Float(u[0]), mi.Point2f(u[1], u[2]))
         si.wi = _vector(wi)
-        # half of the pairs where the plugin itself goes: narrow lobes
+        # Half of the pairs follow the plugin's own samples, to cover narrow lobes.
         drawn, _ = bsdf.sample(self.ctx, si, *self.u)
         usable = (np.arange(COUNT) % 2 == 0) & (np.abs(np.linalg.norm(_rows(drawn.wo), axis=1) - 1.0) < 1e-3)
         self.wo = _vector(np.where(usable[:, None], _rows(drawn.wo), wo))
@@ -129,9 +129,9 @@ class _Trial:
             "sample's weight": (self.color(weight), self.weight),
         }
         for name, (got, expected) in asked.items():
-            # many of Mitsuba's own leave pdf and weight as they are in lanes that are off: integrators drop them
+            # Many of Mitsuba's own plugins leave pdf and weight of inactive lanes unchanged: integrators discard them.
             if name.startswith("eval") and "pdf's pdf" not in name and np.any(got[~live] != 0.0):
-                return f"{name} of lanes that are switched off is {np.abs(got[~live]).max():.4g}, 0 expected"
+                return f"{name} of inactive lanes is {np.abs(got[~live]).max():.4g}, 0 expected"
             wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], expected[live])
             if wrong:
                 return wrong
@@ -152,10 +152,10 @@ class _Trial:
         if strange.any():
             return f"samples of type {_names(int(sampled[strange][0]) & ~all_)}, which flags() does not name"
         if np.any(self.lit & (sampled == 0)):
-            return "samples that carry light and name no type"
+            return "samples that carry light but have no type"
         eta = np.broadcast_to(np.asarray(self.drawn.eta.numpy()), COUNT)
         if np.any(self.lit & ~(np.isfinite(eta) & (eta > 0.0))):
-            return f"a sample's eta is {eta[self.lit].min():.4g}: path tracers multiply by its square"
+            return f"a sample's eta is {eta[self.lit].min():.4g}: path tracers multiply radiance by its square"
         component = np.broadcast_to(np.asarray(self.drawn.sampled_component.numpy()), COUNT)
         if count and np.any(self.lit & (component >= count)):
             return f"samples of component {int(component[self.lit].max())}, of {count}"
@@ -164,23 +164,23 @@ class _Trial:
         transmits = all_ & (int(flags.Transmission) | int(flags.Null))
         lit = np.any(self.value > 1e-6 * max(float(self.value.max(initial=0.0)), 1e-6), axis=1)
         if not transmits and np.any(lit & across):
-            return "light goes through, and no flag says that it transmits"
+            return "light is transmitted, but no flag declares transmission"
         beyond = wi * _rows(self.drawn.wo)[:, 2] < 0.0
         said = (sampled & (int(flags.Transmission) | int(flags.Null))) > 0
-        either = (sampled & int(flags.Reflection)) > 0  # hair's lobes go anywhere
+        either = (sampled & int(flags.Reflection)) > 0  # the lobes of hair go to both sides
         strange = self.lit & (said != beyond) & (np.abs(wi) > 1e-3) & ~(said & either)
         if strange.any():
             row = int(np.argmax(strange))
-            where = "goes through" if beyond[row] else "stays on its side"
-            return f"a sample of type {_names(int(sampled[row]))} {where}"
+            side = "crosses the surface" if beyond[row] else "stays on its side"
+            return f"a sample of type {_names(int(sampled[row]))} {side}"
         smooth = self.lit & ~self.delta
         result = self.bsdf.pdf(self.ctx, self.si, self.drawn.wo)
         if smooth.sum() > 20 and np.mean(_rows(result)[smooth] > 0.0) < 0.5:
-            return "samples whose type is no delta, where pdf is 0"
+            return "samples of a type other than delta, whose pdf is 0"
         if self.delta.any() and (self.delta & self.lit).sum() > 20 and not all_ & (int(flags.Delta) | int(flags.Null)):
-            return "delta samples, and no flag says so"
+            return "delta samples, but no flag declares them"
         if not self.delta.any() and not (self.value > 0.0).any() and all_ & int(flags.Smooth) and self.lit.any():
-            return "a flag says that it is smooth, and it has no value anywhere"
+            return "a flag declares a smooth lobe, but eval is 0 everywhere"
         return ""
 
     def components(self) -> str:
@@ -202,11 +202,11 @@ class _Trial:
             ctx.type_mask = int(getattr(flags, name))
             contexts.append((name.lower(), ctx, None))
         if int(self.bsdf.flags()) & int(flags.Null):
-            return ""  # null interactions are of neither
+            return ""  # null interactions are neither
         return self.parts(contexts, "reflection and transmission")
 
-    def turned_frame(self) -> str:
-        """Directions are local: a surface that is turned in space, its tangents with it, looks the same."""
+    def rotated_frame(self) -> str:
+        """Directions are local: a surface rotated in space together with its tangents has the same values."""
         frame = mi.Frame3f(mi.Vector3f(0.48, 0.6, 0.64), mi.Vector3f(-0.8, 0.6, 0.0), mi.Vector3f(-0.36, -0.48, 0.8))
         frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
         si = mi.SurfaceInteraction3f(self.si)
@@ -216,7 +216,7 @@ class _Trial:
         )
 
     def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
-        """Asked one by one, parts add up to the whole, and what is sampled from one is of that one."""
+        """Components requested one by one add up to the sum, and their samples are of the requested component."""
         total = np.zeros_like(self.value)
         for name, ctx, number in contexts:
             value = self.color(self.bsdf.eval(ctx, self.si, self.wo))
@@ -229,7 +229,8 @@ class _Trial:
             lit = np.any(self.color(weight) > 0.0, axis=1)
             component = np.broadcast_to(np.asarray(bs.sampled_component.numpy()), COUNT)
             if number is not None and np.any(lit & (component != number)):
-                return f"asked for {name}, sample gives component {int(component[lit & (component != number)][0])}"
+                strange = int(component[lit & (component != number)][0])
+                return f"{name} requested, but sample returns component {strange}"
             wrong = self.shares(name, bs, self.color(weight))
             if wrong:
                 return wrong
@@ -238,27 +239,28 @@ class _Trial:
         return ""
 
     def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
-        """A delta lobe carries weight x pdf, whether it is asked for alone or chosen among others."""
+        """A delta lobe carries weight x pdf, whether it is requested alone or chosen among others."""
         type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
         delta = (type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0
         same = np.abs(_rows(bs.wo) - _rows(self.drawn.wo)).max(1) < 1e-3
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
             return ""
-        alone, among = ((weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both])
-        return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", alone, among)
+        single, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
+        return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", single, among)
 
     def diffuse_reflectance(self) -> str:
         value = _rows(mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self.si)))
         if not np.all(np.isfinite(value)):
             return "not finite"
         up = mi.Vector3f(0.0, 0.0, 1.0)
-        default = np.pi * self.color(self.bsdf.eval(self.ctx, self.si, up))  # the base class's, of glossy ones no share
-        # from behind, where `eval` may be 0, a plugin that asks the one it holds is not told from one of its own
+        # the default of Mitsuba's base class, which exceeds 1 for glossy BSDFs
+        default = np.pi * self.color(self.bsdf.eval(self.ctx, self.si, up))
+        # From behind, where `eval` may be 0, a plugin that forwards to a nested one looks like one with its own method.
         front = _rows(self.si.wi)[:, 2] > 0.0
         own = not np.allclose(value[front], default[front], rtol=1e-3, atol=1e-6)
         if own and (np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3)):
-            return f"from {value.min():.4g} to {value.max():.4g}, a share of the light expected"
+            return f"from {value.min():.4g} to {value.max():.4g}, a fraction of the light expected"
         flags = mi.BSDFFlags
         if int(self.bsdf.flags()) & int(flags.All) == int(flags.DiffuseReflection) and not self.noisy:
             wi, wo = _rows(self.si.wi)[:, 2], _rows(self.wo)[:, 2]
@@ -269,7 +271,7 @@ class _Trial:
         return ""
 
     def unlike(self, name: str, other: str, got: np.ndarray, expected: np.ndarray) -> str:
-        """The worst difference in words, "" where there is none."""
+        """A description of the largest difference, "" if there is none."""
         if self.noisy:
             return ""
         got, expected = np.broadcast_arrays(got, expected)
@@ -284,7 +286,8 @@ class _Trial:
         if len(got) == COUNT:
             self.difference = _Difference(name, other, got, expected, _rows(self.wo), _rows(self.si.wi))
         ratio = got[wrong].sum() / max(expected[wrong].sum(), 1e-30)
-        return f"{name} is not {other}: {ratio:.4g} times as much where they differ, in {wrong.mean():.1%} of the pairs"
+        part = f"in {wrong.mean():.1%} of the pairs"
+        return f"{name} is not {other}: {ratio:.4g} times as large where they differ, {part}"
 
 
 def _uniform(rng: np.random.Generator) -> np.ndarray:
@@ -297,7 +300,7 @@ def _vector(rows: np.ndarray) -> mi.Vector3f:
 
 
 def _rows(value: OfVariant) -> np.ndarray:
-    """(COUNT, k) in float64."""
+    """A value as (COUNT, k) in float64."""
     parts = (
         [np.asarray(c.numpy(), float) for c in value]
         if dr.is_vector_v(value)

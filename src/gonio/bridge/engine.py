@@ -1,4 +1,4 @@
-"""Choose the machine to render on: Mitsuba's variant, and Mitsuba itself."""
+"""Select Mitsuba's variant, and load Mitsuba."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import sys
 from collections.abc import Iterator
 from types import ModuleType
 
-from .. import llvm
+from .. import files, llvm
 from ..errors import InputError, MachineError
-from ..owner import COMPUTING, alone
+from ..owner import COMPUTING, exclusive
 from . import plugin_search
 
 DEVICES = ("auto", "cpu", "cuda")
 
 
 def _driver() -> ctypes.CDLL | None:
-    """NVIDIA's, where it is installed and answers (asked without starting Dr.Jit)."""
+    """NVIDIA's driver library, if it is installed and initializes (tried without starting Dr.Jit)."""
     for name in ("libcuda.so.1", "nvcuda.dll"):
         with contextlib.suppress(OSError):
             driver = ctypes.CDLL(name)
@@ -33,7 +33,7 @@ def cuda_available() -> bool:
 
 
 def cuda_device() -> str:
-    """Name of the first device and the driver's CUDA, "none" where there is none."""
+    """Name of the first device and the CUDA version of the driver; "none" without a device."""
     driver, name, version = _driver(), ctypes.create_string_buffer(256), ctypes.c_int(0)
     if driver is None or driver.cuDeviceGetName(name, len(name), 0) or driver.cuDriverGetVersion(ctypes.byref(version)):
         return "none"
@@ -41,27 +41,29 @@ def cuda_device() -> str:
 
 
 def variant_for(device: str = "cpu", spectral: bool = False) -> str:
-    """Mitsuba's variant for a device: "cpu" (LLVM), "cuda", or "auto" (CUDA where there is one)."""
+    """Mitsuba's variant for a device: "cpu" (LLVM), "cuda", or "auto" (CUDA if available)."""
     if device not in DEVICES:
         raise InputError(f"unknown device '{device}'", "--device", "one of " + ", ".join(DEVICES))
     has_cuda = cuda_available() if device != "cpu" else False
     if device == "cuda" and not has_cuda:
-        raise MachineError("no CUDA device answers", "--device cuda", "use --device cpu, or install an NVIDIA driver")
+        raise MachineError("no CUDA device found", "--device cuda", "use --device cpu, or install an NVIDIA driver")
     return ("cuda_ad_" if has_cuda else "llvm_ad_") + ("spectral" if spectral else "rgb")
 
 
 def polarized(variant: str) -> str:
-    """The variant that knows polarization, and color, on the device of another."""
+    """The polarized variant, with spectral colors, on the same device as another variant."""
     return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
-@alone
+@exclusive
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
-    """Mitsuba, with a variant set: the current one where `device` is None and one is set, else `variant_for`.
+    """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else `variant_for`.
 
     threads  how many cores to use; None leaves Dr.Jit's default (all)
-    Raises MachineError where no usable LLVM or no GPU is found.
+    Raises MachineError where no usable LLVM or no GPU is found, InputError where the current folder has been deleted.
     """
+    if "mitsuba" not in sys.modules:
+        files.check_current_folder()  # without one, importing Mitsuba ends the process
     import mitsuba as mi
 
     _own(mi)
@@ -76,15 +78,15 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
         import drjit as dr
 
         if threads < 1:
-            raise InputError(f"{threads} threads asked for", "--threads", "give 1 or more")
+            raise InputError(f"{threads} threads requested", "--threads", "give 1 or more")
         dr.set_thread_count(threads)
     return mi
 
 
 @functools.lru_cache
 def _own(mi: ModuleType) -> None:
-    """Let nobody change the variant, which is one for all threads, while another thread computes; and let no plugin be
-    loaded from the current folder."""
+    """Guard the variant, which is shared by all threads, against changes while another thread computes, and prevent
+    plugins from being loaded from the current folder."""
     plugin_search.confine(mi)
     change = mi.set_variant
 
@@ -98,7 +100,7 @@ def _own(mi: ModuleType) -> None:
 
 @contextlib.contextmanager
 def using(variant: str) -> Iterator[None]:
-    """Compute by that variant, whatever another thread has set, and put it back."""
+    """Compute with a variant, whatever another thread has set, and restore the previous one."""
     import mitsuba as mi
 
     with COMPUTING:
@@ -115,8 +117,8 @@ def using(variant: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
-    """Whatever spectral variant is set in here, afterwards the one from before is, or RGB's of the same device: what
-    else a program does counts on three colours."""
+    """Restore the variant after the block if a spectral one was set in it (RGB on the same device if none was set
+    before): the rest of a program expects three colors."""
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
     try:

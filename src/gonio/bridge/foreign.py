@@ -4,11 +4,12 @@
     rough.eval(wo, wi)
     rougher = tree.replace(rough, {"alpha": 0.4})
 
-Numbers and albedos among a plugin's properties are the material's parameters.
+Numbers and albedos among the properties of a plugin become parameters of the material.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -24,14 +25,15 @@ from .faults.exr_threads import file_threads
 from .native import MitsubaBSDF
 from .types import BSDFPlugin, OfVariant, PluginDict
 
-# Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
-SMALLEST_ALPHA = 1e-3  # Mitsuba's pages: "smooth" below, and another plugin; its float32 code ends near here
+# Below it, Mitsuba's documentation recommends the smooth plugin, and its float32 code is close to its limit.
+SMALLEST_ALPHA = 1e-3
+# Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are passed on as they are
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
 
 
-# Ranges and defaults of the numbers among the properties of Mitsuba's own plugins, (default, low, high), from their
-# pages in Mitsuba's documentation (version 3.9, "BSDFs"). A property that is not here has no range that is known, and
-# is judged at the value that it has.
+# Ranges of numeric properties of Mitsuba's own plugins, (default, low, high), from their pages in Mitsuba's
+# documentation (version 3.9, "BSDFs"). A property that is not listed has no known range and is tested at its current
+# value only.
 _SHARE = (0.0, 0.0, 1.0)
 _PRINCIPLED = {"roughness": (0.5, 0.0, 1.0)} | dict.fromkeys(
     ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"), _SHARE
@@ -48,27 +50,27 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
 
 
 class _Described(MitsubaBSDF):
-    """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
+    """A BSDF that is built from a dictionary, and rebuilt when a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
-    plugin: ClassVar[PluginDict] = {}  # of an instance: the description with the values of its parameters
+    plugin: ClassVar[PluginDict] = {}  # of an instance: its description with parameter values
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """Laws that plugins of this kind break by what they are meant to be, with the reasons."""
+        """Laws that plugins of this kind violate by design, with the reasons."""
         return _BY_NATURE.get(str(self.description.get("type", "")), {})
 
     @property
     def held(self) -> dict[str, MitsubaBSDF]:
-        """The BSDFs inside, as materials of their own."""
+        """The nested BSDFs, as materials."""
         return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
 
-    def anew(self) -> MitsubaBSDF:
-        """The plugin built once more."""
+    def rebuilt(self) -> MitsubaBSDF:
+        """The plugin, built again."""
         return load(self.plugin)
 
-    def around_diffuse(self) -> MitsubaBSDF:
-        """The same around plain diffuse ones."""
+    def with_diffuse_inside(self) -> MitsubaBSDF:
+        """The same plugin with plain diffuse BSDFs nested in it."""
         return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
 
     def __post_init__(self) -> None:
@@ -77,7 +79,8 @@ class _Described(MitsubaBSDF):
         for name, parameter in self.parameters().items():
             value = np.asarray(getattr(self, name), float)
             if value.ndim > (name in ALBEDOS):
-                raise InputError(f"{len(value)} rows given, one value expected", name, "a plugin holds no arrays")
+                hint = "the properties of a plugin are single values"
+                raise InputError(f"{len(value)} rows given, one value expected", name, hint)
             if not np.array_equal(value, np.asarray(parameter.default)):
                 rgb = {"type": "rgb", "value": np.broadcast_to(value, 3).tolist()}
                 changed[name] = rgb if name in ALBEDOS else float(value)
@@ -86,13 +89,13 @@ class _Described(MitsubaBSDF):
 
 
 def load(description: PluginDict) -> MitsubaBSDF:
-    """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
+    """The BSDF of a dictionary for `mi.load_dict`; InputError if Mitsuba rejects it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
     known = RANGES.get(kind, {})
     if any(name.startswith("alpha_") for name in description):
-        known = {name: ends for name, ends in known.items() if name != "alpha"}  # one width, or two
-    given = {**{name: ends[0] for name, ends in known.items()}, **_colours(_built(description)), **description}
+        known = {name: ends for name, ends in known.items() if name != "alpha"}  # either alpha, or alpha_u and alpha_v
+    given = {**{name: ends[0] for name, ends in known.items()}, **_albedos(_built(description)), **description}
     for name, value in given.items():
         if name in ALBEDOS and isinstance(value, int | float | tuple):
             low, high = (0.0, 1.0) if kind in _NESTS else (-np.inf, np.inf)
@@ -107,7 +110,7 @@ def load(description: PluginDict) -> MitsubaBSDF:
 
 
 def _built(description: PluginDict) -> BSDFPlugin:
-    """The plugin itself."""
+    """The plugin of a description; InputError if Mitsuba rejects it."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
     _check_plugins(description, f"mitsuba:{kind}")
@@ -115,17 +118,17 @@ def _built(description: PluginDict) -> BSDFPlugin:
         with file_threads():
             bsdf = mi.load_dict(description, parallel=False)
     except Exception as error:
-        raise refused(error, kind) from None
+        raise rejected(error, kind) from None
     if not isinstance(bsdf, mi.BSDF):
         raise InputError(f"'{kind}' is a {type(bsdf).__name__}, a BSDF expected", f"mitsuba:{kind}")
     return bsdf
 
 
 def _check_plugins(description: Mapping[str, object], location: str) -> None:
-    """Raise InputError where a description, or one inside it, names a plugin that must not be loaded."""
+    """Raise InputError if a description, or one nested in it, names a plugin that must not be loaded."""
     kind = description.get("type")
     if kind == "resources":
-        raise InputError("'resources' given, and a BSDF searches no folders", location, "give files by their paths")
+        raise InputError("'resources' given, but a BSDF has no search folders", location, "give the paths of files")
     if isinstance(kind, str) and kind not in ("rgb", "ref"):
         plugin_search.check(kind, location)
     for value in description.values():
@@ -133,8 +136,8 @@ def _check_plugins(description: Mapping[str, object], location: str) -> None:
             _check_plugins(value, location)
 
 
-def _colours(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
-    """The albedos that a plugin holds as one number or colour each."""
+def _albedos(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
+    """The albedos of a plugin that are one number or color each."""
     import mitsuba as mi
 
     held = mi.traverse(bsdf)
@@ -158,11 +161,11 @@ def _is_bsdf(value: object) -> bool:
 
 
 def plugins() -> list[str]:
-    """Names of the BSDF plugins that Mitsuba brings along."""
+    """Names of the BSDF plugins that ship with Mitsuba."""
     return sorted(_NESTS)
 
 
-# Mitsuba does not tell a plugin's kind without building it; what each needs to be built is written down here
+# Mitsuba does not tell a plugin's kind without building it: these are the properties that each needs to be built.
 _DIFFUSE = {"type": "diffuse"}
 _NESTS: dict[str, PluginDict] = {
     "blendbsdf": {"weight": 0.5, "a": _DIFFUSE, "b": {"type": "roughconductor"}},
@@ -190,25 +193,25 @@ _NESTS: dict[str, PluginDict] = {
     "twosided": {"bsdf": {"type": "roughconductor"}},
 }
 
-# A frame that is turned away from the surface's knows a direction of its own, and cosines that are not the surface's
-# (Veach1997, section 5.3): what Mitsuba's manual calls an approximation that these two plugins are made of.
-_TURNED_FRAME = {
-    "isotropy": "the normal it is shaded with is tilted to one side: it turns with the surface",
-    "reciprocity": "the cosine of wi is that of another normal than the surface's (Veach1997, section 5.3)",
-    "energy": "what the tilted frame reflects to below the surface is cut off in one direction only",
+# A frame that differs from the surface's has a preferred direction, and cosines that are not the surface's (Veach1997,
+# section 5.3). Mitsuba's manual calls these two plugins an approximation for this reason.
+_TILTED_FRAME = {
+    "isotropy": "its shading normal is tilted to one side and rotates with the surface",
+    "reciprocity": "the cosine of wi refers to a normal other than the surface's (Veach1997, section 5.3)",
+    "energy": "light that the tilted frame reflects below the surface is cut off in one direction only",
 }
 _BY_NATURE: dict[str, dict[str, str]] = {
-    "bumpmap": _TURNED_FRAME,
-    "normalmap": _TURNED_FRAME,
+    "bumpmap": _TILTED_FRAME,
+    "normalmap": _TILTED_FRAME,
     "hair": {
-        "reciprocity": "where wo's ray meets the fibre, its offset, is fixed: light that comes back has another",
-        "isotropy": "a fibre has an axis",
+        "reciprocity": "the offset at which wo's ray hits the fiber is fixed, but differs on the reverse path",
+        "isotropy": "a fiber has an axis",
     },
 }
 
 
 def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
-    """A plugin by name with the properties given; BSDFs of BSDFs get plain ones inside."""
+    """A plugin by name with the given properties; plugins that nest BSDFs get plain ones."""
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
         ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
@@ -217,24 +220,24 @@ def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
     return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
 
 
-_registered: dict[Path, dict[str, object]] = {}  # what the files registered that were run, by path
+_registered: dict[Path, dict[str, object]] = {}  # registered plugins by the path of the file that was run
 
 
 def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
     """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
     the file registers none of that name."""
-    path = Path(target.rpartition(":")[0]).expanduser().resolve()
+    path = Path(os.path.expanduser(target.rpartition(":")[0])).resolve()
     name = target.rpartition(":")[2]
     if not path.is_file() or b"register_bsdf" not in path.read_bytes():
         return None
     mi = mitsuba()
     register, registered = mi.register_bsdf, _registered.setdefault(path, {})
 
-    def noted(kind: str, make: object, *more: object) -> None:
+    def record(kind: str, make: object, *more: object) -> None:
         registered[kind] = make
         register(kind, make, *more)
 
-    vars(mi)["register_bsdf"] = noted
+    vars(mi)["register_bsdf"] = record
     try:
         module = outside.module_of(path, "TARGET")
     finally:
@@ -248,17 +251,20 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
 
 
 def mitsuba() -> ModuleType:
+    """Mitsuba in an LLVM variant, with Gonio's plugins registered."""
     mi = engine.load()
     if not mi.variant().startswith("llvm_"):
-        raise InputError(f"variant {mi.variant()} is set, an LLVM one expected", "mitsuba", "verify in another process")
+        what = f"variant {mi.variant()} is set, an LLVM variant expected"
+        raise InputError(what, "mitsuba", "verify in another process")
     adapter.register(mi)
     mi.set_log_level(mi.LogLevel.Error)
     return mi
 
 
-def refused(error: Exception, name: str) -> InputError:
+def rejected(error: Exception, name: str) -> InputError:
+    """Mitsuba's error for a description, as an InputError."""
     text = " ".join(str(error).split())
     if "not found" in text and ("Plugin" in text or "plugin" in text):
         return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))
-    # Mitsuba prefixes source lines and the object's description; the last sentence says what it is about
-    return InputError(f"Mitsuba refuses it: {text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")
+    # Mitsuba prefixes source lines and the object's description; the last sentence states the problem
+    return InputError(f"Mitsuba rejects it: {text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")

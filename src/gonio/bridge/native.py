@@ -1,8 +1,8 @@
-"""A BSDF of Mitsuba's, built in or a user's plugin, as a material: alone, or inside one of Gonio's.
+"""A Mitsuba BSDF, built in or a user's plugin, as a material of its own or nested in one of Gonio's.
 
-Mitsuba's `wi` is Gonio's `wo`, and the other way round. Mitsuba's BSDFs see a surface interaction: inside a plugin of
-Gonio's that of the ray, alone one whose shading frame is the local frame, at uv = (0.5, 0.5). Values are float32, the
-wheel has no 64-bit variant; of a Mueller matrix they are what unpolarized light gives.
+Mitsuba's `wi` is Gonio's `wo`, and vice versa. Mitsuba's BSDFs read a surface interaction: nested in a Gonio plugin
+they get that of the ray; otherwise one whose shading frame is the local frame, at uv = (0.5, 0.5). Values are float32,
+since the wheel has no 64-bit variant; a Mueller matrix is reduced to its value for unpolarized light.
 """
 
 from __future__ import annotations
@@ -24,51 +24,51 @@ from .types import BSDFContext, BSDFPlugin, Mask, SurfaceInteraction
 
 
 class MitsubaBSDF(BSDF):
-    """A BSDF of Mitsuba's."""
+    """A BSDF of Mitsuba as a material."""
 
     precisions: ClassVar[tuple[str, ...]] = ("float32",)
     zero_weight_is_failure: ClassVar[bool] = True
-    bsdf: ClassVar[BSDFPlugin]  # of an instance, but no parameter
-    _si: ClassVar[SurfaceInteraction | None] = None  # where it is asked, on a copy that `at` bound
+    bsdf: ClassVar[BSDFPlugin]  # an attribute of each instance, but not a parameter
+    _si: ClassVar[SurfaceInteraction | None] = None  # where it is evaluated, on a copy bound by `at`
     _active: ClassVar[Mask] = True
 
     def __init__(self, bsdf: BSDFPlugin) -> None:
         object.__setattr__(self, "bsdf", bsdf)
 
     def at(self, si: SurfaceInteraction, active: Mask) -> MitsubaBSDF:
-        """The copy that answers at a surface interaction."""
+        """The copy that is evaluated at a surface interaction."""
         return binding.bound_copy(self, {"_si": si, "_active": active})
 
     # ------------------------------------------------------------------ formulas
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """Its value."""
+        """Mitsuba's value, which includes the cosine."""
         value = self.bsdf.eval(context(mi, mode), self._interaction(wo), mi.Vector3f(wi), self._active)
         return _like(wo, mi.unpolarized_spectrum(value))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Its density."""
+        """Mitsuba's sampling density, 1/sr."""
         return self.bsdf.pdf(mi.BSDFContext(), self._interaction(wo), mi.Vector3f(wi), self._active)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
-        """A direction; null interactions, which go straight on, count as delta lobes."""
+        """A sampled direction; null interactions, which pass straight through, count as delta lobes."""
         ctx, si, flags = context(mi, mode), self._interaction(wo), mi.BSDFFlags
         bs, value = self.bsdf.sample(ctx, si, mi.Float(u.x), mi.Point2f(u.y, u.z), self._active)
         weight = mi.unpolarized_spectrum(value)
         delta = mi.has_flag(bs.sampled_type, flags.Delta) | mi.has_flag(bs.sampled_type, flags.Null)
         pdf = bs.pdf
         if self._si is None:
-            # Mitsuba tells of a failed sample by its weight, 0, and leaves any pdf: so reads its own chi-square test.
-            # Inside a mix that may be a black lobe too, whose direction the other material reflects to.
+            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. Inside a
+            # mix, weight 0 may also be a black lobe toward a direction that the other material reflects to.
             failed = dr.all(weight == 0.0)
             pdf, delta = dr.select(failed, 0.0, pdf), delta & ~failed
         return Sample(bs.wo, _like(wo, weight), pdf, delta, bs.eta)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """What the plugin gives for it."""
+        """The plugin's diffuse reflectance."""
         return mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self._interaction(wo), self._active))
 
     def _interaction(self, wo: Direction) -> SurfaceInteraction:
@@ -77,8 +77,8 @@ class MitsubaBSDF(BSDF):
             si.wi = mi.Vector3f(wo)
             return si
         if self.bsdf.variant_name() != mi.variant():
-            what = f"this BSDF is of the variant {self.bsdf.variant_name()}, and {mi.variant()} is set"
-            raise InputError(what, type(self).__name__, "set its variant again, or build it anew")
+            what = f"this BSDF is of variant {self.bsdf.variant_name()}, but {mi.variant()} is set"
+            raise InputError(what, type(self).__name__, "set its variant again, or build the BSDF again")
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wo))
         si.wi = mi.Vector3f(wo)
         si.t = 1.0
@@ -86,14 +86,14 @@ class MitsubaBSDF(BSDF):
         si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
         si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
         si.uv = mi.Point2f(0.5, 0.5)
-        # a BSDF that knows it is lit on a visible surface (`null`, `mask`) asks whether there is one
+        # `null` and `mask` check whether the interaction is on a surface
         si.prim_index = mi.UInt32(0)
         return si
 
     # ------------------------------------------------------------------ facts
 
     def renderer_calls(self, seed: int) -> Iterator[Answer]:
-        """What else a renderer asks of it, and what comes."""
+        """The results of the other calls that a renderer makes."""
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)
 
@@ -115,12 +115,12 @@ class MitsubaBSDF(BSDF):
 
 
 def context(mi: ModuleType, mode: Mode) -> BSDFContext:
-    """Mitsuba's context of a transport mode."""
+    """Mitsuba's BSDF context for a transport mode."""
     modes = mi.TransportMode
     return mi.BSDFContext(modes.Radiance if mode == "radiance" else modes.Importance)
 
 
 def _like(wo: Direction, value: Spectrum) -> Spectrum:
-    """The value with 64 bits where wo has them, as a formula expects that mixes it with another."""
+    """The value in 64 bits if wo has them, so that formulas can combine it with others."""
     types = backend.types_like(type(wo))
     return types.vec3(value) if dr.itemsize_v(types.float) == 8 else value

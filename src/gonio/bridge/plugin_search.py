@@ -1,11 +1,11 @@
-"""Mitsuba's plugins are native code: which files may be loaded as such, and where Mitsuba looks for them.
+"""Which native plugins Mitsuba may load, and where it looks for them.
 
-Mitsuba loads `plugins/TYPE.so` from the first folder of its file resolver that has it, and where none has, from the
-current folder: that fallback cannot be switched off. A type that Python registered is searched for too, since
-`load_dict` asks for its kind in another variant. Therefore
+Mitsuba loads `plugins/TYPE.so` from the first folder of its file resolver that contains it, otherwise from the current
+folder; this fallback cannot be disabled. Mitsuba also searches for a type that Python has registered, since `load_dict`
+looks up its kind in another variant. Therefore
 
-- the resolver begins with Mitsuba's own folder, and the current folder is not in it (`confine`),
-- a type that a document names is checked before Mitsuba reads the document (`check`),
+- the resolver begins with Mitsuba's own folder and does not contain the current folder (`confine`),
+- a type named by a document is checked before Mitsuba reads the document (`check`),
 - a type is registered only if the current folder has no plugin of that name (`register`).
 """
 
@@ -23,9 +23,9 @@ from types import ModuleType
 from ..errors import InputError
 from .types import OfVariant
 
-VARIABLE = "GONIO_PLUGINS"  # folders of the user's, each with a folder `plugins` in it, as Mitsuba's own
+VARIABLE = "GONIO_PLUGINS"  # the user's folders, each with a subfolder `plugins` as in Mitsuba's own
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-# Their properties are addresses of memory, which only the program that calls Mitsuba can know.
+# Their properties are memory addresses, which only the program that calls Mitsuba can provide.
 _UNSAFE = ("blender",)
 
 
@@ -38,15 +38,16 @@ def package() -> Path:
 
 
 def trusted() -> list[Path]:
-    """The folders in whose `plugins` native code may lie: Mitsuba's, and those that GONIO_PLUGINS names."""
+    """The folders whose `plugins` may contain native code: Mitsuba's and those of GONIO_PLUGINS."""
     named = os.environ.get(VARIABLE, "").split(os.pathsep)
     return [package(), *(Path(folder).absolute() for folder in named if folder)]
 
 
 def confine(mi: ModuleType) -> None:
-    """Let Mitsuba search its own folder first, then those of GONIO_PLUGINS and of the program, and not the current.
+    """Make Mitsuba search its own folder first, then those of GONIO_PLUGINS and of the program, but not the current
+    one.
 
-    As it is imported it appends the folder that is then the current one, and its own.
+    On import, Mitsuba appends the folder that is current at that time, and its own.
     """
     resolver = mi.file_resolver()
     paths = list(map(str, resolver))
@@ -60,7 +61,7 @@ def confine(mi: ModuleType) -> None:
 
 @contextlib.contextmanager
 def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
-    """In here Mitsuba searches these folders too, after all others."""
+    """Let Mitsuba also search these folders inside the block, after all others."""
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     for path in folders:
@@ -73,46 +74,46 @@ def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
 
 
 def check(name: str, location: str, folder: Path | None = None, allow_code: bool = False) -> Path | None:
-    """Raise InputError for a plugin's type, named by a document, that would load native code of nobody's choice.
+    """Raise InputError if a plugin type named by a document would load untrusted native code.
 
-    folder      the document's, whose `plugins` may be loaded where `allow_code` is set
-    Returns the file in that folder that will be loaded, None where it is another or none.
+    folder      the document's folder, whose `plugins` may be loaded if `allow_code` is set
+    Returns the file in that folder that will be loaded, else None.
     """
-    if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path of it, and drops what a dot begins
-        raise InputError(f"'{name}' is no type of a plugin", location, "a type is a name such as sphere, and no path")
-    if name.lower() in _UNSAFE:  # a file system may not tell capitals apart
-        what = f"'{name}' reads from addresses of memory, which no file can know"
+    if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path of it and drops everything from a dot on
+        raise InputError(f"'{name}' is not a plugin type", location, "a type is a name such as sphere, not a path")
+    if name.lower() in _UNSAFE:  # file systems may ignore case
+        what = f"'{name}' reads from memory addresses, which a file cannot provide"
         raise InputError(what, location, "export the mesh as .ply or .obj")
     if _is_trusted(name):
         return None
     if folder is not None and (folder / _file(name)).exists():
         if allow_code:
             return folder / _file(name)
-        what = f"'{name}' is native code in {folder / _file(name)}, which a scene alone does not run"
+        what = f"'{name}' is native code in {folder / _file(name)}, which scenes may not run by default"
         raise InputError(what, location, f"if you trust it, --allow-code lets the scene run it, or {VARIABLE}={folder}")
     _refuse_current_folder(name, location)
     return None
 
 
 def register(register_kind: Callable[[str, OfVariant], None], name: str, make: OfVariant) -> None:
-    """Register a plugin of Python's by `mi.register_bsdf` or one of its kind; see `_refuse_current_folder`."""
+    """Register a Python plugin by `mi.register_bsdf` or a similar function; see `_refuse_current_folder`."""
     _refuse_current_folder(name, "Mitsuba")
     register_kind(name, make)
 
 
 def _refuse_current_folder(name: str, location: str) -> None:
-    """Raise InputError where Mitsuba would load the plugin of that name from the current folder."""
+    """Raise InputError if Mitsuba would load the plugin of that name from the current folder."""
     if os.path.exists(_file(name)) and not _is_trusted(name):
         what = f"Mitsuba would run {os.path.abspath(_file(name))}, native code in the current folder"
-        hint = f"call Gonio from another folder, or if you trust it, set {VARIABLE}={os.getcwd()}"
+        hint = f"run Gonio in another folder, or if you trust the file, set {VARIABLE}={os.getcwd()}"
         raise InputError(what, location, hint)
 
 
 def _is_trusted(name: str) -> bool:
-    """Whether the plugin lies in a trusted folder, which Mitsuba searches first."""
+    """Whether the plugin is in a trusted folder, which Mitsuba searches first."""
     return any((folder / _file(name)).exists() for folder in trusted())
 
 
 def _file(name: str) -> str:
-    """Where Mitsuba looks for a plugin's file, within a folder."""
+    """Path of a plugin's file relative to a search folder."""
     return os.path.join("plugins", name + _SUFFIX)

@@ -1,16 +1,16 @@
-"""What Mitsuba and Dr.Jit hand out, by name.
+"""Names for the types of Mitsuba and Dr.Jit.
 
-Both ship types for single variants only, and this room serves all of them: these names say what a value is, and check
-nothing. Values of materials have types of their own, in `gonio.ops.types`.
+Both ship type information for single variants only, but this package serves all of them: these names document what a
+value is, and check nothing. Values of materials have their own types, in `gonio.ops.types`.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-OfVariant: TypeAlias = Any  # of a class that Mitsuba or Dr.Jit has once a variant
+OfVariant: TypeAlias = Any  # of a class that Mitsuba or Dr.Jit has once per variant
 
-# Mitsuba's objects
+# Objects of Mitsuba
 Plugin: TypeAlias = OfVariant  # what a dictionary or a file loads to
 Scene: TypeAlias = Plugin
 Sensor: TypeAlias = Plugin
@@ -18,15 +18,15 @@ Shape: TypeAlias = Plugin
 Emitter: TypeAlias = Plugin
 Texture: TypeAlias = Plugin
 BSDFPlugin: TypeAlias = Plugin
-Properties: TypeAlias = OfVariant  # of a plugin that is being built
+Properties: TypeAlias = OfVariant  # of a plugin under construction
 BSDFContext: TypeAlias = OfVariant
 TraversalCallback: TypeAlias = OfVariant
 PluginDict: TypeAlias = dict[str, Any]  # what `mi.load_dict` takes
 
-# What a scene file holds
+# The contents of a scene file
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
-# Records with an entry for every lane
+# Records with one entry per lane
 Ray: TypeAlias = OfVariant
 Hit: TypeAlias = OfVariant  # mi.PreliminaryIntersection3f
 Interaction: TypeAlias = OfVariant  # mi.Interaction3f
@@ -34,12 +34,12 @@ SurfaceInteraction: TypeAlias = OfVariant
 PositionSample: TypeAlias = OfVariant
 DirectionSample: TypeAlias = OfVariant
 BSDFSample: TypeAlias = OfVariant
-Record: TypeAlias = OfVariant  # one of our own, made for a variant
+Record: TypeAlias = OfVariant  # one of Gonio's, made for a variant
 
-# Values with an entry for every lane, of the variant's types
+# Values with one entry per lane, of the variant's types
 Float: TypeAlias = OfVariant
 UInt: TypeAlias = OfVariant
-Whole: TypeAlias = OfVariant  # of 64 bits, with a sign
+Whole: TypeAlias = OfVariant  # signed, 64 bits
 Mask: TypeAlias = OfVariant
 Point: TypeAlias = OfVariant  # of two or three components
 Vector: TypeAlias = OfVariant

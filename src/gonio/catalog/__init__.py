@@ -1,1 +1,1 @@
-"""How a text or a file becomes a material: its notation, the library of named ones, documents, files of the user's."""
+"""Materials from texts and files: the notation, the library of named materials, documents, and user files."""

@@ -1,10 +1,10 @@
-"""A hundred named materials: what three papers fitted to the measured BRDFs of the MERL database, as parameters.
+"""A hundred named materials: published fits to the measured BRDFs of the MERL database, as parameters.
 
-    go.material("alum-bronze")                                  Bagher2012's fit, by `shifted-gamma`
+    go.material("alum-bronze")                                  Bagher2012's fit, a `shifted-gamma`
     go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
 
-As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The figures stand in
-`published/`, as the papers print them; here is what they mean. Every fit is a preset of its model too.
+As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The files in `published/`
+contain the figures as printed; this file converts them to parameters. Every fit is also a preset of its model.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from ..material.parameters import Value
 Figures: TypeAlias = "dict[str, Value]"  # as printed, by the name in the collection
 
 FILES = ("bagher2012", "low2012", "ngan2005")
-DEFAULT = "bagher2012/sgd"  # the latest, and one of all hundred
+DEFAULT = "bagher2012/sgd"  # the most recent, and one with all hundred materials
 _FOLDER = Path(__file__).parent / "published"
 
 
 class Fit(NamedTuple):
-    """One way in which a paper fitted its materials.
+    """One fit of a paper to its materials.
 
     name       FILE/FIT, "low2012/lowsmooth_E2"
     model      the material's model, by name
@@ -52,18 +52,18 @@ def materials() -> list[str]:
 
 
 def fits(name: str) -> list[str]:
-    """FILE/FIT of every fit of a material, the default first; InputError where the name is unknown."""
+    """FILE/FIT of every fit of a material, the default first; raises InputError for an unknown name."""
     _known(name, "material")
     return [fit.name for fit in published().values() if name in fit.materials]
 
 
 def knows(text: str) -> bool:
-    """Whether a text names a material of the library, were it with a fit that there is none of."""
+    """Whether a text names a material of the library, even with an unknown fit."""
     return text.partition(":")[0] in published()[DEFAULT].materials
 
 
 def resembles(text: str) -> bool:
-    """Whether a text is the name of a material, with or without a fit, or nearer to one than to a model's name."""
+    """Whether a text is the name of a material, with or without a fit, or closer to one than to a model's name."""
     near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
     return bool(near) and near[0] in materials()
 
@@ -94,7 +94,7 @@ def presets(model_name: str) -> dict[str, Preset]:
 @lru_cache(maxsize=1)
 def published() -> dict[str, Fit]:
     """Every fit by FILE/FIT, the default first."""
-    found: dict[str, Fit] = {}
+    fits: dict[str, Fit] = {}
     for file in FILES:
         data = json.loads((_FOLDER / f"{file}.json").read_text())
         for name, one in data["fits"].items():
@@ -104,20 +104,20 @@ def published() -> dict[str, Fit]:
             for key, numbers in one["materials"].items():
                 figures = _unpacked(numbers, shapes)
                 of_material[key] = {"diffuse": figures["diffuse"], **translate(figures)}
-            found[f"{file}/{name}"] = Fit(f"{file}/{name}", model_name, data["source"], of_material)
-    return found
+            fits[f"{file}/{name}"] = Fit(f"{file}/{name}", model_name, data["source"], of_material)
+    return fits
 
 
 def _unpacked(numbers: list[float], shapes: Mapping[str, tuple[int, ...]]) -> Figures:
-    """The flat list of a material's figures, by parameter: numbers, colours, pairs of colours."""
-    found: Figures = {}
+    """The flat list of a material's figures, by parameter: numbers, colors, pairs of colors."""
+    figures: Figures = {}
     at = 0
     for name, shape in shapes.items():
         size = math.prod(shape)
         part = np.reshape(numbers[at : at + size], shape)
-        found[name] = float(part) if not shape else _tuples(part)
+        figures[name] = float(part) if not shape else _tuples(part)
         at += size
-    return found
+    return figures
 
 
 def _tuples(array: np.ndarray) -> Value:
@@ -133,11 +133,11 @@ def _known(name: str, where: str) -> None:
         raise InputError(f"unknown material '{name}'", where, did_you_mean(name, materials()))
 
 
-# --------------------------------------------------------------------------- what the printed figures mean
+# --------------------------------------------------------------------------- conversion of the printed figures
 
 
 def _index(f0: float) -> float:
-    """The index that reflects f0 at normal incidence: Schlick's formula is given F0 by it."""
+    """The index with normal reflectance f0: Schlick's formula receives F0 as an index."""
     root = math.sqrt(f0)
     return (1.0 + root) / (1.0 - root)
 
@@ -173,7 +173,7 @@ def _ngan_ashikhmin_shirley(p: Figures) -> Figures:
 
 
 def _he(p: Figures) -> Figures:
-    """Lengths in micrometres."""
+    """Lengths in micrometers."""
     lengths = {"sigma": 1000.0 * p["roughness"], "tau": 1000.0 * p["autocorrelation"]}
     return {"specular": p["albedo"], **lengths, "eta": p["eta"]}
 

@@ -1,18 +1,18 @@
-"""Materials as text: how the command line names one, with its parameters, and a material in a material.
+"""Materials as text: the command line's notation of a material with its parameters, including nested materials.
 
     conductor                                   its name; parameters follow as NAME=VALUE
-    ward.py:Ward                                a class in a Python file, which runs because the user named it
+    ward.py:Ward                                a class in a Python file, which is run because the user named it
     gold.binary                                 a file of measured values
-    chest.gltf:Wood                             a material of a glTF file, with its numbers (`documents`)
-    gold.json                                   what `gonio fit` found, or JSON as below
+    chest.gltf:Wood                             a material of a glTF file, numbers only (`documents`)
+    gold.json                                   a result of `gonio fit`, or JSON as below
     alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
     alum-bronze:low2012/lowsmooth_E2            the same by another published fit
-    conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
-    kulla-conty(base=conductor,base.alpha=.3)   a value of a material inside, by its path; the order does not matter
-    {"type": "conductor", "alpha": [.1, .4]}    as in a scene
+    conductor(alpha=0.3,preset=Au)              all in one; a comma separates where a name and = follow
+    kulla-conty(base=conductor,base.alpha=0.3)  a value of an inner material, by its path; in any order
+    {"type": "conductor", "alpha": [0.1, 0.4]}  as in a scene
 
-Values are numbers, "0.9,0.8,0.7" or [.9, .8, .7] for several, names, true or false, and materials again. A material
-inside that is not given is metal of alpha .3, and the first of a mix Lambert's.
+Values are numbers, "0.9,0.8,0.7" or [0.9, 0.8, 0.7] for several, names, true or false, and materials. The default inner
+material is metal of alpha 0.3, and for the first of a mix Lambert's.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..optics.indices import DispersiveIndex
 from . import documents, library, outside
 from .texts import apart, assignment, class_named, split, taken_apart
 
-Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class, and what is set of it: text, or as JSON has it
+Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
 
 __all__ = [
     "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
@@ -45,11 +45,11 @@ def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
     """A named material, `material("alum-bronze")`, by one of the published fits; or one of a file, "chest.gltf:Wood".
 
     name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file that describes materials,
-                another program's or what a fit found ("gold.json"), behind a colon which, where it holds several
-    fit         FILE/FIT; Bagher2012's if not given
-    parameters  in place of the fitted ones
-    Raises InputError, with the nearest known name, where it is unknown or the paper left the material out, and for a
-    file that cannot be read; GonioWarning for what a file has and Gonio's materials do not.
+                of another program or the result of a fit ("gold.json"), followed by :NAME if it contains several
+    fit         FILE/FIT; by default Bagher2012's
+    parameters  override the fitted ones
+    Raises InputError, with the closest known name, if it is unknown or missing from the paper, and for a file that
+    cannot be read; a GonioWarning names features of a file that Gonio's materials lack.
     """
     if documents.names_document(name) and not library.knows(name):
         cls, given = taken_apart(name, "material")
@@ -61,11 +61,11 @@ def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
 def named(
     text: str, assignments: Sequence[str] = (), preset: str = "", allow_code: bool = False
 ) -> tuple[BSDF, dict[str, object]]:
-    """A material as the command line names it, and what was set: values by parameter, "preset" among them.
+    """A material as the command line names it, and its settings: values by parameter, "preset" among them.
 
     assignments  "name=value" each
-    allow_code   let a file of data name classes in Python files, which then run
-    Raises InputError, with the nearest known spelling, for what is unknown or out of range.
+    allow_code   let a data file name classes in Python files, which are then run
+    Raises InputError, with the closest known spelling, for unknown names and values out of range.
     """
     cls, own = taken_apart(text, allow_code=allow_code)
     given = {**own, **dict(map(assignment, assignments))}
@@ -74,35 +74,35 @@ def named(
 
 
 def several(texts: Sequence[str], assignments: Sequence[str]) -> list[Settings]:
-    """Of each text the class and what is set of it: its own settings, and of the shared ones those that it has.
+    """For each text the class and its settings: its own, and those of the shared ones that it has.
 
-    assignments  "name=value" each, shared by all; InputError for one that no material has
+    assignments  "name=value" each, shared by all; raises InputError for one that no material has
     """
     named = [taken_apart(text) for text in texts]
     return [(cls, {**given, **own}) for (cls, own), given in zip(named, shared(named, assignments), strict=True)]
 
 
 def shared(named: Sequence[Settings], assignments: Sequence[str]) -> list[dict[str, str]]:
-    """Of settings, "name=value" each, those that each material has; InputError for one that none has."""
+    """The subset of settings, "name=value" each, for each material; raises InputError for one that none has."""
     wanted = dict(map(assignment, assignments))
-    found, known = [], set()
+    assigned, known = [], set()
     for cls, own in named:
         fits = [name for name in wanted if _has(cls, {**wanted, **own}, name)]
-        found.append({name: wanted[name] for name in fits})
+        assigned.append({name: wanted[name] for name in fits})
         known |= {*fits, *cls.parameters(), *(["preset"] if cls.presets() else [])}
     for name in wanted:
         if name not in known:
             raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
-    return found
+    return assigned
 
 
 def build(named: Settings) -> BSDF:
-    """The material of a class and what is set of it, tried. Raises InputError as `named` does."""
+    """The material of a class and settings, tested. Raises InputError as `named` does."""
     return outside.probe(made(*named)[0])
 
 
 def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
-    """Whether a material of a class has a parameter, by its path; `given` is what is set of it, as `made` takes it."""
+    """Whether a material of a class has a parameter, by its path; `given` are its settings, as for `made`."""
     name, dot, rest = path.partition(".")
     parameter = cls.parameters().get(name)
     if parameter is None or not dot:
@@ -115,8 +115,8 @@ def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
 
 
 def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
-    """As `named`, of a class; a value is text, or what JSON has for it. "base.alpha" is a value of the material `base`,
-    and prevails over one inside of the text of `base`."""
+    """`named` for a class; a value is text or a JSON value. "base.alpha" is a value of the material `base`, and
+    overrides one inside the text of `base`."""
     known = cls.parameters()
     values: dict[str, object] = {}
     preset = "" if "preset" in known else str(given.get("preset", ""))
@@ -141,12 +141,13 @@ def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, 
         return cls(**values), values
     except InputError:
         raise
-    except Exception as error:  # a user's own class
-        raise InputError(f"{cls.__name__} cannot be made: {type(error).__name__}: {error}", "TARGET") from None
+    except Exception as error:  # a user's class
+        raise InputError(f"{cls.__name__} cannot be constructed: {type(error).__name__}: {error}", "TARGET") from None
 
 
 def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
-    """What is set of a material itself, and of each material inside it, by parameter. InputError for unknown names."""
+    """The settings of a material itself, and of each inner material, by parameter. Raises InputError for unknown
+    names."""
     known = cls.parameters()
     own: dict[str, object] = {}
     below: dict[str, dict[str, object]] = {}
@@ -156,7 +157,7 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
             own[path] = value
         elif dot and name in known:
             if not known[name].inner:
-                what = f"'{name}' of {cls.name} is no material, and has no '{rest}'"
+                what = f"'{name}' of {cls.name} is not a material, and has no '{rest}'"
                 raise InputError(what, f"--param {path}", f"give --param {name}=...")
             below.setdefault(name, {})[rest] = value
         elif path != "preset":
@@ -166,7 +167,7 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
 
 
 def typed(parameter: Parameter, value: Value) -> object:
-    """A parameter's value from text, or from what JSON has for it."""
+    """A parameter's value from text, or from a JSON value."""
     where = f"--param {parameter.name}"
     if parameter.inner:
         return _inner(value, where, {})
@@ -174,7 +175,7 @@ def typed(parameter: Parameter, value: Value) -> object:
         return value
     if parameter.kind == "choice":
         name = value.strip().strip('"') if isinstance(value, str) else value
-        # a distribution or a masking term of the user's own
+        # a user's distribution or masking term
         family = getattr(parameter, "family", None)
         return outside.member(name, None, where, family) if isinstance(name, str) and outside.names_code(name) else name
     if parameter.kind == "flag":
@@ -192,7 +193,7 @@ def typed(parameter: Parameter, value: Value) -> object:
 
 
 def written(value: Value) -> str:
-    """A value as `typed` takes it, a material with the parameters that are not the default."""
+    """A value in the form that `typed` accepts, a material with its non-default parameters."""
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={setting(value, name, v)}" for name, v in settings(value).items())
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
@@ -208,8 +209,8 @@ def written(value: Value) -> str:
 
 
 def setting(material: object, path: str, value: Value) -> str:
-    """The value of a material's parameter as `typed` takes it in any process: as `written`, and FILE.py:NAME of a
-    distribution, or another member, that this program alone knows.
+    """The value of a material's parameter in a form that `typed` accepts in any process: as `written`, but FILE.py:NAME
+    for a distribution or another member that only this program knows.
 
     path  "alpha", "base.ndf"
     """
@@ -220,35 +221,35 @@ def setting(material: object, path: str, value: Value) -> str:
 
 
 def as_json(material: BSDF) -> dict[str, object]:
-    """The material as JSON has it, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` takes the values.
-    Paths of files are absolute, as whoever reads it may stand in another folder.
+    """The material as JSON, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` accepts the values. File
+    paths are absolute, since a reader may run in another folder.
 
-    Raises InputError for a class that no file holds, and for values that JSON has no word for.
+    Raises InputError for a class without a file, and for values that JSON cannot express.
     """
-    found: dict[str, object] = {"type": spelled(type(material))}
-    if found["type"] != type(material).name and ":" not in str(found["type"]):
-        what = f"the class {type(material).__name__} is known to this program alone"
+    notation: dict[str, object] = {"type": spelled(type(material))}
+    if notation["type"] != type(material).name and ":" not in str(notation["type"]):
+        what = f"the class {type(material).__name__} is known to this program only"
         raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
     for name, value in settings(material).items():
         if isinstance(value, BSDF):
-            found[name] = as_json(value)
+            notation[name] = as_json(value)
         elif material.parameters()[name].kind == "file":
-            found[name] = os.path.abspath(os.path.expanduser(value))
+            notation[name] = os.path.abspath(os.path.expanduser(value))
         elif isinstance(value, bool | str):
             parameter = material.parameters()[name]
-            found[name] = parameter.spelled(str(value)) if isinstance(parameter, ChoiceParameter) else value
+            notation[name] = parameter.spelled(str(value)) if isinstance(parameter, ChoiceParameter) else value
         elif isinstance(value, DispersiveIndex):
-            found[name] = value.constants.name
+            notation[name] = value.constants.name
         else:
             try:
-                found[name] = np.asarray(value, float).tolist()
+                notation[name] = np.asarray(value, float).tolist()
             except (TypeError, ValueError):
-                raise InputError(f"{name} = {value!r} is no number", "material", "give numbers") from None
-    return found
+                raise InputError(f"{name} = {value!r} is not a number", "material", "give numbers") from None
+    return notation
 
 
 def for_files(material: BSDF) -> dict[str, object] | None:
-    """The material as a file of results holds it: with types as scenes have them; None where no file can hold it."""
+    """The material in the form of result files: with the types of scenes; None if no file can express it."""
     try:
         return documents.for_scenes(as_json(material))
     except InputError:
@@ -256,19 +257,21 @@ def for_files(material: BSDF) -> dict[str, object] | None:
 
 
 def from_json(described: Mapping[str, object]) -> BSDF:
-    """The material that `as_json` describes."""
+    """The material that `as_json` describes. Raises InputError for anything else."""
+    if not isinstance(described, Mapping) or "type" not in described:
+        raise InputError(f"{described!r:.60} describes no material", "material", 'such as {"type": "conductor"}')
     fields = dict(described)
     return made(class_named(str(fields.pop("type")), "material"), fields)[0]
 
 
 def settings(material: BSDF) -> dict[str, Value]:
-    """The parameters that are not the default, by name."""
-    found = {}
+    """The non-default parameters, by name."""
+    values = {}
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
         if parameter.required or not _same(value, parameter.default):
-            found[name] = value
-    return found
+            values[name] = value
+    return values
 
 
 def _same(a: object, b: object) -> bool:
@@ -281,7 +284,7 @@ def _same(a: object, b: object) -> bool:
 
 
 def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
-    """The material that a text or JSON names, with some more settings."""
+    """The material that a text or JSON names, with additional settings."""
     if isinstance(value, BSDF):
         return (
             value
@@ -293,14 +296,14 @@ def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
 
 
 def _inner_default(parameter: Parameter) -> Value:
-    """The material of a parameter that none was given for."""
+    """The default material of a parameter."""
     if not parameter.required:
         return parameter.default
     return "lambert" if parameter.name == "a" else "conductor(alpha=0.3)"
 
 
 def _typed_at(material: BSDF, path: str, value: Value) -> object:
-    """A value as the parameter at a path takes it. InputError where there is none."""
+    """A value for the parameter at a path. Raises InputError if there is none."""
     name, dot, rest = path.partition(".")
     parameter = material.parameters().get(name)
     if parameter is None or (dot and not parameter.inner):
@@ -310,12 +313,12 @@ def _typed_at(material: BSDF, path: str, value: Value) -> object:
 
 
 def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
-    """The material with other values, by path: text, or what JSON has for them. InputError for what cannot be."""
+    """The material with some values replaced, by path: text or JSON values. Raises InputError for invalid ones."""
     return _inner(material, "material", values)
 
 
 def spelled(cls: type[BSDF]) -> str:
-    """How a text names a class: a material's name, or FILE.py:CLASS."""
+    """The text that names a class: a material's name, or FILE.py:CLASS."""
     if BSDF.family.all().get(cls.name) is cls:
         return cls.name
     try:

@@ -1,10 +1,10 @@
-"""What a word of the command line names, a material, a scene, a picture, ...: one decision for all verbs.
+"""The kind of thing that a word of the command line names, a material, a scene, a picture, ..., for all verbs.
 
     kind_of("examples/phong", {Kind.SCENE, *MATERIALS}, "SCENE")     Kind.SCENE
 
-A word may be read in several ways: `phong` is a material, and a folder of that name may hold a scene. The readings have
-an order, what is there before what is a name alone, and the first that the verb accepts is meant. Only names, suffixes
-and the contents of files decide; nothing is run, and no name is too long to be asked about.
+A word may have several readings: `phong` is a material, and a folder of that name may contain a scene. The readings are
+ordered, existing files before plain names, and the first that the verb accepts is chosen. Only names, suffixes and file
+contents matter; nothing is run, and names of any length are accepted.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from ..optics.ndf import distributions
 from . import documents, library, outside, texts
 
 PICTURE_SUFFIXES = (".exr", ".hdr", ".png", ".npz")
-CALIBRATION = "calibration.json"  # beside photographs
-_LONGEST = 80  # letters of a word in an error
-_LARGEST_CALIBRATION = 1 << 20  # bytes; a large .json is a scene
-_NEAR = 0.75  # likeness from which an unknown word is taken for a name that was misspelt
+CALIBRATION = "calibration.json"  # in a folder of photographs
+_LONGEST = 80  # characters of a word in an error
+_LARGEST_CALIBRATION = 1 << 20  # bytes; a larger .json is a scene
+_NEAR = 0.75  # similarity from which an unknown word is treated as a misspelled name
 
 
 class Kind(enum.Enum):
-    """What a word may name."""
+    """The kinds of things that a word may name."""
 
     NAME = "a material's name"
     CODE = "a class in a Python file"
@@ -60,21 +60,21 @@ _TAKEN = {
 
 
 def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str) -> Kind:
-    """What a word names, of the kinds that are accepted.
+    """The kind of a word, among those that are accepted.
 
-    where  what takes it, "SCENE", as errors show it
-    Raises InputError, with what it is and what is expected, where it names nothing of these kinds.
+    where  the operand, "SCENE", for errors
+    Raises InputError, with the actual and the expected kinds, if it has none of these kinds.
     """
     text = os.fspath(word)
-    found = readings(text)
-    kind = next((one for one in found if one in accepted), None)
+    kinds = readings(text)
+    kind = next((one for one in kinds if one in accepted), None)
     if kind is not None:
         return kind
     shown = _shortened(text)
-    what, hint = f"'{shown}' is {found[0].value}, {_expected(accepted)} expected", _TAKEN.get(found[0], "")
-    if Kind.SCENE in found and (reason := _broken(Path(text))):
-        what, where, hint = reason, text, "mend the file"
-    elif not _exists(Path(text)) and found[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
+    what, hint = f"'{shown}' is {kinds[0].value}, {_expected(accepted)} expected", _TAKEN.get(kinds[0], "")
+    if Kind.SCENE in kinds and (reason := _broken(Path(text))):
+        what, where, hint = reason, text, "correct the file"
+    elif not _exists(Path(text)) and kinds[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
         what, hint = f"no file or folder '{shown}'; {_expected(accepted)} expected", "check the path"
     raise InputError(what, where, hint)
 
@@ -84,24 +84,25 @@ def _shortened(text: str) -> str:
 
 
 def _expected(accepted: Collection[Kind]) -> str:
-    """The kinds in words."""
-    whole = set(accepted) >= MATERIALS
-    named = [kind.value for kind in Kind if kind in accepted and not (whole and kind in MATERIALS)]
-    *others, last = ["a material", *named] if whole else named
+    """A description of the kinds."""
+    any_material = set(accepted) >= MATERIALS
+    named = [kind.value for kind in Kind if kind in accepted and not (any_material and kind in MATERIALS)]
+    *others, last = ["a material", *named] if any_material else named
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def is_material(word: str) -> bool:
-    """Whether a word names a material that there is: a known name, a file, or a class that is one."""
-    found = readings(word)
-    if found[0] is Kind.CODE:
+    """Whether a word names an existing material: a known name, a file, or a material class."""
+    kinds = readings(word)
+    if kinds[0] is Kind.CODE:
         cls = outside.thing(texts.split(word)[0], where="MODEL")
         return (isinstance(cls, type) and issubclass(cls, BSDF)) or callable(getattr(cls, "eval", None))
-    return found[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in found)
+    return kinds[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in kinds)
 
 
 def readings(text: str) -> list[Kind]:
-    """All that a word may name, what is most likely first; at least one. InputError for a Python file without class."""
+    """All readings of a word, the most likely first; at least one. Raises InputError for a Python file without a
+    class."""
     text = text.strip()
     head, settings = texts.split(text)
     if head.startswith("{"):
@@ -114,8 +115,8 @@ def readings(text: str) -> list[Kind]:
         raise InputError(f"'{head}' names a file, but no class in it", "MODEL", f"give {head}:CLASS")
     path = Path(text)
     if not _may_be_a_path(Path(head)):
-        what = f"'{_shortened(text)}' names no material, and no file can have that name"
-        raise InputError(what, "MODEL", "such as 'conductor(alpha=.3)', or the path of a file")
+        what = f"'{_shortened(text)}' does not name a material, and no file can have that name"
+        raise InputError(what, "MODEL", "such as 'conductor(alpha=0.3)', or the path of a file")
     if _is_folder(path):
         return _in_folder(path, _names(head))
     if documents.names_document(head):
@@ -133,8 +134,8 @@ def readings(text: str) -> list[Kind]:
 
 
 def _described(name: str, kind: Kind) -> list[Kind]:
-    """Of a description by its type: Gonio's, or a plugin of Mitsuba's. Names that both have are Gonio's; `twosided` and
-    `thindielectric`, which other verbs take for two-sided and thin-dielectric, are plugins."""
+    """The readings of a description by its type: Gonio's, or a Mitsuba plugin's. Names that both have are Gonio's;
+    `twosided` and `thindielectric`, which other verbs read as two-sided and thin-dielectric, are plugins."""
     known = re.sub("^gonio-", "", name) in models() or library.knows(name) or outside.names_code(name)
     plugins = [Kind.PLUGIN] if name else []
     return [kind, *plugins] if known or not plugins else [*plugins, kind]
@@ -142,15 +143,15 @@ def _described(name: str, kind: Kind) -> list[Kind]:
 
 def _type_of(text: str) -> str:
     try:
-        found = json.loads(text)
+        content = json.loads(text)
     except (ValueError, RecursionError):
         return ""
-    return str(found.get("type", "")) if isinstance(found, dict) else ""
+    return str(content.get("type", "")) if isinstance(content, dict) else ""
 
 
 def _type_of_file(text: str) -> str:
     """The type of a description in a .json, "" of other documents."""
-    path = Path(text).expanduser()
+    path = Path(os.path.expanduser(text))
     try:
         return _type_of(path.read_text(encoding="utf-8")) if path.suffix.lower() == ".json" else ""
     except (OSError, ValueError):
@@ -158,13 +159,13 @@ def _type_of_file(text: str) -> str:
 
 
 def _names(name: str) -> list[Kind]:
-    """What a name alone may stand for."""
-    found = [Kind.NAME] if is_model(name) or library.knows(name) else []
-    return [Kind.DISTRIBUTION, *found] if name in distributions() else found
+    """The readings of a plain name."""
+    kinds = [Kind.NAME] if is_model(name) or library.knows(name) else []
+    return [Kind.DISTRIBUTION, *kinds] if name in distributions() else kinds
 
 
 def _resembles(name: str) -> bool:
-    """Whether a name is nearly one of a material or a distribution."""
+    """Whether a name is similar to that of a material or a distribution."""
     if os.sep in name or not name:
         return False
     known = [*models(), *library.materials(), *distributions()]
@@ -172,14 +173,14 @@ def _resembles(name: str) -> bool:
 
 
 def _in_folder(path: Path, names: list[Kind]) -> list[Kind]:
-    """By the files that a folder holds; one that holds none of them is left to what the verb says of it."""
+    """The readings of a folder by its files; for one without known files the verb reports the error."""
     marks = {"scene.json": Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
-    found = [kind for name, kind in marks.items() if _exists(path / name)]
-    return [*found, Kind.FOLDER, *names] if found else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
+    kinds = [kind for name, kind in marks.items() if _exists(path / name)]
+    return [*kinds, Kind.FOLDER, *names] if kinds else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
 
 
 def _of_file(path: Path) -> list[Kind]:
-    """By a file's suffix, whether it is there or not; empty where that says nothing."""
+    """The readings of a file by its suffix, whether it exists or not; empty if the suffix is unknown."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         return _of_archive(path)
@@ -187,11 +188,11 @@ def _of_file(path: Path) -> list[Kind]:
         return [Kind.PICTURE]
     if suffix == ".json":
         return [Kind.CALIBRATION] if _lists_photographs(path) else [Kind.SCENE]
-    return [Kind.SCENE, Kind.PLUGIN] if suffix == ".xml" else []  # a scene of Mitsuba's, or a description of a BSDF
+    return [Kind.SCENE, Kind.PLUGIN] if suffix == ".xml" else []  # a Mitsuba scene, or a description of a BSDF
 
 
 def _of_archive(path: Path) -> list[Kind]:
-    """Baked tables, networks of several materials, or a picture: by the names of the arrays."""
+    """Baked tables, networks of several materials, or a picture, by the names of the arrays."""
     try:
         with zipfile.ZipFile(path) as file:
             names = file.namelist()
@@ -205,14 +206,14 @@ def _of_archive(path: Path) -> list[Kind]:
 def _lists_photographs(path: Path) -> bool:
     """Whether a .json is a calibration."""
     try:
-        found = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
+        content = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(found, dict) and "scene" not in found and ("photographs" in found or "lights" in found)
+    return isinstance(content, dict) and "scene" not in content and ("photographs" in content or "lights" in content)
 
 
 def _broken(path: Path) -> str:
-    """What is wrong with a .json that cannot be read as one; "" where it can, or is another file."""
+    """The error in a .json that cannot be parsed; "" if it can, or for other files."""
     if path.suffix.lower() != ".json" or not _exists(path):
         return ""
     try:
@@ -223,7 +224,7 @@ def _broken(path: Path) -> str:
 
 
 def _may_be_a_path(path: Path) -> bool:
-    """Whether a file could have that name: it is not too long, and has no zero byte."""
+    """Whether a file could have that name: it is not too long, and contains no zero byte."""
     try:
         os.stat(path)
     except ValueError:
@@ -236,7 +237,7 @@ def _may_be_a_path(path: Path) -> bool:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except (OSError, ValueError):  # a name that is too long, a zero byte
+    except (OSError, ValueError):  # too long, or a zero byte
         return False
 
 

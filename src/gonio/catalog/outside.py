@@ -1,7 +1,7 @@
-"""Materials in files of the user's own: FILE.py:CLASS, which is code, and files of data.
+"""Materials in user files: FILE.py:CLASS, which is code, and data files.
 
-A file runs only where the user named it, or allowed a scene to: `load` is called for what stands on the command line or
-in a program, and by the reader of scenes where code is allowed.
+A file runs only if the user named it, or allowed a scene to name it: `load` is called for operands of the command line
+and programs, and by the reader of scenes for which code is allowed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..material.user_code import (
     with_imports,
 )
 from ..ops import ForbiddenOperator, RecordingError
-from ..owner import alone
+from ..owner import exclusive
 
 __all__ = [
     "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
@@ -39,25 +39,25 @@ __all__ = [
 
 
 def reader_of(text: str) -> type[BSDF] | None:
-    """The material that a file of data is, by the file's name: Measured of "gold.binary"; None where it is none."""
+    """The material class of a data file, by its name: Measured for "gold.binary"; None if there is none."""
     return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:
-    """The material class that FILE.py:CLASS names; the file is run, once for each state in which it was saved.
+    """The material class that FILE.py:CLASS names; the file is run once per saved version.
 
-    folder  what a relative path starts from; the current folder if not given
-    Raises InputError, with file and line, where the file cannot be run or has no such class.
+    folder  the base of a relative path; by default the current folder
+    Raises InputError, with file and line, if the file cannot be run or has no such class.
     """
     return _material(thing(text, folder, where))
 
 
 def _material(cls: object) -> type[BSDF]:
-    """The class itself as a material; InputError where it cannot be one."""
+    """The class as a material; raises InputError if it cannot be one."""
     place = place_of(cls)
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
-        hint = f"a material takes it: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
+        hint = f"use it in a material: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
         raise InputError(f"a {family.kind} given, the class of a material expected", place, hint)
     if not issubclass(cls, BSDF):
         return adopt(cls, place)
@@ -71,21 +71,21 @@ def _material(cls: object) -> type[BSDF]:
 
 
 def adopt(cls: type, where: str = "") -> type[BSDF]:
-    """A class that is no gonio.BSDF but has `eval`, as one: `pdf` and `sample` fall back to a guide found from it."""
+    """A class with `eval` that is not a gonio.BSDF, as one: `pdf` and `sample` use a guide computed from it."""
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
     try:
         inner = cls()
     except Exception as error:
         raise InputError(f"{cls.__name__}() fails: {type(error).__name__}: {error}", where, "give defaults") from None
-    kept: dict[str, object] = {}
+    members: dict[str, object] = {}
     for name in ("eval", "pdf", "sample"):
         if callable(getattr(cls, name, None)):
-            kept[name] = _forward(inner, name)
+            members[name] = _forward(inner, name)
     for name in ("transmits", "isotropic", "delta", "stochastic", "known_violations", "lossless_tolerance"):
         if hasattr(cls, name):
-            kept[name] = getattr(inner, name)
-    namespace = {**kept, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}
+            members[name] = getattr(inner, name)
+    namespace = {**members, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}
     return type(cls.__name__, (BSDF,), namespace)
 
 
@@ -101,24 +101,24 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
     return forwarded
 
 
-# --------------------------------------------------------------------------- trying a material
+# --------------------------------------------------------------------------- tests of a material
 
 
-@alone
+@exclusive
 def probe(material: BSDF) -> BSDF:
-    """The material itself, after its formulas were tried on two directions. InputError, with file and line, where one
-    raises, uses Python's `if` on a value, or returns what it must not: better than a failure deep inside a render."""
+    """The material itself, after its formulas were tested on two directions. Raises InputError, with file and line, if
+    one raises, uses Python's `if` on a value, or returns a wrong type, instead of a failure deep inside a render."""
     if any(is_outside(type(inner)) for _, inner in tree.walk(material)):
         _try(material)
     return material
 
 
-@alone
+@exclusive
 def check_operators(material: BSDF) -> BSDF:
-    """The material itself; InputError, with file and line, where a formula of the user's has `**` on a value.
+    """The material itself; raises InputError, with file and line, if a user's formula uses `**` on a value.
 
-    Formulas are recorded only where their file has the operator at all: the verifier runs others, also those that never
-    end, under its own watch.
+    Formulas are recorded only if their file contains the operator: the verifier runs all others, including those that
+    do not terminate, under its own supervision.
     """
     classes = {type(inner) for _, inner in tree.walk(material)}
     files = [_file_of(cls) for cls in classes if not cls.__module__.startswith("gonio.")]
@@ -131,14 +131,14 @@ def check_operators(material: BSDF) -> BSDF:
             if "`**`" in error.what:
                 raise InputError(error.what, error.where, error.hint) from error
         except Exception:
-            continue  # for a law to report
+            continue  # a law reports it
     return material
 
 
 def _file_of(cls: type) -> str:
     try:
         return inspect.getsourcefile(cls) or ""
-    except (OSError, TypeError):  # typed at a prompt
+    except (OSError, TypeError):  # defined at a prompt
         return ""
 
 
@@ -148,7 +148,7 @@ U = np.array([[0.3, 0.7, 0.2], [0.8, 0.1, 0.6]])
 
 
 def _try(material: BSDF) -> None:
-    """By recording, which compiles nothing; by running it where code is for Dr.Jit alone and cannot be recorded."""
+    """Test by recording, which compiles nothing; by running if the code uses Dr.Jit directly and cannot be recorded."""
     path = Path(inspect.getsourcefile(inspect.unwrap(type(material).eval)) or "")
     for formula in ("eval", "pdf", "sample"):
         if material.stochastic or not _recorded(material, formula, path):
@@ -156,11 +156,11 @@ def _try(material: BSDF) -> None:
 
 
 def _recorded(material: BSDF, formula: str, path: Path) -> bool:
-    """Whether a formula can be recorded; then its answer has the right kinds of values."""
+    """Whether a formula can be recorded; if so, its result is checked for the right kinds of values."""
     try:
         result = material.record(formula).entry.result
     except RecordingError as error:
-        if isinstance(error, ForbiddenOperator):  # a single ray would pass it unseen
+        if isinstance(error, ForbiddenOperator):  # with a single ray it would run unnoticed
             raise InputError(error.what, error.where, error.hint) from error
         return False
     except Exception:
@@ -173,7 +173,7 @@ def _recorded(material: BSDF, formula: str, path: Path) -> bool:
         expected = KINDS[name]
         if kind not in expected:
             what = f"{formula if not parts else f'sample: {name}'} returned a {kind}, a {expected[0]} expected"
-            hint = "multiply by a colour of the material" if name in ("eval", "weight") else ""
+            hint = "multiply by a color of the material" if name in ("eval", "weight") else ""
             raise InputError(what, _place(type(material), formula, path), hint)
     return True
 
@@ -214,8 +214,8 @@ def _remedy(text: str) -> str:
     if "__bool__" in text or "truth" in text or "bool" in text:
         return "a value differs from ray to ray: use where(mask, a, b) instead of if, &, | and ~"
     if "integer" in text or "iter" in text or "range" in text:
-        return "a loop must have a length that is known before anything runs"
-    return "mend the formula: it must run on Dr.Jit values, in the words of gonio.ops"
+        return "the length of a loop must not depend on values"
+    return "correct the formula: it must run on Dr.Jit values, with the functions of gonio.ops"
 
 
 def _check_shape(what: str, value: object, shape: tuple[int, ...], path: Path, cls: type[BSDF]) -> None:
@@ -223,7 +223,7 @@ def _check_shape(what: str, value: object, shape: tuple[int, ...], path: Path, c
     if not isinstance(value, np.ndarray) or value.shape != shape:
         given = f"shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
         expected = "a spectrum (N, 3)" if shape == (2, 3) and "wi" not in what else f"shape {('N', *shape[1:])}"
-        hint = "multiply by a colour of the material, or return spectrum values" if formula == "eval" else ""
+        hint = "multiply by a color of the material, or return spectrum values" if formula == "eval" else ""
         raise InputError(f"{what} returned {given} for two rays, {expected} expected", _place(cls, formula, path), hint)
 
 

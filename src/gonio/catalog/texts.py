@@ -1,8 +1,8 @@
-"""The text of a material taken apart: what names it, and what is set of it.
+"""Parsing of a material's text: its name and its settings.
 
-    taken_apart("conductor(alpha=.3,preset=Au)")     (Conductor, {"alpha": ".3", "preset": "Au"})
+    taken_apart("conductor(alpha=0.3,preset=Au)")    (Conductor, {"alpha": "0.3", "preset": "Au"})
 
-What the words mean is a matter of `notation`.
+`notation` interprets the settings.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from ..material.bsdf import BSDF
 from ..material.parameters import Value
 from . import documents, library, outside
 
+RANGE_STEPS = 5  # values of a range
+_RANGE = re.compile(r"(.+?)\.\.(.+)", re.DOTALL)
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
-_SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # at a text's end
+_SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # at the end of a text
 
 
 def assignment(text: str, option: str = "--param") -> tuple[str, str]:
-    """("alpha", ".3") of "alpha=.3"."""
+    """("alpha", "0.3") for "alpha=0.3"."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", option, "such as alpha=0.3")
@@ -30,17 +32,17 @@ def assignment(text: str, option: str = "--param") -> tuple[str, str]:
 
 
 def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tuple[type[BSDF], dict[str, object]]:
-    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material,
-    and of JSON, what JSON has for them. InputError where it is no material, and for a document that names code which
-    is not allowed."""
+    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); JSON values for a document's
+    material and for JSON. Raises InputError if it is not a material, and for a document that names code that is not
+    allowed."""
     if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
-        raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
+        raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
     head, inside = split(text)
     given: dict[str, object] = {**assignments(inside, where)}
     if head.startswith("{"):
         cls, own = apart(_json(head, where), where)
         return cls, {**own, **given}
-    if documents.names_document(head):  # before a table, as the name of a material in a document may be that of one
+    if documents.names_document(head):  # before tables, since the name of a material in a document may look like one
         described = documents.without_pictures(head)
         _refuse_code(described, head, allow_code)
         cls = class_named(str(described.pop("type")), where)
@@ -55,8 +57,8 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
 
 
 def split(text: str) -> tuple[str, str]:
-    """Name and settings of NAME(parameter=value,...): ("conductor", "alpha=.3"); the settings are "" where it has none.
-    The name of a file may have brackets in it, and so may JSON."""
+    """Name and settings of NAME(parameter=value,...): ("conductor", "alpha=0.3"); the settings are "" if there are
+    none. File names and JSON may contain brackets."""
     text = text.strip()
     if text.startswith("{"):
         try:
@@ -77,12 +79,12 @@ def split(text: str) -> tuple[str, str]:
 
 
 def assignments(inside: str, where: str = "MODEL") -> dict[str, str]:
-    """The text of each parameter of "alpha=.3,preset=Au"."""
+    """The text of each parameter of "alpha=0.3,preset=Au"."""
     return dict(assignment(part, where) for part in _parts(inside))
 
 
 def _with_zeros(text: str) -> str:
-    """JSON, with 0.3 for .3."""
+    """JSON with leading zeros added: 0.3 for `.3`."""
     return re.sub(r"(?<![\w.])\.(?=\d)", "0.", text)
 
 
@@ -94,11 +96,11 @@ def _json(text: str, where: str) -> Value:
 
 
 def _refuse_code(described: documents.Notation, file: str, allowed: bool) -> None:
-    """Raise InputError where what a file describes names a class in a Python file."""
+    """Raise InputError if a file's description names a class in a Python file."""
     code = next(_code_in(described), None)
     if code is not None and not allowed:
         hint = f"read that file first; then name the material itself: '{as_text(described)}'"
-        raise InputError(f"it names '{code}', code that a file of data alone does not run", file, hint)
+        raise InputError(f"it names '{code}', code that a data file may not run", file, hint)
 
 
 def _code_in(described: Mapping[str, object]) -> Iterator[str]:
@@ -110,7 +112,7 @@ def _code_in(described: Mapping[str, object]) -> Iterator[str]:
 
 
 def _parts(text: str) -> list[str]:
-    """At commas outside of brackets, where a name and = follow; any other comma is part of a colour."""
+    """The parts between commas outside brackets where a name and = follow; any other comma is part of a color."""
     parts, depth, start = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in "([{") - (letter in ")]}")
@@ -123,9 +125,9 @@ def _parts(text: str) -> list[str]:
 def _no_material(value: object, where: str) -> InputError:
     if str(value).endswith(".py"):
         return InputError(f"'{value}' names a file, but no class in it", where, f"give {value}:CLASS")
-    hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
+    hint = 'such as lambert, \'conductor(alpha=0.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
     expected = ', an object with a "type" expected' if isinstance(value, Mapping) else ""
-    return InputError(f"'{value}' is no material{expected}", where, hint)
+    return InputError(f"'{value}' is not a material{expected}", where, hint)
 
 
 def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
@@ -134,8 +136,8 @@ def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
 
 
 def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
-    """The class of a name, of FILE.py:CLASS or of a material of the library, of which the preset too; "" for none.
-    InputError, with the nearest known name, where there is nothing of that name."""
+    """The class of a name, of FILE.py:CLASS or of a library material, with its preset; "" for none. Raises InputError,
+    with the closest known name, for an unknown name."""
     if outside.names_code(name):
         return outside.load(name, where=where), ""
     if not is_model(name) and (":" in name or library.resembles(name)):
@@ -144,7 +146,7 @@ def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
 
 
 def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
-    """As `taken_apart`, of a text or what JSON has for a material."""
+    """`taken_apart` for a text or a JSON value of a material."""
     if isinstance(value, BSDF):
         return type(value), {}
     if isinstance(value, str):
@@ -158,10 +160,30 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
 
 
 def as_text(value: object) -> str:
-    """What JSON has for a value, as text."""
+    """A JSON value as text."""
     if isinstance(value, Mapping):
         inner = ",".join(f"{name}={as_text(v)}" for name, v in value.items() if name != "type")
         return f"{value.get('type')}({inner})" if inner else str(value.get("type"))
     if isinstance(value, list | tuple):
         return ",".join(map(as_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def range_of(text: str) -> list[str]:
+    """The five values of "LOW..HIGH", geometric where the range spans a factor of ten or more; empty of any other text.
+
+    Raises InputError for ends that are no numbers, or do not increase.
+    """
+    import numpy as np
+
+    ends = _RANGE.fullmatch(text)
+    if ends is None:
+        return []
+    try:
+        low, high = float(ends[1]), float(ends[2])
+    except ValueError:
+        raise InputError(f"'{text}' is not a range", "--vary", "such as --vary alpha=0.01..1") from None
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f"'{text}' is not an increasing range", "--vary", "such as --vary alpha=0.01..1")
+    steps = np.geomspace if low > 0.0 and high >= 10.0 * low else np.linspace
+    return [f"{value:.6g}" for value in steps(low, high, RANGE_STEPS)]

@@ -1,8 +1,8 @@
-"""The command line: thin verbs over the rooms below, no logic of its own. One verb a file in `verbs`.
+"""The command line: thin verbs over the packages below it, without logic. One file per verb in `verbs`.
 
-Nothing at all is imported at the top, so that whatever is imported later is already inside `main`, where Ctrl-C is one
-line. Nothing heavy is imported by `app`, so that `gonio --help` takes little more than Python and Typer: each verb
-imports what it needs when it runs. Errors are printed in one place, `app.run`.
+Nothing is imported at the top, so that every later import happens inside `main`, where Ctrl-C gives one line. `app`
+imports nothing heavy, so that `gonio --help` takes little more than Python and Typer: each verb imports what it needs
+when it runs. Errors are printed in one place, `app.run`.
 
 Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C (143 by
 SIGTERM, 129 by SIGHUP).
@@ -23,8 +23,9 @@ def main(arguments: list[str] | None = None) -> None:
     """The `gonio` command."""
     import sys
 
-    from . import signals
+    from . import signals, streams
 
+    streams.prepare()
     with signals.at_once():
         from . import app
     with signals.as_exceptions() as ended:

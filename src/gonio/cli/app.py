@@ -9,12 +9,14 @@ import re
 import signal
 import sys
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ..errors import GonioError, GonioWarning, InputError, in_user_code, out_of_loop
+from ..errors import GonioError, GonioWarning, InputError, MachineError, in_user_code, out_of_loop
+from ..files import check_current_folder
+from . import renamed, streams
 from .signals import Ended, exit_code
 from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
@@ -23,11 +25,16 @@ _NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTIL
 
 
 def _styled(text: str) -> str:
-    """Help with bold headings and coloured names. Typer's own way, by Rich, takes longer than all else together."""
+    """Help with bold headings and colored names. Typer's own way, by Rich, takes longer than all else together."""
     return _NAMES.sub("  \x1b[36m\\1\x1b[0m", _HEADINGS.sub("\x1b[1m\\g<0>\x1b[0m", text))
 
 
 class _Command(TyperCommand):
+    def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        parser = super().make_parser(ctx)  # type: ignore[arg-type]
+        renamed.accept(parser, self.name or "")
+        return parser
+
     def get_help(self, ctx: typer.Context) -> str:  # type: ignore[override]  # Typer has its own Click
         return _styled(super().get_help(ctx))
 
@@ -89,7 +96,7 @@ def gonio(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where Gonio fails.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
 ) -> None:
     """A laboratory for the scattering of light by materials."""
     if debug:
@@ -114,7 +121,7 @@ def _fail(error: GonioError, as_json: bool) -> int:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-    """Our own warnings are for the user, in one line; those of libraries are for their authors."""
+    """Print Gonio's own warnings in one line; those of libraries are for their authors."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
@@ -122,13 +129,30 @@ def _show_warning(message: Warning | str, category: type[Warning], *place: objec
 def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
     """The exit code of the command; `ended` knows the signal where one came."""
     given = sys.argv[1:] if arguments is None else arguments
-    as_json = "--json" in given
     ended = ended or Ended()
     warnings.showwarning = _show_warning
     warnings.simplefilter("always", GonioWarning)
     try:
-        code = app(given or ["--help"], prog_name="gonio", standalone_mode=False)
+        code = _run(given, ended)
         sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # `gonio schema | head`: the reader has closed the pipe
+        streams.silence(sys.stdout, sys.stderr)
+        return 0
+    except streams.OutputError as error:
+        if error.errno == errno.EIO and ended.number:  # the terminal has closed
+            streams.silence(sys.stdout, sys.stderr)
+            return ended.code
+        streams.silence(sys.stdout)
+        hint = "the files that the command wrote are there"
+        return _fail(MachineError(f"the output cannot be printed: {error.strerror}", "stdout", hint), as_json=False)
+
+
+def _run(given: list[str], ended: Ended) -> int:
+    as_json = "--json" in given
+    try:
+        check_current_folder()
+        code = app(given or ["--help"], prog_name="gonio", standalone_mode=False)
         if code == exit_code(signal.SIGINT):  # Typer's answer to a KeyboardInterrupt; what kept something exits itself
             print(ended.line, file=sys.stderr)
             return ended.code
@@ -138,24 +162,12 @@ def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
     except KeyboardInterrupt:  # between two things that Typer does
         print(ended.line, file=sys.stderr)
         return ended.code
-    except OSError as error:
-        if isinstance(error, BrokenPipeError):  # `gonio schema | head`: whoever read us has seen enough
-            _say_no_more()
-            return 0
-        if error.errno == errno.EIO and ended.number:  # the terminal has closed
-            _say_no_more()
-            return ended.code
-        return _broken(error, as_json, ended)
+    except (BrokenPipeError, streams.OutputError):
+        raise
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error of the argument parser
             return _fail(_usage_error(error), as_json)
         return _broken(error, as_json, ended)
-
-
-def _say_no_more() -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
-        os.dup2(nowhere, stream.fileno())
 
 
 def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
@@ -170,6 +182,11 @@ def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
     located = cause if isinstance(cause, GonioError) else in_user_code(cause)
     if located is not None:
         return _fail(located, as_json)
+    if isinstance(error, OSError) and error.filename is not None:  # a file that is no more, or that nobody may read
+        reason = error.strerror or type(error).__name__
+        return _fail(InputError(f"cannot be used: {reason}", os.fsdecode(error.filename), "check the file"), as_json)
+    if isinstance(error, MemoryError):
+        return _fail(MachineError("the memory does not suffice", "", "ask for less, such as a smaller --size"), as_json)
     what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
     failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
     failure.code = 3

@@ -1,10 +1,10 @@
-"""What the shell offers after Tab, without loading Dr.Jit: materials, presets, laws, languages, ..."""
+"""Completion in the shell, without loading Dr.Jit: materials, presets, laws, languages, ..."""
 
 from __future__ import annotations
 
 import typer
 
-Offers = list[tuple[str, str]]  # what may stand here, and what it is
+Offers = list[tuple[str, str]]  # words, each with a description
 
 
 def materials(incomplete: str) -> Offers:

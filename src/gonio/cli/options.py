@@ -1,16 +1,18 @@
-"""Options and arguments that several verbs take, declared once: one by one, or as a dataclass of those that belong
-together, whose fields a verb gets as one parameter."""
+"""Options and arguments that several verbs share, declared once: singly, or as a dataclass of related ones, which a
+verb takes as one parameter."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
 
 from typer import Argument, Option
+from typer.models import OptionInfo
 
+from ..render.options import RenderOptions
 from . import completion
 
 if TYPE_CHECKING:
@@ -18,62 +20,86 @@ if TYPE_CHECKING:
     from ..material import BSDF
     from ..render.request import Request
 
+
+def output_option(metavar: str, text: str) -> OptionInfo:
+    """`-o`, the one name of what a verb writes: `Annotated[Path, output_option("FILE", "The sheet.")]`."""
+    return Option("-o", "--output", metavar=metavar, help=text)
+
+
+def samples_option(text: str) -> OptionInfo:
+    """`--samples`: random samples of anything but a pixel."""
+    return Option("--samples", metavar="N", help=text)
+
+
+def render_option(name: str) -> OptionInfo:
+    """An option of `RenderOptions`, with its help text."""
+    kind, shown = get_args(get_type_hints(RenderOptions, include_extras=True)[name])
+    flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
+    return Option(*flag, metavar=shown.metavar or None, help=shown.help)
+
+
 Model = Annotated[
-    str, Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials)
+    str, Argument(metavar="MODEL", help="A material; `gonio models` lists them.", autocompletion=completion.materials)
 ]
-Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")]
 SceneFile = Annotated[
-    str, Argument(metavar="SCENE", help="A scene's folder or .json; a Mitsuba .xml; or a material, shown on a ball.")
+    str, Argument(metavar="SCENE", help="A scene: its folder, .json or Mitsuba .xml; or a material, shown on a ball.")
 ]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
-Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
-Code = Annotated[bool, Option("--allow-code", help="Let the scene run code that it names: Python files, plugins.")]
-Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
+Outside = Annotated[bool, render_option("allow_outside")]
+Code = Annotated[bool, render_option("allow_code")]
+Device = Annotated[str, render_option("device")]
+Threads = Annotated[int | None, render_option("threads")]
+Seed = Annotated[int | None, render_option("seed")]
+Spp = Annotated[int | None, render_option("spp")]
+Exposure = Annotated[str, render_option("exposure")]
+Timeout = Annotated[float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")]
 Checkpoint = Annotated[
-    Path | None, Option(metavar="FILE", help="Keep the sums so far there, and go on from them where it exists.")
+    Path | None, Option(metavar="FILE", help="Store intermediate sums there; resume from the file if it exists.")
 ]
-Exposure = Annotated[str, Option(metavar="EV|auto", help="Stops of brightness, for .png.")]
 
 
 @dataclass(frozen=True)
 class Material:
-    """How a material that is named on the command line is set up."""
+    """Parameters and preset of the materials that are named on the command line."""
 
-    param: Parameters = None
+    param: Annotated[
+        list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="Set a parameter; repeatable.")
+    ] = None
     preset: Annotated[
-        str, Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets)
+        str, Option(metavar="NAME", help="A named preset, such as Au of conductor.", autocompletion=completion.presets)
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
-        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have.
+        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share the parameters they have.
 
         accepted  the kinds that may stand there; materials alone if not given
-        Raises InputError for what is none of these, and for a parameter that none has.
+        Raises InputError for a word of another kind, and for a parameter that no material has.
         """
         from ..catalog import notation, operands, texts
 
         for one in models:
             operands.kind_of(one, accepted or operands.MATERIALS, "MODEL")
-        wanted = self._wanted()
-        if not wanted:
+        settings = self.settings()
+        if not settings:
             return list(models)
         apart = [notation.split(one) for one in models]
         if len(models) == 1:
-            return [_text(apart[0][0], dict(map(notation.assignment, wanted)), apart[0][1])]
-        given = notation.shared([notation.taken_apart(one) for one in models], wanted)
+            return [_text(apart[0][0], dict(map(notation.assignment, settings)), apart[0][1])]
+        given = notation.shared([notation.taken_apart(one) for one in models], settings)
         return [_text(head, {**of, **texts.assignments(own)}) for (head, own), of in zip(apart, given, strict=True)]
 
     def text(self, model: str, accepted: Collection[operands.Kind] = ()) -> str:
         return self.texts([model], accepted)[0]
 
-    def _wanted(self) -> list[str]:
+    def settings(self) -> list[str]:
+        """ "NAME=VALUE" each, the preset first."""
         return [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
 
     def refuse(self, target: str) -> None:
-        """Raise InputError for parameters of a material where there is none."""
+        """Raise InputError if parameters are given without a material."""
         from ..errors import InputError
 
-        if self._wanted():
+        if self.settings():
             what = f"parameters of a material given, and '{target}' is none"
             raise InputError(what, "--param", "name a material, such as conductor, or leave the parameters out")
 
@@ -84,7 +110,7 @@ class Material:
 
         if operands.kind_of(scene, {operands.Kind.SCENE, *operands.MATERIALS}, "SCENE") in operands.MATERIALS:
             cls, own = notation.taken_apart(scene, allow_code=allow_code)
-            return cls, {**own, **dict(map(notation.assignment, self._wanted()))}
+            return cls, {**own, **dict(map(notation.assignment, self.settings()))}
         self.refuse(scene)
         return None
 
@@ -95,14 +121,46 @@ def _text(head: str, settings: Mapping[str, str], own: str = "") -> str:
 
 
 @dataclass(frozen=True)
-class Crew:
-    """Who does the work: this process, more of them, or a cluster."""
+class Fitting(Material):
+    """What of a model is fitted: `param` and `preset` hold values, `free` releases them."""
 
-    workers: Annotated[int | None, Option(metavar="N", help="Work with N processes of this machine.")] = None
-    cluster: Annotated[str | None, Option(metavar="ADDRESS", help="Work on a Dask cluster: tcp://host:8786.")] = None
+    free: Annotated[
+        list[str] | None, Option(metavar="NAME", help="Fit this parameter too, though it is 1; repeatable.")
+    ] = None
+    grazing: Annotated[float, Option(metavar="DEG", help="Ignore values beyond this angle from the normal.")] = 80.0
 
-    def working(self) -> AbstractContextManager[object]:
-        """Inside, they do it."""
+    def fixed(self) -> dict[str, str]:
+        """Parameters that are held, by path, as texts."""
+        from ..catalog import notation
+
+        return dict(map(notation.assignment, self.param or ()))
+
+    def models(self, names: Sequence[str]) -> list[str]:
+        """The models as texts, with the preset where one is given. Raises InputError for a preset of a sum."""
+        if not self.preset:
+            return list(names)
+        from ..errors import InputError
+
+        for name in names:
+            if "+" in name:
+                hint = f"name it in a part: -m 'lambert+conductor(preset={self.preset})'"
+                raise InputError(f"preset '{self.preset}' given, and '{name}' is a sum of materials", "--preset", hint)
+        if not names:
+            raise InputError(f"preset '{self.preset}' given without a model", "--preset", "name a model with -m")
+        return Material(preset=self.preset).texts(names)
+
+
+@dataclass(frozen=True)
+class Executor:
+    """Who computes: this process, several processes of this machine, or a cluster."""
+
+    workers: Annotated[int | None, Option(metavar="N", help="Compute with N processes of this machine.")] = None
+    cluster: Annotated[
+        str | None, Option(metavar="ADDRESS", help="Compute on a Dask cluster, such as tcp://host:8786.")
+    ] = None
+
+    def running(self) -> AbstractContextManager[object]:
+        """A context in which they compute."""
         if self.workers is None and self.cluster is None:
             return nullcontext()
         from ..work.cluster import Cluster
@@ -110,23 +168,8 @@ class Crew:
         return Cluster(self.cluster, workers=self.workers)
 
 
-@dataclass(frozen=True)
-class Rendering:
-    """How a scene is rendered; None means: as the scene says."""
-
-    spp: Annotated[int | None, Option(metavar="N", help="Samples per pixel.")] = None
-    size: Annotated[str | None, Option(metavar="WxH", help="Film size in pixels, such as 640x480.")] = None
-    integrator: Annotated[str | None, Option(metavar="NAME", help="direct, path, caustics, light, normal, ...")] = None
-    max_depth: Annotated[int | None, Option(metavar="N", help="Longest path, for path, caustics and light.")] = None
-    sampler: Annotated[str | None, Option(metavar="NAME", help="Where random numbers come from.")] = None
-    seed: Annotated[int | None, Option(metavar="N", help="Same seed, same picture, to the bit.")] = None
-    device: Device = "cpu"
-    spectral: Annotated[bool, Option("--spectral", help="Light as wavelengths: glass disperses.")] = False
-    threads: Annotated[int | None, Option(metavar="N", help="CPU cores to use; all if not given.")] = None
-    denoise: Annotated[bool, Option("--denoise", help="Remove noise with Open Image Denoise.")] = False
-    exposure: Exposure = "0"
-    allow_outside: Outside = False
-    allow_code: Code = False
+class Rendering(RenderOptions):
+    """How a scene is rendered, as the command line takes it: size and exposure are texts until `request`."""
 
     def request(
         self,
@@ -136,8 +179,7 @@ class Rendering:
         material: BSDF | None = None,
         checkpoint: Path | None = None,
     ) -> Request:
-        """The request to render a scene, or a material on a ball. Raises InputError for a size or an exposure that is
-        none."""
+        """The request to render a scene, or a material on a ball. Raises InputError for an invalid size or exposure."""
         from ..pictures import exposures
         from ..render.request import Request, parse_size
 
@@ -147,9 +189,18 @@ class Rendering:
             timeout=timeout,
             **vars(self)
             | {
-                "size": None if self.size is None else parse_size(self.size),
-                "exposure": exposures.parse(self.exposure),
+                "size": None if self.size is None else parse_size(str(self.size)),
+                "exposure": exposures.parse(str(self.exposure)),
                 "material": material,
                 "checkpoint": checkpoint,
             },
         )
+
+
+# size and exposure are read by `request`, whose errors say more than Typer's
+_TEXTS: dict[str, object] = {"size": str | None, "exposure": str}
+_TYPES = get_type_hints(RenderOptions)
+Rendering.__annotations__ = {
+    field.name: Annotated[_TEXTS.get(field.name, _TYPES[field.name]), render_option(field.name)]
+    for field in fields(RenderOptions)
+}

@@ -1,11 +1,11 @@
-"""What verbs print with: a progress bar, tables, warnings."""
+"""Output of the verbs: a progress bar, tables, warnings."""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -77,14 +77,22 @@ def listing(*headings: str) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    found = Table(box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
+    table = Table(box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
     for index, heading in enumerate(headings):
-        found.add_column(heading, no_wrap=index == 0, style="cyan" if index == 0 else "")
-    return found
+        table.add_column(heading, no_wrap=index == 0, style="cyan" if index == 0 else "")
+    return table
+
+
+def print_intervals(names: Sequence[str], values: Iterable[float], intervals: Iterable[tuple[float, float]]) -> None:
+    """Fitted values with their 95 % intervals."""
+    table = listing("", "value", "95 % interval")
+    for name, value, (low, high) in zip(names, values, intervals, strict=True):
+        table.add_row(name, f"{value:.5g}", f"{low:.5g} to {high:.5g}")
+    print_rich(table)
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print with colours and in the width that the terminal has; where there is none, nothing is cut short.
+    """Print with colors, in the width of the terminal; without a terminal nothing is truncated.
 
     Brackets are text, never markup.
     """

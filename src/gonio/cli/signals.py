@@ -1,6 +1,6 @@
-"""How the command ends when it is told to: by Ctrl-C, or as batch systems and closing terminals do it.
+"""How the command ends on a signal: by Ctrl-C, from batch systems and from closing terminals.
 
-A render has something to keep, and listens by itself (`render.passes.Interrupts`). All else ends with one line.
+A render stores its picture and handles signals itself (`render.passes.Interrupts`). All else ends with one line.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 def words(number: int) -> str:
-    """What a person calls the signal."""
+    """The usual name of the signal."""
     return "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
 
 
 def exit_code(number: int) -> int:
-    """What a shell reports of a program that the signal ended."""
+    """The exit code that shells report for a program ended by the signal."""
     return 128 + number
 
 
 class Ended:
-    """Which signal has ended the command; 0 while none has."""
+    """The signal that has ended the command; 0 while none has."""
 
     number = 0
 

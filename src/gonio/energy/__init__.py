@@ -1,6 +1,6 @@
-"""Where the energy goes: directional albedo, the tables E and E_avg, and materials that keep what they receive.
+"""Energy: directional albedo, the tables E and E_avg, and the compensation of energy lost by single scattering.
 
-Everything here stands on top of any base material; scenes are unknown in this room.
+Everything here builds on any base material and is independent of scenes.
 """
 
 from .albedo.directional import Albedo, albedo

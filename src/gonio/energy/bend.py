@@ -1,6 +1,6 @@
-"""How mu is bent so that what masking does to albedo is smooth in it: for polynomials of what is missing, and for axes.
+"""Transforms of mu in which albedo is smooth despite masking, for polynomials of the missing energy and for axes.
 
-Masking changes where mu is a few alpha. With a bend b of a few alpha
+Masking sets in where mu is a few alpha. With a bend b of a few alpha
 
     u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
 
@@ -19,12 +19,12 @@ from ..ops.backend import Array
 from ..optics.masking import term
 from ..optics.ndf import distribution
 
-DEGREE = 10  # errs by 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, with its jump)
-LEAST_POWER = 1e-33  # of r, and its inverse of z / r: float32 ends at 1e-38 and 3e38
+DEGREE = 10  # error 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, due to its jump)
+MIN_POWER = 1e-33  # of r, and the inverse of the maximum of z / r: the range of float32 is 1e-38 to 3e38
 
 
 class Form(NamedTuple):
-    """How mu is bent: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
+    """A transform of mu: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
 
     w is alpha, or for schlick-direct 2 k.
     """
@@ -37,16 +37,16 @@ class Form(NamedTuple):
 
     @property
     def least(self) -> float:
-        """mu / b below which M is held, as powers of r and z / r would leave what float32 holds."""
-        return LEAST_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
+        """mu / b below which M is constant, because powers of r and z / r would leave the range of float32."""
+        return MIN_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
 
 
 # Chosen for the smallest error of the fit.
 FORMS = {
     "schlick": Form(0, 0, 2.0),
     "ggx": Form(0, 0, 2.0, 6.0),
-    "narrow": Form(2, 2, 4.0),  # other distributions end, and a few alpha from grazing nothing is missing
-    # glass has more to show: a knee at the critical angle
+    "narrow": Form(2, 2, 4.0),  # other distributions: nothing is missing beyond a few alpha from grazing
+    # glass also has a knee at the critical angle
     "schlick-glass": Form(0, 0, 2.0, degree=14),
     "thin-ggx": Form(0, 1, 2.0, degree=14),
     "thin-narrow": Form(1, 2, 4.0, degree=14),
@@ -56,7 +56,7 @@ FORMS = {
 
 
 def form_of(ndf: str, masking: str, side: str = "") -> Form:
-    """The form of a table: of a metal, or of a side of glass."""
+    """The form of a table: of a metal, or of one side of glass."""
     if not term(masking).smith:
         return FORMS["schlick-glass" if side else "schlick"]
     kind = "ggx" if distribution(ndf).falls_slowly else "narrow"
@@ -64,12 +64,12 @@ def form_of(ndf: str, masking: str, side: str = "") -> Form:
 
 
 def knee(form: Form, masking: str, alpha: Scalar) -> Scalar:
-    """The bend: the cosine about which masking sets in."""
+    """The bend: the cosine at which masking sets in."""
     return _bend(form, term(masking).onset(alpha))
 
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    """The same of an array."""
+    """`knee` of an array."""
     onset: Array = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
     return _bend(form, np.asarray(onset.numpy()).reshape(np.shape(alpha)))
 
@@ -80,7 +80,7 @@ def _bend(form: Form, width: Array) -> Array:
 
 @ops.function
 def descent(form: Form, mu: Array, bend: Array) -> Array:
-    """z / r: 0 at the normal; nothing here is a difference of near values."""
+    """z / r: 0 at the normal; computed without differences of nearly equal values."""
     mu = ops.maximum(mu, bend * form.least)
     fall = 1.0 - mu
     for _ in range(form.squarings):
@@ -93,7 +93,7 @@ def descent(form: Form, mu: Array, bend: Array) -> Array:
 
 
 def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """r, as `descent` has it."""
+    """r, as defined by `descent`."""
     mu, power = np.maximum(mu, bend * form.least), 2**form.squarings
     return (mu**power * (1.0 + bend**power) / (mu**power + bend**power)) ** 0.5**form.roots
 

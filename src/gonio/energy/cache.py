@@ -1,8 +1,8 @@
-"""Tables that were computed once: kept in the user's cache folder by a hash of what they are.
+"""A cache of computed tables in the user's cache folder, by a hash of their inputs.
 
-The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of what was
-asked for and of the formulas behind it; inside stands the hash of its content. A file that is truncated, altered or not
-ours is rebuilt, with a warning; a folder that cannot be written is no hindrance.
+The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of the
+request and of the formulas behind it; the file contains the hash of its content. A truncated, altered or foreign file
+is rebuilt, with a warning; a folder that cannot be written is ignored.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ def content_hash(values: np.ndarray) -> str:
     return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
 
 
-PACKAGES = ("energy", "material", "materials", "ops", "optics")  # whose formulas a table depends on
+PACKAGES = ("energy", "material", "materials", "ops", "optics")  # packages whose formulas determine a table
 
 
 @lru_cache
 def formulas() -> str:
-    """Hash of the code of `PACKAGES` without comments and docstrings: a changed formula makes new tables.
+    """Hash of the code of `PACKAGES` without comments and docstrings: a changed formula leads to new tables.
 
-    Parsing takes a tenth of a second, so the hash is kept for as long as no file changes.
+    Parsing takes a tenth of a second, so the hash is cached until a file changes.
     """
     package = Path(__file__).parent.parent
     files = sorted(p for name in PACKAGES for p in (package / name).rglob("*.py"))
@@ -66,14 +66,14 @@ def formulas() -> str:
 
 
 def _store(path: Path, content: bytes) -> None:
-    """Write a file of the cache where that can be done: a read-only home costs time, not correctness."""
+    """Write a file of the cache if possible: a read-only home costs time, not correctness."""
     with contextlib.suppress(OSError, GonioError):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_whole(path, content, rescue=False)
 
 
 def _meaning(source: str) -> str:
-    """What a file says to the interpreter: its syntax tree without docstrings and annotations."""
+    """The meaning of a file to the interpreter: its syntax tree without docstrings and annotations."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
@@ -84,12 +84,12 @@ def _meaning(source: str) -> str:
     return ast.dump(tree, annotate_fields=False)
 
 
-FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)  # whose members shape tables
+FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)  # members that determine tables
 
 
 def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
-    """Keep in memory what a function makes of a distribution, a masking term and a Fresnel kind, given by name in this
-    order; where another member has the name by now, it is made anew."""
+    """Memoize a function of a distribution, a masking term and a Fresnel kind, given by name in this order; the result
+    is recomputed if a name refers to another member."""
     made: dict[tuple[object, ...], Kept] = {}
 
     @functools.wraps(build)
@@ -103,17 +103,17 @@ def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
 
 
 def origin(*names: str) -> tuple[str, ...]:
-    """Hashes of the files of those among these members that are not Gonio's own, and of what these import from their
-    folders: part of a key on disk. A class that no file has is another in every process."""
+    """Hashes of the files of user-defined members among these, and of their local imports: part of a key on disk. A
+    class without a file has a new hash in every process."""
     members = [type(family.get(name)) for family, name in zip(FAMILIES, names, strict=False)]
     return tuple(_hash_of(cls) for cls in members if not cls.__module__.startswith("gonio."))
 
 
 def _hash_of(cls: type) -> str:
     try:
-        found = with_imports(Path(inspect.getsourcefile(cls) or ""))
-        return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(found))).hexdigest()
-    except (OSError, TypeError):  # typed at a prompt
+        files = with_imports(Path(inspect.getsourcefile(cls) or ""))
+        return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()
+    except (OSError, TypeError):  # defined at a prompt
         return f"{cls.__qualname__} {id(cls)} {_PROCESS}"
 
 
@@ -121,30 +121,30 @@ _PROCESS = f"{os.getpid()} {time.time_ns()}"
 
 
 def _path(key: tuple) -> tuple[Path, str]:
-    """(file, full name) of what `key` names; its first entry says what kind of thing it is."""
+    """(file, full name) of a key; its first entry is the type of the content."""
     name = hashlib.sha256((repr(key) + formulas()).encode()).hexdigest()
     return folder() / f"{key[0]}-{name[:32]}.npz", name
 
 
 def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], read: Callable[[Path], Kept]) -> Kept:
-    """What `key` names, read from the cache or built and kept there.
+    """The object for `key`, read from the cache, or built and stored there.
 
-    key   everything that it depends on besides the formulas of the rooms, which are added
-    read  raises ValueError where the file is not what `write` made
+    key   all inputs besides the formulas of `PACKAGES`, which are added
+    read  raises ValueError if the file was not written by `write`
     """
     path, _ = _path(key)
     if path.is_file():
         try:
             return read(path)
         except ValueError as error:
-            warnings.warn(f"{path}: {error}; it is built again", GonioWarning, stacklevel=3)
+            warnings.warn(f"{path}: {error}; it is rebuilt", GonioWarning, stacklevel=3)
     made = build()
     _store(path, write(made))
     return made
 
 
 def remember(key: tuple, build: Callable[[], np.ndarray]) -> np.ndarray:
-    """The array that `key` names, as `keep` keeps it."""
+    """The array for `key`, cached by `keep`."""
     _, name = _path(key)
 
     def write(values: np.ndarray) -> bytes:
@@ -158,9 +158,9 @@ def remember(key: tuple, build: Callable[[], np.ndarray]) -> np.ndarray:
             values = file["values"]
             fine = str(file["name"]) == name and str(file["hash"]) == content_hash(values)
         except (KeyError, ValueError, OSError) as error:
-            raise ValueError("damaged, or not ours") from error
+            raise ValueError("damaged, or not written by Gonio") from error
         if not fine:
-            raise ValueError("altered, or not ours")
+            raise ValueError("altered, or not written by Gonio")
         return values
 
     return keep(key, lambda: np.asarray(build(), dtype=np.float64), write, read)

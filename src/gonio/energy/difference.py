@@ -1,11 +1,11 @@
-"""How far two materials lie apart: f over pairs of directions, and the albedo.
+"""The difference between two materials: f over pairs of directions, and the albedo.
 
     found = difference(go.OrenNayar(sigma=0.5), go.Lambert())
     found.mean, found.largest, found.largest_at
 
-f is compared at directions that the materials' own sampling chooses and at directions by the cosine, a third each, so
-that narrow lobes are found; each pair is weighed by the inverse of that mixture's density. Perfectly specular parts
-have no f: they count in the albedo alone.
+f is compared at directions sampled by each material and by the cosine, a third each, so that narrow lobes are covered;
+each pair is weighted by the inverse density of this mixture. Perfectly specular parts have no f and count in the albedo
+only.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ from .albedo import albedo, direction
 
 Floats = NDArray[np.float64]
 VIEWS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)  # degrees of wo
-AZIMUTHS = 8  # of each view, where a material is anisotropic
-PAIRS = 1 << 14  # directions of light at each view
-GRAZING = 0.03  # least cosine of wi: f = eval / cos loses its digits within 1.7 degrees of the horizon
-FAINT = 0.01  # of the mean f at a view: below it a ratio says nothing that could be seen
+AZIMUTHS = 8  # per view, if a material is anisotropic
+PAIRS = 1 << 14  # directions of light per view
+GRAZING = 0.03  # smallest cosine of wi: f = eval / cos loses its digits within 1.7 degrees of the horizon
+FAINT = 0.01  # of the mean f at a view: below it a ratio is not visible
 METRICS = {
     "mean": "int |f_A - f_B| cos over int f_B cos, averaged over views",
-    "largest": "the largest |f_A - f_B| over the larger of both, where either is over 1 % of the mean",
+    "largest": "the largest |f_A - f_B| over the larger of both, if either is over 1 % of the mean",
     "albedo": "the largest difference of the directional albedos",
 }
 
 
 @dataclass(frozen=True)
 class View:
-    """What was found at one angle of wo.
+    """The comparison at one angle of wo.
 
     theta    degrees
     mean     int |f_A - f_B| cos d wi over int f_B cos d wi, mean of the channels; inf where B is black
     largest  of |f_A - f_B| / max(f_A, f_B)
-    wi       (theta, phi) of that direction, degrees; phi from wo
+    wi       (theta, phi) of that direction, degrees; phi relative to wo
     f        f_A and f_B there, 1/sr, mean of the channels
     albedo   of A and of B, (2, channels)
     """
@@ -55,13 +55,13 @@ class View:
 
 @dataclass(frozen=True)
 class Difference:
-    """Two materials, compared.
+    """The comparison of two materials.
 
-    views         what was found at each angle of wo
-    known         the angles at which both are known: no others are compared
-    has_specular  whether one has perfectly specular parts, which count in the albedo alone
-    metric        of METRICS, what is judged
-    tolerance     the most that passes; None passes all
+    views         the results at each angle of wo
+    known         the angles at which both are known; only these are compared
+    has_specular  whether either has perfectly specular parts, which count in the albedo only
+    metric        the metric that is judged, one of METRICS
+    tolerance     the largest value that passes; None passes all
     """
 
     views: tuple[View, ...]
@@ -72,7 +72,7 @@ class Difference:
 
     @property
     def mean(self) -> float:
-        """The mean relative difference of f cos, over all light and the views."""
+        """The mean relative difference of f cos, over all light and views."""
         return float(np.mean([view.mean for view in self.views]))
 
     @property
@@ -97,7 +97,7 @@ class Difference:
         return self.tolerance is None or self.value(self.metric) <= self.tolerance
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON; a mean that is infinite is null."""
+        """A dictionary for JSON; an infinite mean becomes null."""
         at = self.largest_at
         return {
             "mean": _finite(self.mean),
@@ -128,12 +128,12 @@ def difference(
 ) -> Difference:
     """Compare f and albedo of A with those of B, at the angles where both are known.
 
-    metric, tolerance  of METRICS, what is judged, and the most that passes
-    pairs              directions of light at each view
-    Raises InputError for a metric that is none, and where no view of both is known.
+    metric, tolerance  the metric that is judged, one of METRICS, and the largest value that passes
+    pairs              directions of light per view
+    Raises InputError for an unknown metric, and if no view is known for both.
     """
     if metric not in METRICS:
-        raise InputError(f"unknown metric '{metric}' of materials", "--metric", " | ".join(METRICS))
+        raise InputError(f"unknown metric '{metric}' for materials", "--metric", " | ".join(METRICS))
     if tolerance is not None and not tolerance >= 0.0:
         raise InputError(f"a tolerance of {tolerance:g}", "--tolerance", "give 0 or more")
     known = a.angular_range.within(b.angular_range)
@@ -145,8 +145,8 @@ def difference(
     albedos = np.stack([np.broadcast_to(albedo(one, mu).value, (len(mu), 3)) for one in (a, b)], axis=1)
     rng = np.random.default_rng([seed, 95])
     specular = any(one.delta != "never" for one in (a, b))
-    found = [_view(a, b, theta, of, known, pairs, rng) for theta, of in zip(views, albedos, strict=True)]
-    return Difference(tuple(found), known, specular, metric, tolerance)
+    per_view = [_view(a, b, theta, of, known, pairs, rng) for theta, of in zip(views, albedos, strict=True)]
+    return Difference(tuple(per_view), known, specular, metric, tolerance)
 
 
 def _view(
@@ -156,8 +156,8 @@ def _view(
     phi = np.repeat(2.0 * np.pi * np.arange(turns) / turns, -(-pairs // turns))
     wo = direction(np.full(len(phi), np.cos(np.radians(theta))), phi)
     wi, density = _directions(a, b, wo, rng)
-    kept = (density > 0.0) & (np.abs(wi[:, 2]) > GRAZING) & known.holds(wo, wi)
-    wo, wi, density = wo[kept], wi[kept], density[kept]
+    usable = (density > 0.0) & (np.abs(wi[:, 2]) > GRAZING) & known.holds(wo, wi)
+    wo, wi, density = wo[usable], wi[usable], density[usable]
     values = [np.asarray(one.eval(wo, wi, precision="float64"), float).mean(axis=1) for one in (a, b)]
     off, of_b = np.abs(values[0] - values[1]), np.abs(values[1])
     total = float((of_b / density).sum())
@@ -177,8 +177,8 @@ def _view(
 
 
 def _directions(a: BSDF, b: BSDF, wo: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Directions of light, a third by each material and by the cosine, and the density of the mixture; 0 for those of
-    perfectly specular parts."""
+    """Directions of light, a third from each material and from the cosine, and the density of the mixture; 0 for those
+    from perfectly specular parts."""
     u = rng.random((len(wo), 3))
     both = a.transmits or b.transmits
     side = np.where(both & (u[:, 0] < 0.5), -1.0, 1.0)

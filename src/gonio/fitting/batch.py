@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +44,7 @@ def files_of(named: Sequence[str]) -> list[str]:
     """The files that are named, those in a folder among them, by name. InputError where there is none."""
     found: list[str] = []
     for text in named:
-        folder = Path(text).expanduser()
+        folder = Path(os.path.expanduser(text))
         if operands.kind_of(str(folder), {Kind.TABLE, Kind.FOLDER}, "DATA") is Kind.FOLDER:
             inside = sorted(str(path) for path in folder.iterdir() if names_table(path.name) and path.is_file())
             if not inside:
@@ -91,7 +92,7 @@ def run(
             cells = data_of(read(file), grazing, file)
             fits = ranked(
                 [
-                    fit(cells, model, lobes=lobes, metric=metric, fixed=given, free=free, grazing=grazing)
+                    fit(cells, model, lobes=lobes, loss=metric, param=given, free=free, grazing=grazing)
                     for model in models
                 ]
             )
@@ -111,7 +112,7 @@ def run(
 
 def _key(how: tuple[object, ...], file: str) -> str:
     """What a fit depends on: the question and the file's state."""
-    path = Path(file.rpartition(":")[0] if not Path(file).exists() and ":" in file else file).expanduser()
+    path = Path(os.path.expanduser(file.rpartition(":")[0] if not Path(file).exists() and ":" in file else file))
     try:
         state = path.stat()
         return parts.key_of(how, file, state.st_size, state.st_mtime_ns)

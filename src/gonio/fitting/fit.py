@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import renamed
 from ..catalog import notation
 from ..errors import InputError
 from ..material import BSDF
@@ -108,14 +109,15 @@ class Fit:
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
 
+@renamed(metric="loss", fixed="param")
 @public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
     model: str | BSDF = "conductor",
     *,
     lobes: int = 1,
-    metric: str = "relative",
-    fixed: Mapping[str, object] | None = None,
+    loss: str = "relative",
+    param: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
     grazing: float = GRAZING,
     progress: Callable[[str], None] = lambda text: None,
@@ -128,28 +130,29 @@ def fit(
     data     a file of measurements, a table, or `Data`
     model    a material, or its name, or a sum of names such as "lambert+ggx"; what it is set to is where the fit starts
     lobes    how many of the last part are added up
-    metric   "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
-    fixed    path -> value of parameters that stay
+    loss     "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
+    param    path -> value of parameters that are held
     free     paths of parameters that move although they stay by themselves: factors that are 1
     grazing  degrees: values beyond, of either direction, are left out
+    progress  called after each start and at the end, with the loss in words
     Levenberg and Marquardt from several starts: the widths of lobes, ever more values as it goes on, at last all.
     Raises InputError for files, models and paths that are none.
     """
     started = time.perf_counter()
-    if metric not in METRICS:
-        raise InputError(f"unknown metric '{metric}'", "metric", " | ".join(METRICS))
-    material, moving, notes = moving_with_notes(model, lobes, fixed, free)
+    if loss not in METRICS:
+        raise InputError(f"unknown metric '{loss}'", "loss", " | ".join(METRICS))
+    material, moving, notes = moving_with_notes(model, lobes, param, free)
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
-    middle = Problem(material, moving, cells.some(SOME), metric)
+    middle = Problem(material, moving, cells.some(SOME), loss)
     best = _best(middle, starts_of(material, moving), progress)
     whole = middle
     if len(cells) > SOME:
-        whole = Problem(material, moving, cells, metric, middle.floor, middle.floors)
+        whole = Problem(material, moving, cells, loss, middle.floor, middle.floors)
         best = solve(whole, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
-    return _result(whole, best, metric, time.perf_counter() - started, notes)
+    return _result(whole, best, loss, time.perf_counter() - started, notes)
 
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:

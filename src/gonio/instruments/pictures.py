@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files, scene
+from .. import files
+from .. import scene as scenes
+from ..arguments import renamed
 from ..bridge import engine
 from ..bridge.types import BSDFPlugin
 from ..catalog import notation
@@ -104,17 +106,18 @@ class PictureFit:
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
 
+@renamed(fixed="param", scene_file="scene")
 @public
 def fit_picture(
     picture: str | Path,
-    scene_file: str | Path,
+    scene: str | Path,
     free: Sequence[str] = ("shapes.0.material",),
     *,
     model: str | BSDF | None = None,
-    fixed: Mapping[str, object] | None = None,
+    param: Mapping[str, object] | None = None,
     spp: int = SPP,
     steps: int = STEPS,
-    seed: int = 1,
+    seed: int | None = None,
     device: str = "cpu",
     allow_outside: bool = False,
     allow_code: bool = False,
@@ -125,12 +128,13 @@ def fit_picture(
         found = fit_picture("photo.exr", "scene.json", ["shapes.0.material"])
 
     picture     .exr, .hdr, .npz or .png, linear radiance as the scene's camera would see it
-    scene_file  of the lab's format; what its materials are set to is where the fit starts
+    scene       of the lab's format; what its materials are set to is where the fit starts
     free        "shapes.0.material": all of that material's numbers that move; "shapes.0.material.alpha": that one
     model       a material that is put in the place of the first of `free`
-    fixed       values by their path in the scene, as `gonio study` has them, set before
+    param       values by their path in the scene, as `gonio study` has them, set before
     spp         samples a pixel, of each render
     steps       at most
+    seed        of all random numbers, 1 if None
     progress    called after each step with its number and the loss
     Raises InputError for files, paths and pictures that do not fit together.
     """
@@ -141,11 +145,11 @@ def fit_picture(
         raise InputError(
             f"variant {mi.variant()} is set", "device", "a fit to a picture takes llvm_ad_rgb or cuda_ad_rgb"
         )
-    overrides = dict(fixed or {})
+    overrides = dict(param or {})
     if model is not None:
         overrides[place_of(free[0], "free")[0]] = moving_of(model)[0]
-    description = scene.read(
-        scene_file, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides, names_output=False
+    description = scenes.read(
+        scene, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides, names_output=False
     )
     width, height = description.camera.film.size
     if wanted.shape[:2] != (height, width):
@@ -154,8 +158,10 @@ def fit_picture(
     if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
         raise InputError("the picture is dark, or not finite", str(picture))
     with garbage.kept():
-        built = scene.built(description, mi)
-        problem = Problem(mi, built, _targets(description, built, free), _depth(description), wanted, spp, seed)
+        built = scenes.built(description, mi)
+        problem = Problem(
+            mi, built, _targets(description, built, free), _depth(description), wanted, spp, 1 if seed is None else seed
+        )
         start = problem.start()
         losses = [problem.loss(start)]
         progress(0, losses[0])

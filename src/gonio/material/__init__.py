@@ -1,4 +1,4 @@
-"""What a material is: the protocol `BSDF`, its parameters, and how its formulas are bound, called and recorded.
+"""The protocol of a material, `BSDF`: its parameters, and how its formulas are bound, called and recorded.
 
 The materials themselves are in `gonio.materials`, one file each.
 """
@@ -77,7 +77,7 @@ def is_model(name: str) -> bool:
 
 
 def model(name: str) -> type[BSDF]:
-    """The class of that name; underscores, hyphens and case do not matter. InputError where there is none."""
+    """The class of that name, ignoring underscores, hyphens and case. Raises InputError if there is none."""
     key = _key(name)
     if not key:
         raise InputError(f"unknown material '{name}'", "model", did_you_mean(_plain(name), list(models())))
@@ -85,7 +85,7 @@ def model(name: str) -> type[BSDF]:
 
 
 def _key(name: str) -> str:
-    """The name under which a class is known; "" where there is none."""
+    """The name under which a class is registered; "" if it is not."""
     known = models()
     by_class = {cls.__name__.lower(): key for key, cls in known.items()}
     return _plain(name) if _plain(name) in known else by_class.get(name.lower(), "")

@@ -1,4 +1,4 @@
-"""The angles at which a material's values are known: all, but of tables of measurements that end before."""
+"""The angles at which a material's values are known: all angles, except for tables of measurements that end earlier."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Ends: TypeAlias = "tuple[float, float]"
-SLACK = 0.1  # degrees: tables keep their last node that much above the horizon
+SLACK = 0.1  # degrees by which the last node of a table may lie above the horizon
 
 
 class AngularRange(NamedTuple):
@@ -25,16 +25,16 @@ class AngularRange(NamedTuple):
 
     @property
     def everything(self) -> bool:
-        """Whether the values are known everywhere."""
+        """Whether the values are known at all angles."""
         return self == EVERYWHERE
 
     def within(self, other: AngularRange) -> AngularRange:
-        """Where both are known."""
+        """The intersection of two ranges."""
         ends = [(max(a[0], b[0]), min(a[1], b[1])) for a, b in zip(self, other, strict=True)]
         return AngularRange(*ends)
 
     def holds(self, wo: NDArray[np.floating], wi: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Which pairs of unit vectors, (N, 3) each, lie inside."""
+        """Which pairs of unit vectors, (N, 3) each, lie in the range."""
         known = np.ones(len(wi), bool)
         azimuth = np.abs(np.arctan2(wo[:, 0] * wi[:, 1] - wo[:, 1] * wi[:, 0], np.sum(wo[:, :2] * wi[:, :2], axis=1)))
         angles = (
@@ -63,16 +63,16 @@ EVERYWHERE = AngularRange()
 
 
 def of_nodes(view: NDArray[np.floating], light: NDArray[np.floating], azimuth: NDArray[np.floating]) -> AngularRange:
-    """The range of a table's nodes, radians; without any, that axis is everything."""
-    found = []
+    """The range of a table's nodes in radians; an axis without nodes has the full range."""
+    ranges = []
     for nodes, (lowest, highest) in zip((view, light, azimuth), EVERYWHERE, strict=True):
         low, high = (np.degrees(nodes[0]), np.degrees(nodes[-1])) if len(nodes) else (lowest, highest)
-        low = lowest if low < lowest + SLACK else round(float(low), 4)  # files keep radians, people wrote degrees
+        low = lowest if low < lowest + SLACK else round(float(low), 4)  # files hold radians converted from degrees
         high = highest if high > highest - SLACK else round(float(high), 4)
-        found.append((low, high))
-    return AngularRange(*found)
+        ranges.append((low, high))
+    return AngularRange(*ranges)
 
 
 def _from_normal(w: NDArray[np.floating]) -> NDArray[np.float64]:
-    """The angle to the normal or to its opposite, whichever is nearer, degrees."""
+    """The angle to the normal or to its opposite, whichever is smaller, in degrees."""
     return np.degrees(np.arctan2(np.hypot(w[:, 0], w[:, 1]), np.abs(w[:, 2])))

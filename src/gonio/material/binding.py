@@ -1,9 +1,9 @@
-"""The bound copy of a material: every number a Dr.Jit value (or a symbol), ready for `eval`, `pdf` and `sample`.
+"""The bound copy of a material: its numbers are Dr.Jit values (or symbols), ready for `eval`, `pdf` and `sample`.
 
-Binding makes each value an evaluated array of one entry a literal, so that a changed value compiles nothing.
-What follows from the parameters alone (`BSDF.derive`) is computed once on the bound copy and kept there.
+Binding converts each number to an evaluated array of one entry instead of a literal, so that a changed value compiles
+nothing. Values that depend on the parameters only (`BSDF.derive`) are computed once and stored in the bound copy.
 
-Copies are made in this file and nowhere else.
+Bound copies are made in this file only.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from .parameters import Material, Parameter, Value
 
 M = TypeVar("M", bound=Material)
 
-DERIVED = "derived"  # the part of a bound copy that holds what `derive` gave, in recordings and their names
+DERIVED = "derived"  # the part of a bound copy that holds the result of `derive`; also its name in recordings
 
 
 def bound_copy(material: M, values: Mapping[str, object], derived: object = None) -> M:
-    """A copy with these bound values: every numeric parameter's, and the inner materials'."""
+    """A copy with these bound values of all numeric parameters and inner materials."""
     copy: M = object.__new__(type(material))
     state = vars(copy)
     state.update(vars(material))
@@ -31,7 +31,7 @@ def bound_copy(material: M, values: Mapping[str, object], derived: object = None
 
 
 def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
-    """A bound copy, its numbers being what `convert(parameter, value)` makes of them, in inner materials too."""
+    """A bound copy with `convert(parameter, value)` for every number, inner materials' included."""
     values = {}
     for name, parameter in material.parameters().items():
         if parameter.inner:
@@ -42,8 +42,8 @@ def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
 
 
 def bind_to(material: M, types: backend.Types) -> M:
-    """A bound copy for Dr.Jit values of these types, with what its parameters derive, where that is the same for all
-    rays; what plain numbers derive is kept with the material, which is frozen."""
+    """A bound copy for Dr.Jit values of these types, with its derived values if they are the same for all rays. Those
+    derived from plain numbers are cached with the material, which is frozen."""
     copy = bind(material, lambda parameter, value: parameter.bind(value, types))
     if not material.derives:
         return copy
@@ -57,13 +57,13 @@ def bind_to(material: M, types: backend.Types) -> M:
 
 
 def with_derived(material: M, derived: object) -> M:
-    """The bound copy holding what `derive` gave, or what a recording has in its place."""
+    """The bound copy with the result of `derive`, or with its counterpart in a recording."""
     return bound_copy(material, {}, derived)
 
 
 def evaluate_derived(material: Material, rays: int = 1) -> object:
-    """What a bound copy derives, evaluated now: where no parameter is being differentiated, or varies over more than
-    `rays` rays, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
+    """The derived values of a bound copy, evaluated. None if a parameter is being differentiated or varies over more
+    than `rays` rays, and while Dr.Jit records a loop, inside which nothing can be evaluated."""
     if not material.derives:
         return None
     dr = backend.drjit()
@@ -73,12 +73,12 @@ def evaluate_derived(material: Material, rays: int = 1) -> object:
     if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) > rays or dr.grad_enabled(v) for v in given):
         return None
     derived = material.derive()
-    dr.make_opaque(*_arrays(derived))  # one by one: given a tuple with names in it, Dr.Jit evaluates nothing
+    dr.make_opaque(*_arrays(derived))  # one by one: Dr.Jit evaluates nothing in a tuple that contains names
     return derived
 
 
 def _arrays(value: object) -> Iterator[object]:
-    """The Dr.Jit values in a structure of tuples."""
+    """The Dr.Jit values in a nested structure of tuples."""
     if backend.is_drjit(value):
         yield value
     elif isinstance(value, tuple):
@@ -94,12 +94,12 @@ def values(material: Material) -> Iterator[Scalar | Vector]:
 
 
 def shift(material: M, path: str, change: Callable[[Value], Value]) -> M:
-    """The bound copy with one value changed."""
+    """The bound copy with one value replaced."""
     name, _, rest = path.partition(".")
     value = getattr(material, name)
     return bound_copy(material, {name: shift(value, rest, change) if rest else change(value)})
 
 
 def _plain(material: Material) -> bool:
-    """Whether all numbers are plain ones, which cannot change behind our back as arrays can."""
+    """Whether all numbers are plain ones; arrays could be modified by their owner."""
     return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

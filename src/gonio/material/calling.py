@@ -1,7 +1,7 @@
-"""The call from outside: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
+"""Calls from outside: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
 
-`method` wraps the formulas of a material. Called with bound parameters (by another formula, a renderer, a recording)
-the formula runs as it stands; from outside the material is bound, the arguments converted, and the answer as well.
+`method` wraps the formulas of a material. Called with bound parameters (by another formula, a renderer, a recording),
+the formula runs unchanged; otherwise the material is bound, and the arguments and the result are converted.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .parameters import Material
 from .sample import Floats, Sample, SampleArrays
 
 MODES = ("radiance", "importance")
-UNIT = 1e-2  # how far from 1 a direction's length may be: rounding, and what people type by hand
+UNIT = 1e-2  # tolerance of a direction's length: rounding and values typed by hand
 
 V3 = TypeVar("V3", bound="Vector3[DrJit]")
 S = TypeVar("S")
@@ -32,15 +32,15 @@ M = TypeVar("M", bound=Material)
 T = TypeVar("T", bound="tuple[object, ...]")
 T_co = TypeVar("T_co", bound="tuple[object, ...]", covariant=True)
 
-Given: TypeAlias = Any  # directions as callers have them: arrays, lists, Dr.Jit vectors
-DrJit: TypeAlias = Any  # what only a value's own type could tell, and Dr.Jit's types do not
+Given: TypeAlias = Any  # directions as callers pass them: arrays, lists, Dr.Jit vectors
+DrJit: TypeAlias = Any  # a Dr.Jit value, whose type is not expressible
 
 
 MISSING: Any = object()
 
 
 class EvalMethod(Protocol):
-    """`eval` as callers see it: a spectrum a ray, (N, 3)."""
+    """`eval` as callers see it: a spectrum per ray, (N, 3)."""
 
     @overload
     def __call__(self, wo: Direction, wi: Direction, mode: Mode = ...) -> Spectrum: ...
@@ -51,7 +51,7 @@ class EvalMethod(Protocol):
 
 
 class PdfMethod(Protocol):
-    """`pdf` as callers see it: a number a ray, (N,)."""
+    """`pdf` as callers see it: a number per ray, (N,)."""
 
     @overload
     def __call__(self, wo: Vector3[S], wi: Vector3[S], *, precision: Precision | None = ...) -> S: ...
@@ -75,7 +75,7 @@ class SampleMethod(Protocol):
 
 
 class TermsMethod(Protocol[T_co]):
-    """`terms` as callers see it: a NamedTuple, whose fields from outside are arrays, (N,) or (N, 3)."""
+    """`terms` as callers see it: a NamedTuple, with arrays (N,) or (N, 3) as fields for callers outside formulas."""
 
     @overload
     def __call__(self, wo: Direction, wi: Direction, *, precision: None = ...) -> T_co: ...
@@ -92,8 +92,8 @@ def method(formula: Callable[[M, Direction, Direction, Mode], Sample], /) -> _Sa
 @overload
 def method(formula: Callable[[M, Direction, Direction], T], /) -> _Terms[T]: ...
 def method(formula: Callable[..., object], /) -> object:
-    """Mark `eval`, `pdf`, `sample` or `terms` of a material, so that editors know what callers get; it takes NumPy
-    arrays, lists and Dr.Jit vectors. Methods of these names are wrapped anyway where the mark is left out."""
+    """Mark `eval`, `pdf`, `sample` or `terms` of a material, so that editors show the types for callers, who may pass
+    NumPy arrays, lists or Dr.Jit vectors. Methods of these names are wrapped even without the mark."""
     if hasattr(formula, "__wrapped__"):
         return formula
     inner = ops.function(formula)
@@ -112,7 +112,7 @@ def method(formula: Callable[..., object], /) -> object:
         if other is MISSING:
             other = named.pop(second, MISSING)
         if other is MISSING or named:
-            what = f"has no argument '{next(iter(named))}'" if named else f"misses its argument '{second}'"
+            what = f"has no argument '{next(iter(named))}'" if named else f"lacks its argument '{second}'"
             raise TypeError(f"{type(self).__name__}.{formula.__name__} {what}: wo, {second}, precision and mode")
         args = (mode,) if takes_mode else ()
         if self.is_bound:
@@ -156,7 +156,7 @@ def _on_numpy(
     types = backend.types(precision)
     first, second, count = _rows(wo, other, name)
     _check_rows(material, count)
-    if count == 0:  # Dr.Jit joins no array of no entries with one of one entry
+    if count == 0:  # Dr.Jit cannot broadcast empty arrays with arrays of one entry
         first = second = np.array([0.0, 0.0, 1.0])
     bound = binding.bind_to(material, types)
     result = enter(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), mode)
@@ -188,7 +188,7 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, i
         if label != "u":
             _check_unit(array, where)
         elif not np.all((array >= 0.0) & (array <= 1.0)):  # NaN compares false
-            raise InputError("random numbers outside of [0, 1]", where, "give rng.random((N, 3))")
+            raise InputError("random numbers outside [0, 1]", where, "give rng.random((N, 3))")
         arrays.append(array)
     sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
     if len(sizes) > 1:
@@ -208,7 +208,7 @@ def _check_unit(array: np.ndarray, location: str) -> None:
 
 
 def _check_rows(material: Material, count: int) -> None:
-    """Raise InputError where a parameter has one value a ray, for another number of rays."""
+    """Raise InputError if a parameter has one value per ray for another number of rays."""
     if count == 1:
         return
     for leaf in tree.leaves(material):

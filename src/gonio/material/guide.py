@@ -1,19 +1,18 @@
-"""Sampling for a material that has only an `eval`: a density that follows the light, tabulated from `eval` itself.
+"""Sampling for a material with `eval` only: a density proportional to the light, tabulated from `eval` itself.
 
-The plane that a guide is tabulated over is that of a *chart*: directions about an axis, by how far they lie from it and
-in which azimuth. Of a half vector the axis is the surface normal, so that a glossy lobe stays where it is when the
-viewer moves (as in Dupuy2018); a broad or a lopsided lobe is charted directly, about the normal or about its own
-centre. With q = |v - axis|^2 = 2 (1 - cos),
+A guide is tabulated over a *chart*: directions by distance and azimuth about an axis. For half vectors the axis is the
+surface normal, so that a glossy lobe does not move with the viewer (as in Dupuy2018); a broad or asymmetric lobe is
+charted directly, about the normal or about the lobe's center. With q = |v - axis|^2 = 2 (1 - cos),
 
     s = log(1 + q / q0) / log(1 + q_max / q0),    dw = dq dphi / 2,    dq = (q + q0) log(1 + q_max / q0) ds,
 
-so that equal steps of s resolve a lobe of width sqrt(q0) and all that is wider. A density over (s, phi) is kept for
-each of a few angles of wo (and, where `eval` turns with the surface, azimuths; and values of parameters that vary over
-the surface), bilinear between nodes; between two angles it is the mixture of both. What the nodes do not show is not
-lost: a share of samples follows the cosine.
+so that equal steps of s resolve a lobe of width sqrt(q0) and anything wider. A density over (s, phi) is stored for each
+of a few angles of wo (and, if `eval` depends on them, azimuths of wo and values of parameters that vary over the
+surface). It is bilinear between nodes, and a mixture of two slices between their angles. A fraction of the samples
+follows the cosine, to cover light that the nodes miss.
 
-`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly makes noise bias.
-`guide_search` finds the tables.
+`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly causes noise but no bias.
+`guide_search` computes the tables.
 """
 
 from __future__ import annotations
@@ -46,17 +45,17 @@ ALMOST_ONE = 0.99999994  # the largest float32 under 1
 
 
 class Lobe(NamedTuple):
-    """Where the light goes on one side of the surface.
+    """The distribution of light on one side of the surface.
 
-    across   whether that is the side where wo is not
-    chart    "half", "normal" or "centre"
+    across   whether it is the side opposite to wo
+    chart    "half", "normal" or "center"
     q_max    largest q of the chart: 2 about the normal, else 4
-    full     whether azimuths run all round, from the tangent; else from wo's azimuth, and both halves are alike
-    density  over (s, phi), by slice: 1 over all s and phi
-    below    its integral over phi up to each node, by slice and node of s
-    rows     its integral over s and phi up to each node of s, by slice
+    full     whether azimuths cover the full circle from the tangent; else from wo's azimuth, with symmetric halves
+    density  over (s, phi), per slice: its integral over s and phi is 1
+    below    its integral over phi up to each node, per slice and node of s
+    rows     its integral over s and phi up to each node of s, per slice
     scales   q0 and 1 / log(1 + q_max / q0)
-    centres  sine and cosine of the centre's angle to the normal, by slice: positive on wo's side
+    centers  sine and cosine of the center's angle to the normal, per slice: positive on wo's side
     """
 
     across: bool
@@ -67,26 +66,26 @@ class Lobe(NamedTuple):
     below: Table
     rows: Table
     scales: Table
-    centres: Table
+    centers: Table
 
     def axis(self, place: Place) -> tuple[Scalar, Scalar]:
         """Sine and cosine of the angle between the chart's axis and the normal, in the plane of wo."""
-        if self.chart != "centre":
+        if self.chart != "center":
             return ops.zeros_like(place.weights[0]), ops.ones_like(place.weights[0])
         x: Array = 0.0
         z: Array = 0.0
         for index, weight in zip(place.slices, place.weights, strict=True):
-            sine, cosine = fetch(self.centres, index)
+            sine, cosine = fetch(self.centers, index)
             x, z = x + weight * sine, z + weight * cosine
         scale = ops.rsqrt(maximum(x * x + z * z, 1e-12))
         return x * scale, z * scale
 
     def chart_of(self, place: Place, wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
-        """(s, phi, dw / (ds dphi) of wi) of a direction above the surface, wo in the plane of x."""
+        """(s, phi, dw / (ds dphi) at wi) of a direction above the surface, wo in the plane of x."""
         v = half_vector(wo, wi) if self.chart == "half" else wi
         sine, cosine = self.axis(place)
         x, z = cosine * v.x - sine * v.z, sine * v.x + cosine * v.z
-        # 2 (1 - z), which would cancel near the axis
+        # 2 (1 - z), in a form that does not cancel near the axis
         q = where(z > 0.5, 2.0 * (x * x + v.y * v.y) / (1.0 + z), 2.0 * (1.0 - z))
         q0, scale = fetch(self.scales, ops.zeros_like(z))
         jacobian = 0.5 * (q + q0) / scale
@@ -100,7 +99,7 @@ class Lobe(NamedTuple):
         return ops.log(1.0 + q / q0) * scale, phi, jacobian
 
     def direction(self, place: Place, wo: Direction, s: Scalar, phi: Scalar) -> Direction:
-        """The direction at (s, phi), wo in the plane of x; it may lie under the surface."""
+        """The direction at (s, phi), wo in the plane of x; it may lie below the surface."""
         q0, scale = fetch(self.scales, ops.zeros_like(s))
         q = minimum(q0 * (ops.exp(s / scale) - 1.0), self.q_max)
         radius, (sin_phi, cos_phi) = safe_sqrt(q * (1.0 - 0.25 * q)), sincos(phi)
@@ -111,7 +110,7 @@ class Lobe(NamedTuple):
 
     @property
     def span(self) -> float:
-        """Length of the axis of the azimuth."""
+        """Length of the azimuth axis."""
         return 2.0 * ops.pi if self.full else ops.pi
 
     def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:
@@ -126,7 +125,7 @@ class Lobe(NamedTuple):
 
     @function
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
-        """(s, phi) with the density of a slice: first s, by the integrals over phi, then phi at that s."""
+        """(s, phi) with the density of a slice: first s, from the integrals over phi, then phi at that s."""
         _, rows, columns = self.density.shape
 
         def row_below(row: Scalar) -> Scalar:
@@ -154,17 +153,17 @@ class Lobe(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Which slices a ray's density is mixed from, with what weights."""
+    """The slices from which a ray's density is mixed, with their weights."""
 
     slices: tuple[Scalar, ...]
     weights: tuple[Scalar, ...]
 
 
 class Axis(NamedTuple):
-    """A direction along which slices are laid: a parameter that varies over the surface.
+    """An axis of slices: a parameter that varies over the surface.
 
-    read    its value of a bound material, as a place from 0 to 1
-    slices  along it
+    read    its value in a bound material, as a position from 0 to 1
+    slices  number of slices along it
     """
 
     read: Callable[[object], Scalar]
@@ -172,17 +171,17 @@ class Axis(NamedTuple):
 
 
 class Guide(NamedTuple):
-    """What a material is sampled by.
+    """The sampling tables of a material.
 
-    lobes      on wo's side, across, or both; none where nothing is scattered
-    angles     how many angles of wo there are slices of, from the normal to the horizon
-    azimuths   how many azimuths of wo; 1 where `eval` does not turn with the surface
-    behind     whether slices of wo below the surface follow those of wo above; else both are alike
+    lobes      on wo's side, on the opposite side, or both; empty if nothing is scattered
+    angles     number of slices over the angle of wo, from the normal to the horizon
+    azimuths   number of slices over the azimuth of wo; 1 if `eval` is invariant under rotation
+    behind     whether slices for wo below the surface follow those for wo above; else both are equal
     above      whether anything is scattered toward a wo above the surface
-    below      and below
+    below      likewise below the surface
     axes       parameters that vary
-    shares     by slice: the share of the lobe across
-    cosine     share of samples that follow the cosine
+    shares     per slice: the fraction of the lobe on the opposite side
+    cosine     fraction of samples that follow the cosine
     """
 
     lobes: tuple[Lobe, ...]
@@ -197,7 +196,7 @@ class Guide(NamedTuple):
 
     def pdf(self, material: object, wo: Direction, wi: Direction) -> Scalar:
         """Density of `sample`, 1/sr."""
-        visible = self._seen(wo)
+        visible = self._scattered(wo)
         crosses = wo.z * wi.z < 0.0
         if not self.lobes:
             return where(visible & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
@@ -208,8 +207,8 @@ class Guide(NamedTuple):
         density: Array = ops.zeros_like(wo.z)
         for lobe in self.lobes:
             on_side = crosses if lobe.across else ~crosses
-            local = _turned(_above(wi), turn)
-            s, phi, jacobian = lobe.chart_of(place, _turned(above, turn), local)
+            local = _in_azimuth(_above(wi), turn)
+            s, phi, jacobian = lobe.chart_of(place, _in_azimuth(above, turn), local)
             here: Array = 0.0
             for index, weight in zip(place.slices, place.weights, strict=True):
                 here = here + self._share(lobe, index) * weight * lobe.at(index, s, phi)
@@ -220,7 +219,7 @@ class Guide(NamedTuple):
         return where(visible & (wi.z != 0.0), density, 0.0)
 
     def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
-        """A direction; u1 picks the slice and the side. It may lie on a side where nothing is: its pdf is 0 then."""
+        """A direction; u1 selects the slice and the side. On a side without scattering its pdf is 0."""
         broad = square_to_cosine_hemisphere(u.y, u.z)
         facing = where(wo.z < 0.0, -1.0, 1.0)
         if not self.lobes:
@@ -234,34 +233,34 @@ class Guide(NamedTuple):
         crosses = left < where(by_cosine, 0.5, fetch(self.shares, index)[0])
         chosen: Direction | None = None
         for lobe in self.lobes:
-            # both halves of the azimuth are alike: u2 picks one and is stretched
+            # both halves of the azimuth are equal: u2 selects one and is rescaled
             second = u.z if lobe.full else minimum(ops.abs(2.0 * u.z - 1.0), ALMOST_ONE)
             s, phi = lobe.draw(index, u.y, second)
             if not lobe.full:
                 phi = where(u.z < 0.5, -phi, phi)
-            w = lobe.direction(place, _turned(above, turn), s, phi)
-            # a direction under the surface, which the other side's lobe may hold too, becomes a failed sample: z = 0
+            w = lobe.direction(place, _in_azimuth(above, turn), s, phi)
+            # a direction below the surface, which the other side's lobe may contain too, becomes a failed sample: z = 0
             flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
             w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, ops.zeros_like(w.z)))
-            w = _turned(w, vec3(turn.x, -turn.y, turn.z))
+            w = _in_azimuth(w, vec3(turn.x, -turn.y, turn.z))
             w = where(by_cosine, broad, w)
             w = vec3(w.x, w.y, w.z * (-facing if lobe.across else facing))
             chosen = w if chosen is None else where(crosses if lobe.across else ~crosses, w, chosen)
         assert chosen is not None
         return chosen
 
-    def _seen(self, wo: Direction) -> Mask:
+    def _scattered(self, wo: Direction) -> Mask:
         if self.above and self.below:
             return wo.z != 0.0
         return wo.z > 0.0 if self.above else wo.z < 0.0
 
     def _share(self, lobe: Lobe, index: Scalar) -> Scalar:
-        """Of a slice's samples, those of this lobe."""
+        """The fraction of a slice's samples in this lobe."""
         (across,) = fetch(self.shares, index)
         return across if lobe.across else 1.0 - across
 
     def _turn(self, wo: Direction) -> Direction:
-        """(cos, sin, 0) of the azimuth that charts count from: wo's, or the tangent's where `eval` turns with it."""
+        """(cos, sin, 0) of the azimuth where charts start: wo's, or the tangent's if `eval` depends on the azimuth."""
         zero = ops.zeros_like(wo.z)
         if self.azimuths > 1:
             return vec3(1.0 + zero, zero, zero)
@@ -271,7 +270,7 @@ class Guide(NamedTuple):
         return vec3(where(at_pole, 1.0, wo.x * scale), where(at_pole, 0.0, wo.y * scale), zero)
 
     def _place(self, material: object, wo: Direction) -> Place:
-        """The slices on both sides of wo's angle, and of every other axis."""
+        """The slices adjacent to wo's angle and to the position on every other axis."""
         cos = ops.abs(wo.z)
         angle = ops.atan2(safe_sqrt(1.0 - cos * cos), cos) * (2.0 * inv_pi)
         ways = [_cell(angle * (self.angles - 1.0), self.angles)]
@@ -305,14 +304,14 @@ def _above(w: Direction) -> Direction:
     return vec3(w.x, w.y, ops.abs(w.z))
 
 
-def _turned(w: Direction, turn: Direction) -> Direction:
-    """w in axes turned by an azimuth of (cos, sin, 0)."""
+def _in_azimuth(w: Direction, turn: Direction) -> Direction:
+    """w in axes rotated by an azimuth given as (cos, sin, 0)."""
     along, across = turn.x * w.x + turn.y * w.y, turn.x * w.y - turn.y * w.x
     return vec3(along, across, w.z)
 
 
 def _cell(at: Scalar, count: int) -> tuple[Scalar, Scalar]:
-    """(node below, share of the way to the next) of a place among `count` nodes 0, 1, ..."""
+    """(node below, fraction of the way to the next) of a position among `count` nodes 0, 1, ..."""
     at = ops.clamp(at, 0.0, count - 1.0)
     cell = minimum(ops.floor(at), count - 2.0)
     return cell, at - cell
@@ -323,7 +322,7 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
 
 
 def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
-    """The last but one node at most, up to which there is no more than u."""
+    """The last node, at most the second-last of all, with `below` at most u."""
     node: Array = ops.zeros_like(u)
     step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
     while step:
@@ -336,13 +335,13 @@ def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
 
 @function
 def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """Share of a cell of width 1 below which lies `area` of a density that goes linearly from low to high."""
+    """Fraction of a cell of width 1 that contains `area` of a density linear from low to high."""
     root = safe_sqrt(low * low + 2.0 * (high - low) * area)
     return ops.clamp(ops.safe_div(2.0 * area, low + root), 0.0, 1.0)
 
 
 def _pick(place: Place, u: Scalar) -> tuple[Scalar, Scalar]:
-    """A slice by its weight, and what is left of u, in [0, 1)."""
+    """A slice selected by its weight, and the rescaled u, in [0, 1)."""
     index, start, width = place.slices[0], ops.zeros_like(u), place.weights[0]
     below: Array = place.weights[0]
     for other, weight in zip(place.slices[1:], place.weights[1:], strict=True):

@@ -1,4 +1,4 @@
-"""How a material polarizes: the light that single smooth facets have reflected or refracted."""
+"""The polarization of a material: light that single smooth facets have reflected or refracted."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ..optics.fresnel.polarization import Diattenuation
 
 
 class Polarized(NamedTuple):
-    """A part of what a material sends from one direction to another, whose polarization is known.
+    """A part of the light scattered from one direction to another, with known polarization.
 
-    value    how much: its part of `eval`, or of a delta lobe's weight
-    normal   of the facets that it met, in the local frame, either side
-    matrix   the Mueller matrix of such a facet, in the plane of incidence, over its first entry
+    value    its contribution to `eval`, or to a delta lobe's weight
+    normal   of the scattering facets, in the local frame, either side
+    matrix   the Mueller matrix of such a facet, in the plane of incidence, divided by its first entry
     """
 
     value: Spectrum
@@ -21,5 +21,5 @@ class Polarized(NamedTuple):
     matrix: Diattenuation[Spectrum] | Diattenuation[Scalar]
 
     def times(self, factor: Scalar) -> Polarized:
-        """The part of a material that has this share."""
+        """This part scaled by the fraction of its material in a mixture."""
         return self._replace(value=self.value * factor)

@@ -1,4 +1,4 @@
-"""A material on symbols: the same methods leave a typed graph (`gonio.ops.graph`), from which shaders are written."""
+"""Recordings of materials: the methods run on symbols and produce a typed graph, from which shaders are written."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ M = TypeVar("M", bound=Material)
 
 
 def symbols(material: M, without: Iterable[str] = ()) -> M:
-    """A copy bound to symbols, one for each numeric parameter; an angle that is the plain number 0 is none.
+    """A copy bound to symbols, one per numeric parameter; an angle given as the plain number 0 has none.
 
-    without  paths of parameters that are off (`switched_off`) and stay plain numbers: code is left out by them
+    without  paths of parameters that are off (`switched_off`) and remain plain numbers, so that code is omitted
     """
     bound = binding.bind(material, lambda parameter, value: parameter.symbol(value))
     for path in without:
@@ -26,7 +26,7 @@ def symbols(material: M, without: Iterable[str] = ()) -> M:
 
 
 def switched_off(material: Material) -> list[str]:
-    """Paths of the parameters whose value says that what they weigh is not there."""
+    """Paths of the parameters at whose values the weighted components vanish."""
     return [leaf.path for leaf in tree.leaves(material) if leaf.parameter.is_off(leaf.value)]
 
 

@@ -1,4 +1,4 @@
-"""What `sample` returns."""
+"""The result of `sample`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .. import ops
 from ..ops import Direction, Mask, Scalar, Spectrum
 
-if TYPE_CHECKING:  # Python's own has defaults since 3.13
+if TYPE_CHECKING:  # typing.TypeVar has defaults since Python 3.13
     from typing_extensions import TypeVar
 
     D = TypeVar("D", default=Direction)
@@ -24,11 +24,11 @@ else:
 
 
 class Sample(NamedTuple, Generic[D, C, N, B]):
-    """A direction and what it carries; inside a material plain `Sample`, for callers of what they hand in.
+    """A sampled direction with its weight; inside a material plain `Sample`, for callers typed by their arguments.
 
-    wi      direction chosen, unit
-    weight  eval / pdf; of a delta lobe, its reflectance over its probability; 0 where sampling failed
-    pdf     density of wi, 1/sr; of a delta lobe, its discrete probability; 0 where sampling failed
+    wi      sampled direction, unit
+    weight  eval / pdf; for a delta lobe, its reflectance over its probability; 0 where sampling failed
+    pdf     density of wi, 1/sr; for a delta lobe, its discrete probability; 0 where sampling failed
     delta   whether wi was chosen from a delta lobe
     eta     index on wi's side over index on wo's side: 1 for reflection
 
@@ -43,7 +43,7 @@ class Sample(NamedTuple, Generic[D, C, N, B]):
 
     @staticmethod
     def of_density(wi: Direction, weight: Spectrum, pdf: Scalar) -> Sample:
-        """A reflection drawn from a finite density: no lane is a delta lobe, eta is 1."""
+        """A reflection sampled from a finite density: no lane is a delta lobe, eta is 1."""
         return Sample(wi, weight, pdf, never(pdf), ops.ones_like(pdf))
 
 
@@ -53,4 +53,4 @@ def never(like: Scalar) -> Mask:
 
 
 Floats: TypeAlias = "NDArray[np.floating]"
-SampleArrays: TypeAlias = "Sample[Floats, Floats, Floats, NDArray[np.bool_]]"  # what callers with NumPy arrays get
+SampleArrays: TypeAlias = "Sample[Floats, Floats, Floats, NDArray[np.bool_]]"  # the result for NumPy arguments

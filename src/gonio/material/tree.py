@@ -1,9 +1,9 @@
-"""A material is a tree, as parameters may hold materials: how to walk it, read it by path, and change it.
+"""The tree of materials, since parameters may hold materials: traversal, access by path, and replacement.
 
     for path, parameter, value, owner in leaves(material): ...      "alpha", "base.alpha", "base.a.albedo"
     rougher = replace(material, {"base.alpha": 0.4})
 
-Works on materials as they were made and on bound ones alike.
+Works on bound and unbound materials.
 """
 
 from __future__ import annotations
@@ -36,28 +36,28 @@ MAX_MATERIALS = 64  # materials in a tree: its formula then takes about a second
 
 
 def count(material: Material) -> int:
-    """How many materials a tree holds, itself among them. InputError where these are more than MOST."""
+    """The number of materials in a tree, the root included. Raises InputError for more than `MAX_MATERIALS`."""
     total = 1 + sum(inner._count for inner in children(material).values())
     if total > MAX_MATERIALS:
-        what = f"{total} materials inside each other, {MAX_MATERIALS} at most are expected"
+        what = f"{total} nested materials, at most {MAX_MATERIALS} expected"
         raise InputError(what, type(material).__name__, "mix fewer materials")
     return total
 
 
 def children(material: M) -> dict[str, M]:
-    """The materials that a material holds, by the parameter's name."""
+    """The inner materials of a material, by parameter name."""
     return {name: getattr(material, name) for name, p in material.parameters().items() if p.inner}
 
 
 def walk(material: M, path: str = "") -> Iterator[tuple[str, M]]:
-    """Every material in the tree with its path, itself ("") first: "base", "base.a"."""
+    """Every material in the tree with its path, the root ("") first: "base", "base.a"."""
     yield path, material
     for name, inner in children(material).items():
         yield from walk(inner, join(path, name))
 
 
 def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
-    """Every parameter that holds no material, here and in inner materials, in order of declaration."""
+    """Every parameter that does not hold a material, inner materials' included, in order of declaration."""
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
         if parameter.inner:
@@ -67,7 +67,7 @@ def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
 
 
 def surface(material: M) -> Iterator[Leaf[M]]:
-    """Those of `leaves` that the surface depends on."""
+    """The `leaves` on which the surface depends."""
     return (leaf for leaf in leaves(material) if not leaf.parameter.inside)
 
 
@@ -77,7 +77,7 @@ def join(path: str, name: str) -> str:
 
 
 def value_at(material: Material, path: str) -> Value:
-    """What stands at a path; InputError where there is nothing."""
+    """The value at a path; raises InputError if there is none."""
     value: Value = material
     for name in path.split("."):
         value = getattr(value, _known(value, name, path))
@@ -85,7 +85,7 @@ def value_at(material: Material, path: str) -> Value:
 
 
 def replace(material: M, values: Mapping[str, object], location: str = "replace") -> M:
-    """The material with other values, or other inner materials, at some paths; InputError for what cannot be."""
+    """The material with values or inner materials at some paths replaced; raises InputError for invalid ones."""
     own: dict[str, Value] = {}
     below: dict[str, dict[str, object]] = {}
     for path, value in values.items():
@@ -101,12 +101,12 @@ def replace(material: M, values: Mapping[str, object], location: str = "replace"
 
 
 def rebuild(material: M, values: Mapping[str, object]) -> M:
-    """The material made anew, and so checked, with other values of its own parameters."""
+    """A new material, hence checked, with some of its own parameters replaced."""
     return type(material)(**{**{name: getattr(material, name) for name in material.parameters()}, **values})
 
 
 def map_leaves(material: M, change: Callable[[Parameter, object], object]) -> M:
-    """The material made anew with what `change(parameter, value)` makes of every leaf."""
+    """A new material with `change(parameter, value)` for every leaf."""
     values = {
         name: map_leaves(getattr(material, name), change) if p.inner else change(p, getattr(material, name))
         for name, p in material.parameters().items()
@@ -123,5 +123,5 @@ def _known(material: Material, name: str, location: str) -> str:
 
 
 def rebuild_from(cls: type[M], values: Mapping[str, object]) -> M:
-    """A material of a class and its values: how a pickled one comes back."""
+    """A material from its class and values, as unpickling calls it."""
     return cls(**values)

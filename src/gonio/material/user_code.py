@@ -1,7 +1,7 @@
-"""Python files of the user's own: FILE.py:NAME, which is code.
+"""Python files of the user: FILE.py:NAME, which is code.
 
-A file runs only where the user named it, or allowed a scene to: on the command line, in a program, in another such
-file, and in scenes where code is allowed.
+A file runs only if the user named it or allowed a scene to name it: on the command line, in a program, in another such
+file, and in scenes for which code is allowed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import ast
 import hashlib
 import importlib.util
 import inspect
+import os
 import re
 import sys
 import traceback
@@ -21,7 +22,7 @@ from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 
 _CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w+)")
-PREFIX = "gonio_file_"  # of the names under which such modules stand in sys.modules
+PREFIX = "gonio_file_"  # of such modules' names in sys.modules
 
 Stamp = tuple[int, int]
 _loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
@@ -35,19 +36,19 @@ def names_code(text: str) -> bool:
 def member(
     text: str, folder: Path | None = None, where: str = "MODEL", family: members.Family[Any] | None = None
 ) -> str:
-    """The name of what FILE.py:NAME names: a distribution, a masking term or another member, which is registered.
+    """The name of the member that FILE.py:NAME refers to, a distribution, a masking term etc.; it is registered.
 
-    family  what it must be a member of; InputError for another's
+    family  the family it must belong to, else InputError
     """
     named = thing(text, folder, where)
     return _added(named, place_of(named), family)
 
 
 def member_name(value: object, where: str, family: members.Family[Any] | None = None) -> object:
-    """The name of a member that a program hands over: a class of a family or an instance of one, which is registered,
-    or FILE.py:NAME, from the folder of the file that says so. Whatever else is given is returned as it stands.
+    """The name of a member given by a program: a class of a family or an instance of one, which is registered, or
+    FILE.py:NAME, relative to the file of the calling line. Any other value is returned unchanged.
 
-    A text runs code only where a program's own line calls Gonio with it: not from scenes, pages or documents.
+    A text runs code only if a program's own line calls Gonio with it: not from scenes, pages or documents.
     """
     if isinstance(value, str):
         folder = _folder_of_caller() if names_code(value) else None
@@ -64,15 +65,15 @@ def _added(named: object, where: str, family: members.Family[Any] | None) -> str
 
 
 def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object:
-    """What FILE.py:NAME names: a class, or an instance of a distribution, a masking term or another member.
+    """The object that FILE.py:NAME refers to: a class, or an instance of a distribution, a masking term etc.
 
-    folder  what a relative path starts from; the current folder if not given
+    folder  the base of a relative path; by default the current folder
     """
     match = _CODE.fullmatch(text.strip())
     if match is None:
         raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
     try:
-        path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
+        path = ((folder or Path()) / Path(os.path.expanduser(match["file"]))).resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
         raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
     module, name = module_of(path, where), match["name"]
@@ -83,12 +84,17 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object
     return named
 
 
-_CONSTRUCTING = ("gonio.material.bsdf", "gonio.material.parameters", __name__)  # who a constructor's call goes through
+_CONSTRUCTING = (
+    "gonio.material.bsdf",
+    "gonio.material.kinds",
+    "gonio.material.parameters",
+    __name__,
+)  # in constructors' stacks
 
 
 def _folder_of_caller() -> Path | None:
-    """The folder of the file whose line called the constructor of a material, or declared a parameter; the current one
-    at a prompt. None where that is a line of Gonio's, which hands on what a scene or a page says."""
+    """The folder of the file whose line called a material's constructor or declared a parameter; the current folder at
+    a prompt. None if that line is Gonio's own, which passes on a scene's or page's text."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         code, module = frame.f_code, str(frame.f_globals.get("__name__", ""))
@@ -103,19 +109,19 @@ def _folder_of_caller() -> Path | None:
 
 
 def files_in(text: str) -> list[Path]:
-    """The files that a material's text names, those of inner materials and members too."""
+    """The files that a material's text names, for inner materials and members too."""
     return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w+", text)]
 
 
 def with_imports(path: Path) -> list[Path]:
-    """A Python file, and those beside it that it imports, and so on: what it says depends on all of them."""
-    found: dict[Path, None] = {}
+    """A Python file and the local files that it imports, recursively: its meaning depends on all of them."""
+    files: dict[Path, None] = {}
     waiting = [path]
     while waiting:
         file = waiting.pop()
-        if file in found:
+        if file in files:
             continue
-        found[file] = None
+        files[file] = None
         try:
             nodes = list(ast.walk(ast.parse(file.read_bytes())))
         except (OSError, SyntaxError, ValueError):
@@ -123,23 +129,23 @@ def with_imports(path: Path) -> list[Path]:
         names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
         names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
         for first in {name.partition(".")[0] for name in names}:
-            # "" is `from . import`: all of the package
+            # "" is `from . import`: the entire package
             package = path.parent / first if first else file.parent
-            beside = [
+            local = [
                 path.parent / f"{first}.py",
                 *(package.rglob("*.py") if (package / "__init__.py").is_file() else []),
             ]
-            waiting += [one for one in beside if one.is_file()]
-    return list(found)
+            waiting += [one for one in local if one.is_file()]
+    return list(files)
 
 
 def forget() -> None:
-    """Run files anew when they are asked for next, also those that did not change: what they import may have."""
+    """Run all files again on their next use, even unchanged ones, since their imports may have changed."""
     _loaded.clear()
 
 
 def is_outside(cls: type) -> bool:
-    """Whether a class came from a file that `load` ran."""
+    """Whether a class comes from a file that `load` ran."""
     return cls.__module__.startswith(PREFIX)
 
 
@@ -147,7 +153,7 @@ def is_outside(cls: type) -> bool:
 
 
 def module_of(path: Path, where: str) -> ModuleType:
-    """The file's module, run where it has not been since it was saved."""
+    """The file's module; the file is run if it has changed since its last run."""
     try:
         about = path.stat()
         source = path.read_bytes() if path.is_file() else None
@@ -163,8 +169,8 @@ def module_of(path: Path, where: str) -> ModuleType:
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     before = sys.modules.get(name)
-    sys.modules[name] = module  # dataclasses and pickles look a class's module up
-    sys.path.insert(0, str(path.parent))  # a file may import its neighbours
+    sys.modules[name] = module  # dataclasses and pickle look up the module of a class
+    sys.path.insert(0, str(path.parent))  # a file may import modules from its folder
     try:
         exec(compile(source, str(path), "exec"), vars(module))
     except (KeyboardInterrupt, GeneratorExit):
@@ -181,11 +187,11 @@ def module_of(path: Path, where: str) -> ModuleType:
 
 
 def _located(error: BaseException, path: Path) -> GonioError:
-    """What went wrong while a file ran, with file and line."""
+    """The error raised while a file ran, with file and line."""
     if isinstance(error, SyntaxError) and error.filename:
         text = f": {error.text.strip()}" if error.text else ""
         return InputError(
-            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "mend the line"
+            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "correct the line"
         )
     place = line_in(error, path) or str(path)
     if isinstance(error, GonioError):
@@ -195,13 +201,13 @@ def _located(error: BaseException, path: Path) -> GonioError:
 
 
 def line_in(error: BaseException, path: Path) -> str:
-    """file:line of the innermost call in a file, "" where there is none."""
+    """file:line of the innermost frame in a file, "" if there is none."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
     return f"{path}:{frames[-1].lineno}" if frames else ""
 
 
 def place_of(thing: object) -> str:
-    """FILE:LINE of a class, or of that of an instance; what is known of it."""
+    """FILE:LINE of a class, or of an instance's class, as far as known."""
     cls = thing if isinstance(thing, type) else type(thing)
     try:
         file = inspect.getsourcefile(cls)

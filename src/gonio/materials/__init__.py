@@ -1,1 +1,1 @@
-"""Every material, one file each, in folders by kind; a new one is one new file in any of them."""
+"""All materials, one file each, in folders by kind; to add one, add a file to any folder."""

@@ -1,7 +1,7 @@
-"""Measured materials: their files (`formats`), their tables (`tables`), and the material that a table is (`materials`).
+"""Measured materials: files (`formats`), tables (`tables`) and smaller tables (`compression`).
 
-table = read("gold.binary")                  a table of one kind, with what is known of it
-compare.convert("gold.binary", "gold.bsdf").error    in another format, and how far off that is
+table = read("gold.binary")                  a table of one kind, with its metadata
+compare.convert("gold.binary", "gold.bsdf").error    converted to another format, with the error
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from .formats.base import Format, by_suffix, contents
 from .tables.base import Measurement
 
 _read: dict[tuple[str, str], tuple[tuple[int, int], Measurement]] = {}
-SAMPLE = "sample"  # names the small table that comes with Gonio, made by docs/make_sample_table.py
-KEPT = 8  # tables in memory, the last that were asked for
+SAMPLE = "sample"  # names the small table shipped with Gonio, made by docs/make_sample_table.py
+CACHED = 8  # tables in memory, the most recently used
 
 
 def suffixes() -> list[str]:
@@ -24,7 +24,7 @@ def suffixes() -> list[str]:
 
 
 def parted(file: str) -> tuple[str, str]:
-    """File and item of "FILE" or "FILE:ITEM", as files that hold several materials are named."""
+    """File and item of "FILE" or "FILE:ITEM", for files that hold several materials."""
     path, colon, item = file.rpartition(":")
     return (path, item) if colon and by_suffix(path) and not by_suffix(file) else (file, "")
 
@@ -32,33 +32,34 @@ def parted(file: str) -> tuple[str, str]:
 def names_table(text: str) -> bool:
     """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome".
 
-    Of a format whose files hold several materials, only with one of them: a .npz alone may be anything.
+    For a format with several materials per file, an item is required: a plain .npz may contain anything.
     """
     path, item = parted(text)
-    found = by_suffix(path)
-    return bool(found) and (bool(item) or not found[0].several)
+    formats = by_suffix(path)
+    return bool(formats) and (bool(item) or not formats[0].several)
 
 
 def format_of(path: Path, data: bytes | None = None) -> Format:
-    """The format of a file, by its suffix, and by its contents where formats share one; InputError where none fits.
+    """The format of a file, by its suffix, and by its contents if formats share the suffix; raises InputError if none
+    fits.
 
-    data  None: the file is to be written
+    data  None if the file is to be written
     """
-    found = by_suffix(path)
-    if not found:
+    formats = by_suffix(path)
+    if not formats:
         hint = did_you_mean(path.suffix, suffixes())
-        raise InputError(f"'{path.suffix}' is no format of measurements", str(path), hint)
-    return next((one for one in found if data is not None and one.fits(data)), found[0])
+        raise InputError(f"'{path.suffix}' is not a format of measurements", str(path), hint)
+    return next((one for one in formats if data is not None and one.fits(data)), formats[0])
 
 
 def read(file: str | os.PathLike[str]) -> Measurement:
-    """The table in a file, read once for each state in which it was saved.
+    """The table in a file, read once per saved version.
 
-    file  a path, behind a colon the item where the file holds several materials
-    Raises InputError for what is missing, damaged, or of no known format.
+    file  a path, followed by :ITEM if the file holds several materials
+    Raises InputError for files that are missing, damaged, or of unknown format.
     """
     text, item = parted(os.fspath(file))
-    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(text).expanduser()
+    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(os.path.expanduser(text))
     format_of(path)
     try:
         about = path.stat()
@@ -70,6 +71,6 @@ def read(file: str | os.PathLike[str]) -> Measurement:
         data = contents(path)
         known = stamp, format_of(path, data).read(data, str(path), item)
     _read[key] = known
-    while len(_read) > KEPT:
+    while len(_read) > CACHED:
         _read.pop(next(iter(_read)))
     return known[1]

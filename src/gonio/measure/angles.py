@@ -1,4 +1,4 @@
-"""The angles that tables are stored over, found so that they hold near the normal and near grazing alike."""
+"""The angles over which tables are stored, computed accurately near the normal and near grazing."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def between(wo: Direction, wi: Direction) -> Scalar:
 
 @function
 def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
-    """theta_h, theta_d and phi_d of a pair (Rusinkiewicz1998), wi being the one that phi_d is of; phi_d in (-pi, pi].
+    """theta_h, theta_d and phi_d of a pair (Rusinkiewicz1998), phi_d of wi, in (-pi, pi].
 
-    sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2, which no cancellation touches. Turned so that the half
-    vector lies above x, half the difference wi - wo is the direction that phi_d is the azimuth of.
+    sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2, without cancellation. In the frame with the half vector
+    above x, phi_d is the azimuth of wi - wo.
     """
     flat, length, along, side = _half_frame(wo, wi)
     theta_h = ops.atan2(flat, wo.z + wi.z)
@@ -47,7 +47,7 @@ def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scala
 
 @function
 def half_difference_vectors(wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
-    """The half vector, turned above x, and wi as seen from there: unit vectors of the angles of `half_difference`."""
+    """The half vector, rotated above x, and wi in its frame: unit vectors with the angles of `half_difference`."""
     flat, length, along, side = _half_frame(wo, wi)
     scale = 1.0 / where(length == 0.0, 1.0, length)
     return vec3(flat * scale, 0.0 * flat, (wo.z + wi.z) * scale), vec3(0.5 * along, 0.5 * side, 0.5 * length)
@@ -55,8 +55,8 @@ def half_difference_vectors(wo: Direction, wi: Direction) -> tuple[Direction, Di
 
 @function
 def _half_frame(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """Of h = wo + wi the length along the surface and the whole; of wi - wo the parts along the first two axes of the
-    frame of h, (cos theta_h c, cos theta_h s, -sin theta_h) and (-s, c, 0)."""
+    """The length along the surface and the full length of h = wo + wi; the components of wi - wo along the first two
+    axes of the frame of h, (cos theta_h c, cos theta_h s, -sin theta_h) and (-s, c, 0)."""
     h, d = wo + wi, wi - wo
     flat = ops.safe_sqrt(sqr(h.x) + sqr(h.y))
     length = ops.safe_sqrt(dot(h, h))

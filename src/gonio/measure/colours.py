@@ -1,8 +1,8 @@
-"""From spectra to linear sRGB and back, for tables that were measured by wavelength.
+"""From spectra to linear sRGB and back, for tables measured by wavelength.
 
-A reflectance is seen under D65 by the CIE 1931 observer, whose curves are the sums of Gaussians of Wyman2013 (they err
-by 1 % of the peak at most, the white of a flat reflectance is exact by normalization). Back: the smoothest spectrum of
-a colour, a linear map, so that colour -> spectrum -> colour changes nothing.
+A reflectance is viewed under D65 by the CIE 1931 observer, in the Gaussian fits of Wyman2013 (error 1 % of the peak at
+most; the white of a flat reflectance is exact by normalization). The inverse is the smoothest spectrum of a color, a
+linear map, so that color -> spectrum -> color is the identity.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..optics.colour import D65, LUMINANCE, XYZ_TO_RGB, Floats, observer
 
 __all__ = ["D65", "LUMINANCE", "XYZ_TO_RGB", "observer", "to_rgb", "to_spectrum"]
 
-STEPS = 4  # points between two wavelengths, over which what was measured is taken as linear
+STEPS = 4  # points between two wavelengths, over which measured values are interpolated linearly
 
 
 @lru_cache
@@ -25,23 +25,23 @@ def _to_rgb(wavelengths: tuple[float, ...]) -> Floats:
     if len(nm) == 1:
         return np.ones((1, 3))
     fine = np.unique(np.concatenate([np.linspace(a, b, STEPS + 1) for a, b in pairwise(nm)]))
-    hats = np.stack([np.interp(fine, nm, row) for row in np.eye(len(nm))])  # what one measured value stands for
+    hats = np.stack([np.interp(fine, nm, row) for row in np.eye(len(nm))])  # the basis function of one measured value
     light = np.interp(fine, np.arange(380.0, 781.0, 10.0), D65, left=0.0, right=0.0)
     width = np.gradient(fine)
     rgb = hats @ (observer(fine) * light * width).T @ XYZ_TO_RGB.T
     total = rgb.sum(axis=0)
-    if np.any(np.abs(total) < 1e-3 * np.abs(rgb).sum(axis=0).max()):  # too few wavelengths to tell a colour
+    if np.any(np.abs(total) < 1e-3 * np.abs(rgb).sum(axis=0).max()):  # too few wavelengths to determine a color
         return np.full((len(nm), 3), 1.0 / len(nm))
     return rgb / total
 
 
 def to_rgb(wavelengths: Floats) -> Floats:
-    """The matrix (N, 3) that turns values at increasing wavelengths [nm] into linear sRGB; flat ones give grey."""
+    """The matrix (N, 3) from values at increasing wavelengths [nm] to linear sRGB; flat values give gray."""
     return _to_rgb(tuple(map(float, wavelengths)))
 
 
 def to_spectrum(wavelengths: Floats) -> Floats:
-    """The matrix (3, N) that turns linear sRGB into the smoothest values at these wavelengths which look that way."""
+    """The matrix (3, N) from linear sRGB to the smoothest values at these wavelengths with that color."""
     weights = to_rgb(wavelengths)
     count = len(weights)
     if np.linalg.matrix_rank(weights) < 3:

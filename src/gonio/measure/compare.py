@@ -1,4 +1,4 @@
-"""How far two tables lie apart, and a table in another format."""
+"""The difference between two tables, and conversion to another format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .tables.base import Floats, Measurement
 PAIRS = 1 << 16
 ROUNDS = 16
 SURE = 0.03
-GRAZING = 0.03  # least cosine of view: within 1.7 degrees of the horizon every format extrapolates
+GRAZING = 0.03  # smallest cosine of view: within 1.7 degrees of the horizon every format extrapolates
 
 
 class Comparable(Protocol):
@@ -38,18 +38,18 @@ class Comparable(Protocol):
 def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: int = 1) -> float:
     """E |other - table| / E |table| of f cos theta_i, over views of even cosine and all light, mean of the channels.
 
-    The pairs are drawn by both tables' densities and by the cosine, a third each, so that narrow lobes count for what
-    they carry; each is weighed by the inverse of the mixture's density. Rounds of `pairs` go on until the figure's
-    standard error is under `SURE` of it, or `ROUNDS` are done: a spike that no density follows takes many.
+    The pairs are sampled by both tables' densities and by the cosine, a third each, so that narrow lobes count by their
+    energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the standard error
+    of the result is below `SURE` of it, or `ROUNDS` are done: a spike outside every density requires many.
     """
     rng = np.random.default_rng([seed, 83])
-    sums, squares, whole = 0.0, 0.0, 0.0
+    sums, squares, total = 0.0, 0.0, 0.0
     for _ in range(ROUNDS):
         off, size = _round(table, other, pairs, rng)
-        sums, squares, whole = sums + float(off.sum()), squares + float((off * off).sum()), whole + float(size.sum())
+        sums, squares, total = sums + float(off.sum()), squares + float((off * off).sum()), total + float(size.sum())
         if squares <= (SURE * sums) ** 2 or not np.isfinite(sums):
             break
-    return sums / whole if whole > 0.0 else 0.0
+    return sums / total if total > 0.0 else 0.0
 
 
 def _round(
@@ -67,8 +67,8 @@ def _round(
     for index, one in enumerate((table, other), 1):
         drawn, _ = one.draw(*(backend.vector_of(v[third == index], 3, types) for v in (wo, u)))
         wi[third == index] = backend.to_numpy(drawn, int((third == index).sum()))
-    kept = wi[:, 2] > 1e-6
-    wo, wi = wo[kept], wi[kept]
+    upper = wi[:, 2] > 1e-6
+    wo, wi = wo[upper], wi[upper]
     density = wi[:, 2] / np.pi
     for one in (table, other):
         density = density + backend.to_numpy(
@@ -83,9 +83,9 @@ class Converted:
     """A table in another format.
 
     path       the file
-    kind       of table in it
-    resampled  whether its values were found by evaluating the other; else they are the same numbers
-    error      how far it lies from the source, see `difference`
+    kind       of the table in it
+    resampled  whether its values were computed by evaluating the source; otherwise the numbers are the same
+    error      its distance from the source, see `difference`
     size       bytes
     resolution, reciprocity  how far the file lies from the source's reciprocal part, and that from the source: what
                cells lose, and what a format loses that holds one value for a pair and its exchange; these overlap
@@ -104,7 +104,7 @@ class Converted:
 
 
 class ReciprocalPart:
-    """A table with one value f for a pair and its exchange, by least squares of both (as `half_difference.sampled`)."""
+    """A table with one value f per pair and its exchange: least squares of both, as in `half_difference.sampled`."""
 
     def __init__(self, table: Measurement) -> None:
         self.draw, self.pdf, self._rgb = table.draw, table.pdf, table.rgb
@@ -115,10 +115,10 @@ class ReciprocalPart:
 
 
 def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi: int | None = None) -> Converted:
-    """Write a table in the format of another suffix; its error is measured on the file as it was written.
+    """Write a table in the format of another suffix; its error is measured on the written file.
 
-    phi  cells of phi_d in a MERL file: 180, or 360 for tables that are not reciprocal
-    Raises InputError where the source cannot be read, or the format cannot be written.
+    phi  cells of phi_d in a MERL file: 180, or 360 for nonreciprocal tables
+    Raises InputError if the source cannot be read, or the format cannot be written.
     """
     table, path = read(source), Path(output)
     target = files.check_file(path)
@@ -126,8 +126,8 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi:
     if not kind.writes:
         raise InputError(f"{kind.name} files cannot be written", str(path), "choose another suffix, such as .gonio")
     if not table.isotropic and kind.writes not in (table.name, "any"):
-        hint = ".bsdf and .gonio keep what it is"
-        raise InputError(f"{kind.name} files hold isotropic materials, this one is not", str(path), hint)
+        hint = ".bsdf and .gonio preserve the anisotropy"
+        raise InputError(f"{kind.name} files hold isotropic materials, this one is anisotropic", str(path), hint)
     if phi is not None and (not isinstance(kind, Merl) or phi not in (180, 360)):
         raise InputError(f"{phi} given for a {kind.name} file", "phi", "180 or 360 cells of phi_d, for .binary files")
     resampled = kind.resampled(table, phi) if isinstance(kind, Merl) else kind.resampled(table)
@@ -142,12 +142,12 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi:
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """f of pairs, and of the same pairs exchanged."""
+    """f of pairs, and of the same pairs with directions exchanged."""
     return table.rgb(wo, wi) / wi[:, 2:], table.rgb(wi, wo) / wo[:, 2:]
 
 
 def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
-    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 where reciprocity holds."""
+    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 if the table is reciprocal."""
     rng = np.random.default_rng([1, 84])
     u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
     wo, wi = (

@@ -1,4 +1,4 @@
-"""What is known of a file of measurements: `gonio info`."""
+"""A description of a measurement file: `gonio info`."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a file holds: format, kind, dimensions, range of the values, angles that were measured ("known"), flaws,
-    albedo over the angle of view, reciprocity.
+    """The content of a file: format, kind, dimensions, range of the values, measured angles ("known"), flaws, albedo
+    over the angle of view, reciprocity.
 
-    Of a file with several materials, none of which is named, their names alone ("items").
+    For a file with several materials, none of which is named, only their names ("items").
     Raises InputError as `read` does.
     """
     text, item = parted(os.fspath(file))
-    path = Path(text).expanduser()
+    path = Path(os.path.expanduser(text))
     if not item and text != SAMPLE:
         data = contents(path)
         items = format_of(path, data).items(data, str(path))
@@ -55,7 +55,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _typical_error(table: Measurement) -> float | None:
-    """The median of the standard errors, as shares of their values; None where none are known."""
+    """The median of the standard errors relative to their values; None if there are none."""
     error, values = table.beside.get("error"), vars(table).get("values")
     if error is None or values is None or not np.any(values > 0.0):
         return None
@@ -63,13 +63,13 @@ def _typical_error(table: Measurement) -> float | None:
 
 
 def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same in words, (what, value) each."""
+    """The description as text, (what, value) each."""
     if "items" in about:
         return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
     nm = about["wavelengths"]
     channels = "red, green, blue" if nm is None else f"{len(nm)} wavelengths, {nm[0]:g} to {nm[-1]:g} nm"
     low, high = about["range"]
-    found = [
+    rows = [
         ("format", f"{about['format']}, a table of kind {about['kind']}"),
         ("title", about["title"]),
         ("dimensions", " x ".join(f"{count} {axis}" for axis, count in about["dimensions"].items())),
@@ -79,16 +79,16 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
         ("measured", str(AngularRange(*map(tuple, about["known"].values())))),
     ]
     if about["error"] is not None:
-        found.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
+        rows.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
     for flaw, share in about["flaws"].items():
-        found.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
+        rows.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
     low, high = about["known"]["view"]
     for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):
         if low <= angle <= high:
-            found.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
+            rows.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
     highest = about["albedo"]["highest"]
-    found.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
-    found.append(
+    rows.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
+    rows.append(
         ("reciprocity", f"exchanging both directions changes f by {100.0 * about['reciprocity']:.3g} % on average")
     )
-    return [(what, text) for what, text in found if text]
+    return [(what, text) for what, text in rows if text]

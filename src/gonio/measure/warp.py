@@ -1,15 +1,15 @@
-"""Densities on the unit square given by numbers on a grid, sampled and inverted exactly.
+"""Densities on the unit square given on a grid, sampled and inverted exactly.
 
     warp = Warp("normals", values)                   # (slices, rows, columns), >= 0, nodes on the square's edges
     place, pdf = warp.sample(slices, u, v)
     place, pdf = warp.invert(slices, x, y)           # the numbers that `sample` would have needed
 
-Between nodes the density is bilinear. A slice is one density, of unit integral; a mixture of slices, such as the two
-nearest angles of view, is given as pairs (slice, weight) whose weights sum to 1: it is sampled by the mixed cumulative
-sums, so that `sample` and `invert` stay exact inverses of each other (Dupuy2018, sec. 4.3).
+Between nodes the density is bilinear. A slice is one density with integral 1; a mixture of slices, such as the two
+nearest angles of view, is given as pairs (slice, weight) with weights that sum to 1: it is sampled by the mixed
+cumulative sums, so that `sample` and `invert` are exact inverses of each other (Dupuy2018, sec. 4.3).
 
-Rows are chosen first, by the marginal of y; then x in the mixed row. Both are trapezoids, whose cumulative sums are
-quadratic; the root is taken in the form that also holds where the density does not change.
+Rows are selected first, by the marginal of y; then x in the mixed row. Both densities are piecewise linear with
+quadratic cumulative sums; the root is computed in the form that is also valid for a constant density.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ class Place(NamedTuple):
 
 
 def named(stem: str, values: NDArray[np.float64]) -> Table:
-    """A table under a name of its own: two measured materials may stand in one shader."""
+    """A table with a unique name, since one shader may contain two measured materials."""
     values = np.ascontiguousarray(values, dtype=np.float64)
     return Table(f"{stem}_{hashlib.sha256(values.tobytes()).hexdigest()[:8]}", values)
 
 
 class Warp:
-    """Bilinear densities over the unit square, one a slice.
+    """Bilinear densities over the unit square, one per slice.
 
-    values  (slices, rows, columns), >= 0: at least 2 x 2 nodes; a slice that is 0 everywhere is taken as uniform
+    values  (slices, rows, columns), >= 0: at least 2 x 2 nodes; a slice of zeros is treated as uniform
     """
 
     def __init__(self, stem: str, values: NDArray[np.floating]) -> None:
@@ -65,7 +65,7 @@ class Warp:
 
     @function
     def _mixed(self, slices: Slices, row: Scalar, column: Scalar) -> tuple[Scalar, Scalar]:
-        """Density, and its sum along x up to here, at a node."""
+        """Density at a node, and its integral along x up to there."""
         density: ops.Value = 0.0
         below: ops.Value = 0.0
         for one, weight in slices:
@@ -95,7 +95,7 @@ class Warp:
 
     @function
     def sample(self, slices: Slices, u: Scalar, v: Scalar) -> Place:
-        """The point that two uniform numbers lead to, and its density."""
+        """The point for two uniform numbers, and its density."""
         row = search(lambda at: self._marginal(slices, at), self.rows, v)
         r0 = self._mixed(slices, row, self._last(row))[1]
         r1 = self._mixed(slices, row + 1.0, self._last(row))[1]
@@ -115,7 +115,7 @@ class Warp:
 
     @function
     def invert(self, slices: Slices, x: Scalar, y: Scalar) -> Place:
-        """The two numbers that `sample` would turn into this point, and the density at the point."""
+        """The two numbers for which `sample` returns this point, and the density at the point."""
         row, ty = _cell(y, self.rows)
         column, tx = _cell(x, self.columns)
         (d00, b0), (d10, b1) = (self._mixed(slices, row + step, column) for step in (0.0, 1.0))
@@ -131,14 +131,14 @@ class Warp:
 
 
 def search(below: Callable[[Scalar], Scalar], count: int, wanted: Scalar) -> Scalar:
-    """The last of nodes 0 .. count - 2 at which a sum that never falls is <= `wanted`, by halving."""
-    found = wanted * 0.0
+    """The last of nodes 0 .. count - 2 at which a monotonic sum is <= `wanted`, by bisection."""
+    index = wanted * 0.0
     step = 1 << max((count - 2).bit_length() - 1, 0)
     while step and count > 2:
-        at = found + float(step)
-        found = where((at <= count - 2.0) & (below(ops.minimum(at, count - 2.0)) <= wanted), at, found)
+        at = index + float(step)
+        index = where((at <= count - 2.0) & (below(ops.minimum(at, count - 2.0)) <= wanted), at, index)
         step >>= 1
-    return found
+    return index
 
 
 @function
@@ -149,7 +149,7 @@ def _root(rest: Scalar, low: Scalar, high: Scalar) -> Scalar:
 
 
 def _cell(x: Scalar, count: int) -> tuple[Scalar, Scalar]:
-    """The node before a coordinate in [0, 1], and the way from it to the next."""
+    """The node before a coordinate in [0, 1], and the fraction of the way to the next."""
     at = ops.clamp(x, 0.0, 1.0) * (count - 1.0)
     cell = ops.minimum(ops.floor(at), count - 2.0)
     return cell, at - cell
@@ -162,7 +162,7 @@ def _mix(low: Scalar, high: Scalar, t: Scalar) -> Scalar:
 
 
 class Nodes:
-    """An axis with nodes at uneven steps, two at least or one that stands for all."""
+    """An axis with unevenly spaced nodes, at least two, or one that stands for all."""
 
     def __init__(self, stem: str, nodes: NDArray[np.floating]) -> None:
         self.count = len(nodes)
@@ -173,7 +173,7 @@ class Nodes:
         return fetch(self.table, node)[0]
 
     def find(self, x: Scalar) -> tuple[Scalar, Scalar]:
-        """The node before a coordinate, and the share of the way to the next, held in [0, 1]."""
+        """The node before a coordinate, and the fraction of the way to the next, clamped to [0, 1]."""
         if self.count == 1:
             return x * 0.0, x * 0.0
         cell = search(self.at, self.count, x)

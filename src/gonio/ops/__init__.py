@@ -1,8 +1,8 @@
 """The vocabulary in which a material is written.
 
-The words below take Dr.Jit arrays (32 or 64 bit, with autodiff) and compute, or take symbols and are recorded as a
-typed graph (`gonio.ops.graph`). The same lines of a model therefore serve a render, a gradient, the float64 oracle
-and shader code. Two rules follow: no Python `if` on a value (`where` instead), and no loop whose length is a value.
+The functions below compute on Dr.Jit arrays (32 or 64 bits, with autodiff), or record a typed graph when they are given
+symbols (`gonio.ops.graph`). The same lines of a model therefore serve renders, gradients, the float64 oracle and shader
+code. Two rules follow: no Python `if` on a value (use `where`), and no loop whose length depends on a value.
 
     from gonio import ops
     ops.where(x > 0, ops.sqrt(x), 0.0)
@@ -38,11 +38,11 @@ inv_pi = 1.0 / math.pi
 
 F = TypeVar("F", bound=Callable)
 V = TypeVar("V", bound=Vector)
-T = TypeVar("T", float, Scalar, Pair, Direction, Spectrum)  # what a word takes and gives back
+T = TypeVar("T", float, Scalar, Pair, Direction, Spectrum)  # argument and result of an elementwise function
 
 
 def function(python_function: F) -> F:
-    """Mark a function of the vocabulary: it stays a function of its own, by name and docstring, when recorded."""
+    """Mark a function so that a recording defines it once, with its name and docstring, and records calls of it."""
 
     @functools.wraps(python_function)
     def wrapper(*args: object, **kwargs: object) -> object:
@@ -118,7 +118,7 @@ def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ..
 @overload
 def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
 def where(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where `mask` holds, else `b`; both are computed. Plain numbers are as exact as the formula's values."""
+    """`a` where `mask` holds, else `b`; both are computed. Plain numbers get the precision of the running formula."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
         if isinstance(mask, bool):
             return a if mask else b
@@ -131,7 +131,7 @@ def where(mask: Value, a: Value, b: Value) -> Value:
 
 @function
 def pow(x: Scalar, y: Scalar | float) -> Scalar:
-    """x ** y for x > 0; 0 where x <= 0, so that no power of unknown sign reaches a shader or a gradient."""
+    """x ** y for x > 0; 0 for x <= 0, so that neither shaders nor gradients see a power of a negative number."""
     positive = x > 0.0
     return where(positive, exp(y * log(where(positive, x, 1.0))), 0.0)
 
@@ -150,7 +150,7 @@ def is_single(x: Value) -> bool:
 
 
 def is_short(x: Value) -> bool:
-    """Whether x is computed in 32 bits, by Dr.Jit or a shader, so that steps below its last digits can be left out."""
+    """Whether x is computed in 32 bits, by Dr.Jit or a shader, so that steps below float32 precision can be omitted."""
     if isinstance(x, Node):
         return graph._stack[-1][0].single
     return is_single(x)
@@ -172,7 +172,7 @@ def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
 @overload
 def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
 def fma(a: Value, b: Value, c: Value) -> Value:
-    """a b + c, in float32 in one operation and rounded once; float64, the oracle, rounds both as NumPy does."""
+    """a b + c: in float32 fused and rounded once; in float64, the oracle, product and sum are rounded as in NumPy."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
@@ -184,27 +184,27 @@ def sqr(x: T) -> T:
 
 @function
 def clamp(x: T, low: T | float, high: T | float) -> T:
-    """x held in [low, high]."""
+    """x clamped to [low, high]."""
     return minimum(maximum(x, low), high)
 
 
 def rsqrt(x: T) -> T:
-    """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
+    """1 / sqrt(x); in float32 by the processor's estimate and one step of Newton's method, within 2 ulp."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
 def zeros_like(x: T) -> T:
-    """0 in the type and for every lane of x; recorded as 0 x."""
+    """0 with the type and lanes of x; recorded as 0 x."""
     return 0.0 * x
 
 
 def ones_like(x: T) -> T:
-    """1 in the type and for every lane of x; recorded as 1 + 0 x."""
+    """1 with the type and lanes of x; recorded as 1 + 0 x."""
     return 1.0 + 0.0 * x
 
 
 def _guarded(mask: Value, x: Value) -> Value:
-    """x where the mask holds, else 1: what a branch that is not chosen may take the gradient of."""
+    """x where the mask holds, else 1, so that the gradient of the unused branch is finite."""
     return where(mask, x, 1.0) if not is_drjit(x) or drjit().grad_enabled(x) else x
 
 
@@ -240,7 +240,7 @@ def vec3(x: Scalar | float, y: Scalar | float, z: Scalar | float) -> Direction:
 
 
 def _vector(kind: str, *parts: Value) -> Value:
-    """Of symbols or Dr.Jit values; of plain numbers alone, of what the formula that is running computes with."""
+    """A vector of symbols or Dr.Jit values; plain numbers take the type of the formula that is running."""
     if not any(is_drjit(part) for part in parts):
         parts = (in_formula(parts[0]), *parts[1:])
     for part in parts:
@@ -248,7 +248,7 @@ def _vector(kind: str, *parts: Value) -> Value:
             return getattr(types_like(type(part)), kind)(*parts)
     if graph._stack:
         return graph.emit("vector", kind, *parts)
-    raise InputError(f"{kind} of plain numbers, outside of a formula", kind, "use NumPy, or give a Dr.Jit value")
+    raise InputError(f"{kind} of plain numbers, outside a formula", kind, "use NumPy, or give a Dr.Jit value")
 
 
 def dot(a: V, b: V) -> Scalar:
@@ -257,7 +257,7 @@ def dot(a: V, b: V) -> Scalar:
         return graph.emit("dot", "float", a, b)
     if is_single(a):
         return drjit().dot(a, b)
-    # float64 is the oracle: every product rounded, so that NumPy, reading the recorded graph, gets the same bits
+    # float64 is the oracle: each product is rounded, so that NumPy gets the same bits from the recorded graph
     total = a[0] * b[0]
     for i in range(1, len(a)):
         total = total + a[i] * b[i]
@@ -276,14 +276,14 @@ def normalize(v: V) -> V:
 
 
 def channels(spectrum: Spectrum) -> tuple[Scalar, ...]:
-    """The channels of a spectrum: three where it is recorded."""
+    """The channels of a spectrum: three in a recording."""
     if isinstance(spectrum, Node):
         return tuple(graph.emit("component", "float", spectrum, static=place) for place in range(3))
     return tuple(spectrum)
 
 
 def of_channels(like: Spectrum, values: Sequence[Scalar]) -> Spectrum:
-    """A spectrum of these channels, as many as `like` has."""
+    """A spectrum with these channels, as many as `like` has."""
     if isinstance(like, Node) or any(isinstance(value, Node) for value in values):
         return graph.emit("vector", "spectrum", *values)  # type: ignore[return-value]
     made: Value = type(like)(*values)
@@ -294,7 +294,7 @@ def mean(spectrum: Spectrum) -> Scalar:
     """Mean over the channels of a spectrum, as a float."""
     if isinstance(spectrum, Node):
         return graph.emit("mean", "float", spectrum)
-    # not Dr.Jit's mean, which writes the number of lanes into the kernel: another one for every size of an array
+    # not Dr.Jit's mean, which writes the number of lanes into the kernel and so recompiles it for every array size
     return drjit().sum(spectrum, axis=0) * (1.0 / len(spectrum))
 
 

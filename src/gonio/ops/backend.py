@@ -1,6 +1,6 @@
-"""Dr.Jit arrays: which array types to use, and the way in and out of NumPy.
+"""Dr.Jit arrays: the array types in use, and the conversion from and to NumPy.
 
-Dr.Jit starts here and nowhere else outside `render`.
+Dr.Jit is imported here and, outside `render`, nowhere else.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .. import llvm
 from ..errors import InputError
 from .types import Precision, Value
 
-# A Dr.Jit array. Dr.Jit's stubs describe one device and precision, our code is written for all.
+# A Dr.Jit array. Dr.Jit's stubs describe one device and precision; Gonio's code serves all.
 Array: TypeAlias = Value
 
 PRECISIONS = get_args(Precision)
@@ -27,7 +27,7 @@ _precision: Precision = "float32"
 
 
 class Types(NamedTuple):
-    """Dr.Jit's array types of one device and precision, for values that have one entry a ray."""
+    """Dr.Jit's array types of one device and precision, for values with one entry per ray."""
 
     float: type
     bool: type
@@ -38,7 +38,7 @@ class Types(NamedTuple):
 
 
 def set_precision(precision: Precision) -> None:
-    """Set the precision of evaluations on NumPy arrays: "float32" (default) or "float64", the oracle."""
+    """Set the precision of evaluations on NumPy arrays: "float32" (default), or "float64" for reference values."""
     global _precision
     if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "set_precision", 'give "float32" or "float64"')
@@ -51,7 +51,7 @@ def get_precision() -> Precision:
 
 @lru_cache
 def drjit() -> ModuleType:
-    """Dr.Jit, loaded when something is first computed."""
+    """The module Dr.Jit, imported by the first computation."""
     import drjit as dr
 
     return dr
@@ -61,7 +61,7 @@ def drjit() -> ModuleType:
 def _types(backend: str, double: bool) -> Types:
     dr = drjit()
     if backend == "llvm":
-        llvm.use()  # where none was found, or one that would abort, that is an error here
+        llvm.use()  # raises if no usable libLLVM exists
     module: ModuleType = getattr(dr, backend).ad
     end = "64" if double else ""
     return Types(
@@ -75,7 +75,7 @@ def _types(backend: str, double: bool) -> Types:
 
 
 def types(precision: Precision | None = None) -> Types:
-    """The types for a precision; the one that is set where `precision` is None. CPU: small arrays live there."""
+    """The CPU types of a precision, since small arrays are computed there; None for the current precision."""
     precision = _precision if precision is None else precision
     if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "precision", 'give "float32" or "float64"')
@@ -83,25 +83,25 @@ def types(precision: Precision | None = None) -> Types:
 
 
 def types_like(kind: type) -> Types:
-    """The types that go with a Dr.Jit array type: same device, same precision."""
+    """The types with the device and precision of a Dr.Jit array type."""
     dr = drjit()
     backend = "cuda" if dr.backend_v(kind) == dr.JitBackend.CUDA else "llvm"
     return _types(backend, dr.itemsize_v(kind) == 8 and not dr.is_mask_v(kind))
 
 
 def is_drjit(value: object) -> TypeGuard[Array]:
-    """Whether a value is a Dr.Jit array (asked without loading Dr.Jit)."""
+    """Whether a value is a Dr.Jit array; does not load Dr.Jit."""
     dr = sys.modules.get("drjit")
-    is_array = getattr(dr, "is_array_v", None)  # not there yet while another thread imports Dr.Jit
+    is_array = getattr(dr, "is_array_v", None)  # missing while another thread is still importing Dr.Jit
     return is_array is not None and is_array(value)
 
 
-_formula: ContextVar[type | None] = ContextVar("formula", default=None)  # type of the directions it runs on
+_formula: ContextVar[type | None] = ContextVar("formula", default=None)  # type of the running formula's directions
 
 
 @contextlib.contextmanager
 def formula_of(directions: object) -> Iterator[None]:
-    """A formula runs on these directions meanwhile."""
+    """Declare the directions on which the formula inside the `with` block runs."""
     before = _formula.set(type(directions))
     try:
         yield
@@ -110,7 +110,7 @@ def formula_of(directions: object) -> Iterator[None]:
 
 
 def in_formula(number: float) -> Array:
-    """A plain number with as many bits as the formula that is running has; itself where none is."""
+    """A plain number in the precision of the running formula; unchanged outside a formula."""
     kind = _formula.get()
     return number if kind is None or not drjit().is_array_v(kind) else types_like(kind).float(number)
 
@@ -118,7 +118,7 @@ def in_formula(number: float) -> Array:
 def float_of(value: object, kind: Types) -> Array:
     """A number or an array of shape (N,) as a Dr.Jit float.
 
-    A number becomes an evaluated array of one entry a literal: a literal would be baked into the kernel,
+    A number becomes an evaluated array of one entry instead of a literal: a literal would be compiled into the kernel,
     and every new value would compile it again.
     """
     dr = drjit()
@@ -135,8 +135,8 @@ def float_of(value: object, kind: Types) -> Array:
 def aligned(array: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
     """A copy at an address that is a multiple of 64.
 
-    Dr.Jit takes NumPy's memory as it lies and writes its alignment into the kernel: arrays that NumPy puts now here,
-    now there would compile the same code again and again.
+    Dr.Jit uses NumPy's memory without copying and compiles its alignment into the kernel. Arrays at varying addresses
+    would compile the same code repeatedly.
     """
     size = array.size * np.dtype(dtype).itemsize
     raw = np.empty(size + 64, np.uint8)
@@ -156,12 +156,12 @@ def vector_of(value: object, size: int, kind: Types) -> Array:
 
 
 def to_numpy(value: Array, count: int) -> np.ndarray:
-    """A Dr.Jit float as (count,), a vector as (count, size); what is uniform is repeated `count` times."""
+    """A Dr.Jit float as (count,), a vector as (count, size); a uniform value is repeated `count` times."""
     dr = drjit()
     if not dr.is_array_v(value):
         return np.full(count, value)
     if dr.is_vector_v(value):
-        # component by component: Dr.Jit would join them in a kernel that has the number of rows in it as a literal
+        # per component: Dr.Jit would join them in a kernel that contains the number of rows as a literal
         dr.eval(value)
         parts = [np.asarray(component.numpy()) for component in value]
         count = max(count, *(part.shape[-1] for part in parts))  # parameters may have more rows than the directions

@@ -1,14 +1,14 @@
-"""The recorder: model code run on symbols leaves a typed graph, with names, docstrings and source lines kept.
+"""The recorder: running model code on symbols produces a typed graph with names, docstrings and source lines.
 
     graph = record(lambda a, b: sqrt(a * a + b * b), a="float", b="float")
     graph.evaluate(a=np.array([3.0]), b=np.array([4.0]))      # -> array([5.])
 
-A graph is a list of functions in order of definition, the entry last. A function is a straight line of
-`Node`s: no branches (`where` instead) and no loops (static loops unroll while recording). Calls of functions
-marked `@function` stay calls, so that a shader writer can give each its name, arguments and documentation.
+A graph is a list of functions in order of definition, the entry last. A function is a sequence of `Node`s without
+branches (use `where`) or loops (Python loops unroll while recording). Calls of functions marked `@function` remain
+calls, so that a shader writer can give each function its name, arguments and documentation.
 
-Types are "float", "bool", "vec2", "vec3" and "spectrum". Operators broadcast a float over the components of the
-others. A spectrum has as many channels as whoever evaluates the graph gives it.
+Types are "float", "bool", "vec2", "vec3" and "spectrum". Operators broadcast a float over the components of the other
+types. The number of channels of a spectrum is chosen when the graph is evaluated.
 """
 
 from __future__ import annotations
@@ -16,99 +16,50 @@ from __future__ import annotations
 import html
 import inspect
 import itertools
-import math
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
-from pathlib import Path
-from types import FrameType
-from typing import Protocol, TypeAlias, TypeGuard
+from collections.abc import Callable, Container, Iterator
+from typing import TypeAlias
 
 import numpy as np
 
 from ..errors import GonioError
-from ..owner import alone
-from .table import fetch_in_numpy, read_in_numpy
+from ..owner import exclusive
+from .evaluation import NUMPY as NUMPY
+from .evaluation import operate
+from .naming import HERE, name_locals
+from .structure import flatten, leaves, rebuild, static_key
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
 
-_HERE = str(Path(__file__).parent)
 _SIZES = {"vec2": 2, "vec3": 3}
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 
 class RecordingError(GonioError):
-    """Code that the recorder cannot follow; names the file and line."""
+    """Code that cannot be recorded; names the file and line."""
 
 
 class ForbiddenOperator(RecordingError):
-    """Python that means something else on a value, or nothing: `if`, `and`, `**`. With some values it would run."""
+    """A Python operator with no meaning on a value, or a different one: `if`, `and`, `**`."""
 
 
 def _source_line() -> str:
     frame = sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(HERE):
         frame = frame.f_back
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
 
 
-def _name_locals(function: Function) -> None:
-    """Give the values of `function` the names of the Python variables that hold them now.
-
-    Called whenever a value is made: what an earlier line bound is then still there. A name in the function's own
-    frame is preferred to one in a plain function that it calls, the first name to a later one.
-    """
-    frames = []
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None and frame.f_code is not _define.__code__:
-        if not frame.f_code.co_filename.startswith(_HERE):
-            frames.append(frame)
-        frame = frame.f_back
-    for depth, own in enumerate(reversed(frames)):
-        for name, value in own.f_locals.items():
-            if isinstance(value, Node):
-                if value.function is function and value.depth > depth:
-                    value.name, value.depth = name.strip("_"), depth
-            elif isinstance(value, _CONTAINERS):
-                _name_parts(function, depth, value, (name,))
-
-
-_CONTAINERS = (tuple, list, dict)
-_PLAIN = (float, int, str, bool, type(None), np.ndarray)  # what holds no value, told at a glance
-
-
-def _name_parts(function: Function, depth: int, value: object, path: tuple) -> None:
-    """`_name_locals` for what a variable holds inside of it, in the order and by the paths of `_flatten`.
-
-    It is called for every value that is made, and finds nothing new in most: a path is put together only where one is
-    named.
-    """
-    pairs: Iterable[tuple[object, object]]
-    if isinstance(value, tuple | list):
-        pairs = zip(getattr(value, "_fields", None) or range(len(value)), value, strict=True)
-    elif isinstance(value, dict):
-        pairs = value.items()
-    elif _is_composite(value):
-        pairs = value.__parts__().items()
-    else:
-        return
-    for key, item in pairs:
-        if isinstance(item, Node):
-            if item.function is function and item.depth > depth:
-                item.name, item.depth = ".".join(map(str, (*path, key))).strip("_"), depth
-        elif not isinstance(item, _PLAIN):
-            _name_parts(function, depth, item, (*path, key))
-
-
 def _logical(op: str) -> Callable[[Node, object], Node]:
-    """An operator whose result is true or false."""
+    """An operator with a Boolean result."""
     return lambda self, other: emit(op, "bool", self, other)
 
 
 class Node:
-    """One value in a recorded function: an operation, its arguments, its type and the line that wrote it.
+    """One value in a recorded function: an operation, its arguments, its type and its source line.
 
-    name  of the Python variable that held it, or ""; of a value in a tuple or dict with its place, "found.bend"
+    name  of the Python variable that held it, or ""; inside a tuple or dict with its key, "result.bend"
     """
 
     __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
@@ -119,9 +70,9 @@ class Node:
         self.source = _source_line()
         self.name, self.depth = "", 1000
         self.index = len(function.nodes)
-        # else what our caller's variables hold would be looked into, all the way up
+        # otherwise the variables of all calling frames would be searched
         if _stack and _stack[-1][1] is function:
-            _name_locals(function)
+            name_locals(function, Node, _define.__code__)
         function.nodes.append(self)
 
     def __repr__(self) -> str:
@@ -134,7 +85,7 @@ class Node:
 
     def __pow__(self, other: object) -> Node:
         hint = "use ops.pow(x, p), which is 0 where x <= 0, or ops.sqr(x)"
-        raise ForbiddenOperator("`**` on a value, which is no number where x < 0", _source_line(), hint)
+        raise ForbiddenOperator("`**` on a value, which is NaN where x < 0", _source_line(), hint)
 
     __rpow__ = __pow__
 
@@ -185,9 +136,9 @@ class Function:
 
     name, doc, source  of the Python function it came from
     parameters         name -> type, in order; "self.alpha" is the field `alpha` of the model
-    arguments          name -> what the function was given, nodes inside objects and tuples
+    arguments          name -> the argument: nodes, objects and tuples of nodes
     nodes              every value, in order of evaluation
-    result             the returned nodes, in the shape in which Python returned them (a tuple, a NamedTuple, a node)
+    result             the returned nodes in their structure (a tuple, a NamedTuple, a node)
     """
 
     def __init__(self, name: str, doc: str, source: str) -> None:
@@ -202,18 +153,18 @@ class Function:
         return Node(self, "parameter", type, (), static=name)
 
     def __str__(self) -> str:
-        """A line for each value: its number, its name in the source, its type, and what it is made of."""
+        """One line per value: its number, its name in the source, its type and its expression."""
         lines = [f"{self.name}({', '.join(f'{name}: {type}' for name, type in self.parameters.items())})"]
         for node in self.nodes:
             if node.op != "parameter":
                 lines.append(f"  %{node.index:<3} {node.name:<12} {node.type:<9} {_written(node)}".rstrip())
-        return "\n".join([*lines, f"  return {', '.join(map(_reference, _leaves(self.result)))}"])
+        return "\n".join([*lines, f"  return {', '.join(map(_reference, leaves(self.result)))}"])
 
 
 class Graph:
     """Recorded functions in order of definition; `entry` is the last.
 
-    replacements  operation -> a function of the vocabulary to be recorded in its place, for languages that lack it
+    replacements  operation -> a vocabulary function to record instead, for languages without the operation
     single        whether it is recorded for 32 bits, see `ops.is_short`
     """
 
@@ -233,7 +184,7 @@ class Graph:
         return f"<pre>{html.escape(str(self))}</pre>"
 
     def evaluate(self, **values: Value) -> Value:
-        """Run the graph on NumPy arrays in float64, as an independent reading of the same source.
+        """Run the graph on NumPy arrays in float64, as an independent evaluation of the same source.
 
         values  by parameter name ("self.alpha" of a model as self_alpha); vectors and spectra component first,
                 shape (3, N), floats (N,) or numbers
@@ -248,7 +199,7 @@ class Graph:
 
 
 def _written(node: Node) -> str:
-    """ "dot(%17, %19)"; what is no value stands behind the name, as in "element[1](%17)"."""
+    """ "dot(%17, %19)"; static arguments follow the name, as in "element[1](%17)"."""
     arguments = ", ".join(map(_reference, node.args))
     if node.op == "constant":
         return str(node.static)
@@ -271,14 +222,14 @@ _stack: list[tuple[Graph, Function]] = []
 def emit(op: str, type: str, *args: Value, static: Value = None) -> Node:
     """Append one operation to the function that is being recorded."""
     if not _stack:
-        raise RecordingError("a recorded value outlived its recording", _source_line())
+        raise RecordingError("a recorded value is used after its recording ended", _source_line())
     graph, function = _stack[-1]
     for arg in args:
         if isinstance(arg, Node) and arg.function is not function:
             raise RecordingError(
                 f"a value of '{arg.function.name}' is used inside '{function.name}'",
                 _source_line(),
-                "pass it as an argument: a @function sees its arguments only",
+                "pass it as an argument: a @function has access to its arguments only",
             )
     if op in graph.replacements:
         return call(graph.replacements[op], args, {})
@@ -292,7 +243,9 @@ def type_of(value: object) -> str:
         return "bool"
     if isinstance(value, int | float | np.number):
         return "float"
-    raise RecordingError(f"a {type(value).__name__} inside recorded code", _source_line(), "numbers and nodes only")
+    raise RecordingError(
+        f"a {type(value).__name__} in recorded code", _source_line(), "use numbers and recorded values"
+    )
 
 
 def widest(*values: object) -> str:
@@ -311,66 +264,8 @@ def arithmetic(op: str, a: Operand, b: Operand) -> Node:
 
 
 def _flatten(value: object, name: str) -> Iterator[tuple[str, Node]]:
-    """The nodes inside an argument (node, tuple, list, dict, object with fields), each with its path."""
-    if isinstance(value, Node):
-        yield name, value
-    elif isinstance(value, tuple | list):
-        fields = getattr(value, "_fields", None) or [str(i) for i in range(len(value))]
-        for field, item in zip(fields, value, strict=True):
-            yield from _flatten(item, f"{name}.{field}")
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            yield from _flatten(item, f"{name}.{key}")
-    elif _is_composite(value):
-        for part, held in value.__parts__().items():
-            yield from _flatten(held, f"{name}.{part}")
-
-
-class Composite(Protocol):
-    """An object that a recording follows into its parts: a material."""
-
-    def __parts__(self) -> Mapping[str, object]:
-        """What may hold values, by name."""
-
-    def __with_parts__(self, parts: Mapping[str, object]) -> object:
-        """A copy with other parts."""
-
-
-def _is_composite(value: object) -> TypeGuard[Composite]:
-    # asked of every local variable for every value that is made: isinstance of a protocol took four fifths of emit
-    return hasattr(type(value), "__parts__")
-
-
-def _rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple[type, ...] = Node) -> Value:
-    """The same structure with each node, or whatever is of another kind, replaced."""
-    if isinstance(value, kind):
-        return replace(value)
-    if isinstance(value, tuple | list):
-        items = [_rebuild(item, replace, kind) for item in value]
-        return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
-    if isinstance(value, dict):
-        return {key: _rebuild(item, replace, kind) for key, item in value.items()}
-    if _is_composite(value):
-        return value.__with_parts__({name: _rebuild(part, replace, kind) for name, part in value.__parts__().items()})
-    return value
-
-
-def _static_key(value: object) -> object:
-    """What of an argument is not a node but shapes the recording: names, flags, classes and plain numbers."""
-    if isinstance(value, Node):
-        return value.type
-    if isinstance(value, tuple | list):
-        return tuple(_static_key(item) for item in value)
-    if isinstance(value, dict):
-        return tuple((key, _static_key(item)) for key, item in value.items())
-    if _is_composite(value):
-        return (type(value), *((name, _static_key(part)) for name, part in value.__parts__().items()))
-    try:
-        hash(value)
-    except TypeError:
-        return id(value)
-    # with its type: Python takes True, 1 and 1.0 for the same key; and 0.0 for -0.0
-    return (type(value), repr(value) if isinstance(value, float) else value)
+    """The nodes inside an argument, each with its path."""
+    return flatten(value, name, Node)
 
 
 def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value], name: str) -> Function:
@@ -380,10 +275,10 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
     try:
         given = [pair for argument, value in arguments.items() for pair in _flatten(value, argument)]
         parameters = iter([function.parameter(path, node.type) for path, node in given])
-        inner = {argument: _rebuild(value, lambda _: next(parameters)) for argument, value in arguments.items()}
+        inner = {argument: rebuild(value, lambda _: next(parameters), Node) for argument, value in arguments.items()}
         function.arguments = dict(inner)
-        # numbers that a function returns as they stand become nodes, so that a result is nodes only
-        function.result = _rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
+        # returned plain numbers become nodes, so that a result consists of nodes only
+        function.result = rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
     finally:
         _stack.pop()
     graph.functions.append(function)
@@ -395,25 +290,25 @@ def _constant(number: float | np.number) -> Node:
 
 
 def class_name(value: object) -> str:
-    """The name that its class gives to what is recorded of it; shaders allow no underscore before names."""
+    """The name of a recorded object's class, without leading underscores, which shaders reject."""
     return type(value).__name__.lstrip("_")
 
 
 def first_free(name: str, used: Container[str]) -> str:
-    """The name, or name_2, name_3 and so on: the first that is not taken."""
+    """The name itself or the first of name_2, name_3, ... that is unused."""
     names = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
     return next(free for free in names if free not in used)
 
 
 def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
-    """Record a call of a `@function`, defining it first where this combination of types is new."""
+    """Record a call of a `@function`; defines it first if this combination of argument types is new."""
     bound = inspect.signature(python_function).bind(*args, **kwargs)
     bound.apply_defaults()
     graph, _ = _stack[-1]
     for argument, value in bound.arguments.items():
-        if type(value) is float:  # an argument like any other, or each number would make a copy of the function
+        if type(value) is float:  # recorded as an argument; otherwise each number would define another function
             bound.arguments[argument] = emit("constant", "float", static=value)
-    key = (python_function, *(_static_key(value) for value in bound.arguments.values()))
+    key = (python_function, *(static_key(value, Node) for value in bound.arguments.values()))
     function = graph._known.get(key)
     if function is None:
         used = {f.name for f in graph.functions} | {f.name for _, f in _stack}
@@ -431,7 +326,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
         called.type = function.result.type
         return called
     counter = itertools.count()
-    return _rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)))
+    return rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)), Node)
 
 
 def recording(values: tuple) -> bool:
@@ -439,7 +334,7 @@ def recording(values: tuple) -> bool:
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
-@alone
+@exclusive
 def record(
     python_function: Callable,
     *,
@@ -450,9 +345,9 @@ def record(
 ) -> Graph:
     """Record a function of named arguments.
 
-    types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; or give them as keywords
-    into   an empty graph, where one with replacements is wanted
-    more   arguments that are not symbols are handed over as they stand, objects with symbolic fields included
+    types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; may also be given as keywords
+    into   an empty graph to record into, for a graph with replacements
+    more   arguments that are not symbols, passed on unchanged; objects may have symbolic fields
     """
     graph = Graph() if into is None else into
     kinds = dict(types or {})
@@ -473,47 +368,11 @@ def record(
 
 
 def symbol(kind: str) -> Node:
-    """A free-standing symbol, to be a field of an object that is handed to `record`."""
+    """A free-standing symbol, for a field of an object that is passed to `record`."""
     return Node(Function("outer", "", ""), "parameter", kind, ())
 
 
 # --------------------------------------------------------------------------- evaluation in NumPy
-
-
-NUMPY: dict[str, Callable] = {
-    "add": np.add,
-    "sub": np.subtract,
-    "mul": np.multiply,
-    "div": np.divide,
-    "neg": np.negative,
-    "lt": np.less,
-    "le": np.less_equal,
-    "gt": np.greater,
-    "ge": np.greater_equal,
-    "eq": np.equal,
-    "ne": np.not_equal,
-    "and": np.logical_and,
-    "or": np.logical_or,
-    "not": np.logical_not,
-    "where": np.where,
-    "sqrt": np.sqrt,
-    "abs": np.abs,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "exp": np.exp,
-    "log": np.log,
-    "pow": np.power,
-    "sin": np.sin,
-    "cos": np.cos,
-    "atan2": np.arctan2,
-    "floor": np.floor,
-    "erf": np.vectorize(math.erf, otypes=[float]),
-    "copysign": np.copysign,
-    "isfinite": np.isfinite,
-    "dot": lambda a, b: sum(a[i] * b[i] for i in range(len(a))),
-    "mean": lambda a: np.mean(a, axis=0),
-    "max_component": lambda a: np.max(a, axis=0),
-}
 
 
 def _run(function: Function, arguments: list) -> Value:
@@ -529,28 +388,10 @@ def _run(function: Function, arguments: list) -> Value:
             values.append(next(remaining))
         elif node.op == "constant":
             values.append(np.asarray(node.static))
-        elif node.op == "component":
-            values.append(args[0][node.static])
-        elif node.op == "vector":
-            values.append(np.stack(np.broadcast_arrays(*[np.asarray(a, float) for a in args])))
         elif node.op == "call":
             values.append(_run(node.static, args))
         elif node.op == "element":
-            values.append(list(_leaves(args[0]))[node.static])
-        elif node.op == "lookup":
-            table, channel = node.static
-            values.append(read_in_numpy(table, *args)[channel])
-        elif node.op == "fetch":
-            table, channel = node.static
-            values.append(fetch_in_numpy(table, *args)[channel])
+            values.append(list(leaves(args[0]))[node.static])
         else:
-            values.append(NUMPY[node.op](*args))
-    return _rebuild(function.result, get)
-
-
-def _leaves(value: Value) -> Iterator[Value]:
-    if isinstance(value, tuple | dict):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _leaves(item)
-    else:
-        yield value
+            values.append(operate(node.op, node.static, args))
+    return rebuild(function.result, get, Node)

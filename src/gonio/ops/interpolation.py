@@ -1,4 +1,4 @@
-"""Reading a table by the rule of `gonio.ops.table`, or one texel of it, in Dr.Jit or as symbols."""
+"""Interpolation in a table by the rule of `gonio.ops.table`, and texel access, in Dr.Jit or as symbols."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .types import Scalar
 
 
 def inset(x: Array, count: int) -> Array:
-    """The coordinate at which an axis of `count` texels has its first node at x = 0 and its last at x = 1."""
+    """The coordinate whose values 0 and 1 fall on the first and last texel center of an axis of `count` texels."""
     return x * ((count - 1) / count) + 0.5 / count
 
 
 def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
-    """Every channel of a table at a point, linear between texel centres (see the module)."""
+    """Every channel of a table at a point, linear between texel centers (see `gonio.ops.table`)."""
     if any(isinstance(x, graph.Node) for x in coordinates):
         symbols: list[Array] = [
             graph.emit("lookup", "float", *coordinates, static=(table, c)) for c in range(table.channels)
@@ -35,7 +35,7 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
         cell = dr.minimum(UInt(at), max(count - 2, 0))
         cells.append(cell)
         places.append(at - kind.float(cell))
-    # four channels come in one fetch
+    # one fetch reads four channels
     width = 4 if table.channels % 4 == 0 else 1
     fetched = kind.vec4 if width == 4 else kind.float
     result: list[Array] = [0.0] * table.channels
@@ -53,10 +53,10 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
 
 
 def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
-    """Every channel of the texel at whole-numbered places, one an axis; outside the table the nearest is taken.
+    """Every channel of the texel at integer coordinates, one per axis; outside the table the nearest texel is used.
 
-    For grids whose axes are no plain [0, 1]: angles that wrap, nodes at uneven steps, cumulative sums to search in.
-    Places that are plain numbers are the same for every ray, such as a weight of a network: constants in a shader.
+    For grids whose axes are not a plain [0, 1]: periodic angles, unevenly spaced nodes, cumulative sums to search in.
+    Coordinates given as plain numbers, such as the index of a network's weight, are constants in a shader.
     """
     if not any(isinstance(x, graph.Node) for x in places):
         places = tuple(in_formula(x) if isinstance(x, float) else x for x in places)
@@ -72,7 +72,7 @@ def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
     UInt = kind.module.UInt32
     index: Array = UInt(0)
     for x, count in zip(places, table.shape, strict=True):
-        # clipped again as a whole number: what NaN becomes differs by processor, and may lie far outside the table
+        # clamped again as an integer: the conversion of NaN differs by processor and may lie far outside the table
         index = index * count + dr.minimum(UInt(dr.clip(kind.float(x), 0.0, count - 1.0)), count - 1)
     array = table.array(kind)
     width = 4 if table.channels % 4 == 0 else 1

@@ -1,11 +1,11 @@
-"""Tables, and the one rule by which everybody reads them.
+"""Tables, and the one interpolation rule for all of them.
 
     table = Table("E", values)              # float64, shape (rows, columns, channels)
     e, = lookup(table, roughness, mu)
 
-Coordinates run over [0, 1]; texel j of an axis of n stands at (j + 1/2) / n; between texels values are linear in each
-coordinate, outside the first and last centre they are held. This is a GPU's texture with clamped edges, so baker,
-Dr.Jit and shader agree. To put nodes on both ends of an axis, use `inset`.
+Coordinates lie in [0, 1]; texel j of an axis of n has its center at (j + 1/2) / n. Values are linear in each coordinate
+between centers and constant beyond the first and last. This is a GPU texture with clamped edges, so bakes, Dr.Jit and
+shaders agree. To put nodes on both ends of an axis, use `inset`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from .backend import Array, Types, drjit
 
 
 class Table:
-    """Numbers on a grid of one to three axes, with channels last; compared by identity changed.
+    """Numbers on a grid of one to three axes, channels last; compared by identity.
 
-    name    what it holds, as shader code and manifests call it: other letters than those of an identifier become _
+    name    what it holds, as used in shader code and manifests; characters that identifiers do not allow become _
     values  shape (axis, ..., channels), float64
     """
 
@@ -45,7 +45,7 @@ class Table:
         return f"Table({self.name!r}, {' x '.join(map(str, self.shape))}, {self.channels} channels)"
 
     def array(self, kind: Types) -> Array:
-        """The values as an evaluated Dr.Jit array, made once a type: new contents compile no kernel."""
+        """The values as an evaluated Dr.Jit array, cached per type: new contents compile no kernel."""
         if kind.float not in self._arrays:
             array = kind.float(self.values.ravel())
             drjit().make_opaque(array)
@@ -54,7 +54,7 @@ class Table:
 
 
 def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
-    """Every channel, channels first: the rule in NumPy float64."""
+    """Every channel, channels first: the interpolation rule in NumPy float64."""
     points = np.broadcast_arrays(*[np.asarray(x, dtype=float) for x in coordinates])
     cells, places = [], []
     for x, count in zip(points, table.shape, strict=True):
@@ -75,7 +75,7 @@ def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
 
 
 def fetch_in_numpy(table: Table, *places: object) -> np.ndarray:
-    """Every channel, channels first, of the texels at whole-numbered places: `ops.fetch` in NumPy float64."""
+    """Every channel, channels first, of the texels at integer coordinates: `ops.fetch` in NumPy float64."""
     points = np.broadcast_arrays(*[np.asarray(x, dtype=float) for x in places])
     index = tuple(np.clip(x, 0, n - 1).astype(int) for x, n in zip(points, table.shape, strict=True))
     return np.moveaxis(table.values[index], -1, 0)

@@ -1,9 +1,9 @@
-"""What a value is, for readers, editors and type checkers. Nothing here runs.
+"""The types of values, for readers, editors and type checkers. Nothing here runs.
 
-Inside a material every value is a Dr.Jit array with one entry a ray, or a symbol while the material is recorded. Both
-have the operators below; which Dr.Jit type it really is depends on device, precision and variant, so these classes
-name only what the value means: a `Scalar`, a `Mask`, a `Direction`, a `Spectrum`. They are never instantiated and
-never tested for: `Scalar` in a signature is a promise to the reader, kept by the type checker.
+Inside a material every value is a Dr.Jit array with one entry per ray, or a symbol while the material is recorded. Both
+have the operators below. The actual Dr.Jit type depends on device, precision and variant, so these classes state only
+the meaning: a `Scalar`, a `Mask`, a `Direction`, a `Spectrum`. They are never instantiated and never tested for; only
+the type checker enforces them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 Mode: TypeAlias = Literal["radiance", "importance"]
 Precision: TypeAlias = Literal["float32", "float64"]
 
-# A value whose type only Dr.Jit knows, or a symbol in its place, where code asks which it is
+# A value whose type is known to Dr.Jit only, or a symbol, in code that must distinguish them
 Value: TypeAlias = Any
 
 
 class Mask:
-    """True or false for every ray."""
+    """True or false per ray."""
 
     if TYPE_CHECKING:
 
@@ -34,7 +34,7 @@ V = TypeVar("V", bound="Vector")
 
 
 class Scalar:
-    """A number for every ray. Beside a `Vector` it is that one's operator that serves: scalar * colour is a colour."""
+    """A number per ray. With a `Vector` operators return the vector's type: scalar * color is a color."""
 
     if TYPE_CHECKING:
 
@@ -56,7 +56,7 @@ class Scalar:
 
 
 class Vector:
-    """Several numbers for every ray; operators work on each component, a `Scalar` serves them all."""
+    """Several numbers per ray; operators work per component and broadcast a `Scalar`."""
 
     if TYPE_CHECKING:
 
@@ -79,7 +79,7 @@ class Vector:
 
 
 class Pair(Vector):
-    """Two numbers: the two widths (alpha_x, alpha_y), or an angle as (cos, sin)."""
+    """Two numbers: the widths (alpha_x, alpha_y), or an angle as (cos, sin)."""
 
     if TYPE_CHECKING:
 
@@ -103,14 +103,14 @@ class Direction(Vector):
 
 
 class Spectrum(Vector):
-    """A colour: as many channels as the renderer has, three in RGB."""
+    """A color: as many channels as the renderer has, three in RGB."""
 
 
 S_co = TypeVar("S_co", covariant=True)
 
 
 class Vector3(Protocol[S_co]):
-    """A Dr.Jit vector of three components of type S, as a caller from outside holds it."""
+    """A Dr.Jit vector of three components of type S, as external callers pass it."""
 
     @property
     def x(self) -> S_co: ...

@@ -1,6 +1,6 @@
-"""What light does at a surface: frame, reflection and refraction, Fresnel, microfacets, warps, refractive indices.
+"""Optics of a surface: frame, reflection and refraction, Fresnel, microfacets, warps, refractive indices.
 
-Everything here is written in the vocabulary of `gonio.ops` and knows no material.
+Everything here is written in the vocabulary of `gonio.ops` and independent of materials.
 """
 
 from . import frame, fresnel, indices, masking, ndf, special, warp

@@ -1,4 +1,4 @@
-"""The observer, daylight, and linear sRGB: what turns spectra into colours."""
+"""The conversion of spectra to colors: observer, daylight and linear sRGB."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def observer(nm: Floats) -> Floats:
-    """The curves x, y, z of the CIE 1931 observer, (3, N) (Wyman2013, table 1)."""
+    """The color-matching functions x, y, z of the CIE 1931 observer, (3, N) (Wyman2013, table 1)."""
 
-    def bell(centre: float, low: float, high: float) -> Floats:
-        return np.exp(-0.5 * ((nm - centre) * np.where(nm < centre, low, high)) ** 2)
+    def bell(center: float, low: float, high: float) -> Floats:
+        return np.exp(-0.5 * ((nm - center) * np.where(nm < center, low, high)) ** 2)
 
     x = 0.362 * bell(442.0, 0.0624, 0.0374) + 1.056 * bell(599.8, 0.0264, 0.0323) - 0.065 * bell(501.1, 0.0490, 0.0382)
     y = 0.821 * bell(568.8, 0.0213, 0.0247) + 0.286 * bell(530.9, 0.0613, 0.0322)
@@ -36,7 +36,7 @@ WAVELENGTHS = np.arange(380.0, 781.0, 10.0)  # nm, of D65
 
 
 def weights(nm: Floats) -> Floats:
-    """What each of equally spaced wavelengths adds to linear sRGB under D65, (N, 3); a flat reflectance is grey."""
+    """Linear sRGB per unit reflectance at equally spaced wavelengths under D65, (N, 3); a flat one is gray."""
     light = np.interp(nm, WAVELENGTHS, D65, left=0.0, right=0.0)
     rgb = (observer(nm) * light).T @ XYZ_TO_RGB.T
     chromaticity: Floats = rgb / rgb.sum(axis=0)

@@ -1,7 +1,7 @@
-"""How a refractive index depends on the wavelength: formulas and tables.
+"""The dependence of a refractive index on the wavelength: formulas and tables.
 
-Formulas have the wavelength in micrometres, as they are printed; what the user sees is in nanometres. A formula, too,
-holds only where it was fitted: its range is part of it.
+Formulas take the wavelength in micrometers, as published; the public interface uses nanometers. A formula holds only
+where it was fitted, so its range is part of it.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..errors import InputError
 
 Floats: TypeAlias = NDArray[np.float64]
 
-SODIUM = 589.3  # nm, the middle of the D lines, where a single index of glass is meant
-VISIBLE = (400.0, 700.0)  # nm; what lies beyond gives 0.3 % of the luminance of daylight
+SODIUM = 589.3  # nm, the middle of the D lines: the wavelength of a glass's single index
+VISIBLE = (400.0, 700.0)  # nm; wavelengths outside contribute 0.3 % of the luminance of daylight
 ALL = (0.0, np.inf)
 
 
 class RefractiveIndex(NamedTuple):
-    """The complex index eta + i k, of the wavelengths asked for; k is 0 where the source has none."""
+    """The complex index eta + i k at the requested wavelengths; k is 0 if the source has none."""
 
     eta: Floats
     k: Floats
@@ -32,7 +32,7 @@ class RefractiveIndex(NamedTuple):
 class Dispersion:
     """An index as a function of the wavelength.
 
-    low, high  range in which it holds, nm
+    low, high  range of validity, nm
     """
 
     low: float
@@ -44,7 +44,7 @@ class Dispersion:
         return RefractiveIndex(eta, np.zeros_like(eta))
 
     def eta(self, wavelength: Floats) -> Floats:
-        """The real part, by wavelengths in micrometres."""
+        """The real part at wavelengths in micrometers."""
         raise NotImplementedError
 
 
@@ -60,9 +60,9 @@ class Constant(Dispersion):
 
 @dataclass(frozen=True)
 class Powers(Dispersion):
-    """sum_i c_i lambda^e_i: n itself, by Cauchy's formula, or n^2 (Schott's old catalogues).
+    """sum_i c_i lambda^e_i: n itself (Cauchy's formula) or n^2 (Schott's old catalogs).
 
-    terms    (c, e), lambda in micrometres
+    terms    (c, e), lambda in micrometers
     squared  whether the sum is n^2
     """
 
@@ -76,7 +76,7 @@ class Powers(Dispersion):
 
 @dataclass(frozen=True)
 class Sellmeier(Dispersion):
-    """n^2 = constant + sum_i b_i lambda^2 / (lambda^2 - c_i), with lambda^2 and c_i in square micrometres."""
+    """n^2 = constant + sum_i b_i lambda^2 / (lambda^2 - c_i), with lambda^2 and c_i in square micrometers."""
 
     terms: tuple[tuple[float, float], ...]
     constant: float = 1.0
@@ -102,7 +102,7 @@ class Gas(Dispersion):
 
 @dataclass(frozen=True)
 class Table(Dispersion):
-    """Measured values, linear in the wavelength between them.
+    """Measured values, interpolated linearly in the wavelength.
 
     wavelengths  nm, ascending
     """
@@ -118,7 +118,7 @@ class Table(Dispersion):
 
 @dataclass(frozen=True)
 class Absorbing(Dispersion):
-    """A formula for eta, and a table for k."""
+    """A formula for eta and a table for k."""
 
     real: Dispersion
     imaginary: Table
@@ -129,12 +129,12 @@ class Absorbing(Dispersion):
 
 @dataclass(frozen=True)
 class OpticalConstants:
-    """What is known of a substance's refractive index.
+    """The refractive index of a substance with its description.
 
-    name    what it is called by
-    title   what it is
+    name    the name by which it is selected
+    title   a description
     curve   the index by wavelength
-    source  where that stands
+    source  the reference
     """
 
     name: str
@@ -144,7 +144,7 @@ class OpticalConstants:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Wavelengths for which it is known, nm."""
+        """Range of wavelengths in which it is known, nm."""
         return self.curve.low, self.curve.high
 
     @property
@@ -153,37 +153,37 @@ class OpticalConstants:
         return not isinstance(self.curve, Constant)
 
     def at(self, wavelength: float | list[float] | Floats, outside: str = "refuse") -> RefractiveIndex:
-        """The index at wavelengths (nm, in vacuum), in arrays of their shape.
+        """The index at wavelengths (nm, in vacuum), as arrays of their shape.
 
-        outside  of the range: "refuse", or "level" for the value at its end
+        outside  handling of wavelengths out of range: "refuse", or "level" for the value at the nearer end
         """
         given = np.asarray(wavelength, np.float64)
         low, high = self.range
         if outside not in ("refuse", "level"):
             raise InputError(f"'{outside}' given, refuse or level expected", "outside")
         if given.size and not np.all(np.isfinite(given) & (given > 0.0)):
-            raise InputError("a wavelength that is not a positive number", "wavelength", "give nanometres")
+            raise InputError("a wavelength that is not a positive number", "wavelength", "give nanometers")
         wrong = given[(given < low) | (given > high)]
         if wrong.size and outside == "refuse":
-            hint = "in nanometres" if high >= 20.0 * wrong.flat[0] else 'outside="level" takes the value at the end'
-            what = f"{wrong.flat[0]:g} nm is outside of {self.name}, which is known from {low:g} to {high:g} nm"
+            hint = "in nanometers" if high >= 20.0 * wrong.flat[0] else 'outside="level" uses the value at the end'
+            what = f"{wrong.flat[0]:g} nm is outside the range of {self.name}, which is {low:g} to {high:g} nm"
             raise InputError(what, "wavelength", hint)
         with np.errstate(all="ignore"):
             constants = self.curve.at(np.clip(given, low, high))
         missing = given[~np.isfinite(constants.eta)]
         if missing.size:
-            what = f"{self.name} has no index at {missing.flat[0]:g} nm: a resonance, or the square of none"
-            raise InputError(what, "wavelength", "formulas have lambda in micrometres")
+            what = f"{self.name} has no index at {missing.flat[0]:g} nm: the formula gives n^2 < 0 or diverges"
+            raise InputError(what, "wavelength", "formulas take lambda in micrometers")
         return constants
 
     @property
     def sodium(self) -> float:
-        """eta at 589.3 nm, or at the nearest wavelength that is known: what one number for it would be."""
+        """eta at 589.3 nm or the nearest known wavelength, for use as a single number."""
         return float(self.at(SODIUM, "level").eta)
 
 
 class DispersiveIndex(float):
-    """A dielectric's index that knows how it depends on the wavelength. As a number it is that at 589.3 nm."""
+    """A dielectric's index together with its dispersion. As a number it is the index at 589.3 nm."""
 
     constants: OpticalConstants
 

@@ -1,4 +1,4 @@
-"""The local frame: +z is the shading normal, x the tangent; all directions are unit vectors that point away."""
+"""The local frame: +z is the shading normal, x the tangent; directions are unit vectors away from the surface."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..ops import Direction, Pair, Scalar, dot, function, sincos, sqr, vec3
 
 @function
 def reflect(w: Direction, m: Direction) -> Direction:
-    """w mirrored at the normal m: 2 (w.m) m - w."""
+    """w reflected about the normal m: 2 (w.m) m - w."""
     return m * (2.0 * dot(w, m)) - w
 
 
 def mirror(w: Direction) -> Direction:
-    """w mirrored at the surface normal z."""
+    """w reflected about the surface normal z."""
     return vec3(-w.x, -w.y, w.z)
 
 
 @function
 def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction:
-    """w refracted at the normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
+    """w refracted at a facet with normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
 
     cos_t  cosine of the transmitted direction, positive, from `fresnel.cos_transmitted`
     eta    index on the far side over index on w's side
@@ -31,29 +31,29 @@ def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction
 
 
 def spherical_direction(sin_theta: Scalar, cos_theta: Scalar, phi: Scalar) -> Direction:
-    """The direction of polar angle theta, by its sine and cosine, and azimuth phi; `spherical_array` in NumPy.
+    """The direction with polar angle theta, given by its sine and cosine, and azimuth phi; NumPy: `spherical_array`.
 
-    For computations only: the recorder would name its variables, so shaders write these two lines out."""
+    For computations only: the recorder would use its variable names, so recorded formulas write these lines out."""
     s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
 
 
 def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """The directions, (..., 3), of NumPy arrays that go together."""
+    """The directions, (..., 3), of NumPy arrays that broadcast."""
     parts = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def normal_like(like: Direction) -> Direction:
-    """The surface normal, one for every ray of `like`."""
+    """The surface normal, one per ray of `like`."""
     zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)
 
 
 @function
 def rotate(w: Direction, rotation: Pair | None) -> Direction:
-    """w in a frame that is turned about z by an angle given as the vector (cos, sin)."""
-    if rotation is None:  # known before anything runs: no rotation at all
+    """w in a frame rotated about z by an angle given as (cos, sin)."""
+    if rotation is None:  # static: no rotation is compiled
         return w
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
 
@@ -82,11 +82,11 @@ def sin2(w: Direction) -> Scalar:
 
 @function
 def half_vector(wo: Direction, wi: Direction) -> Direction:
-    """Normal of the facet that mirrors wo into wi, unit; 0 where wo = -wi, which no facet above does."""
+    """Unit normal of the facet that mirrors wo into wi; 0 where wo = -wi, for which there is no such facet above."""
     h = wo + wi
     length2 = dot(h, h)
     return h * ops.rsqrt(ops.maximum(length2, TINY))
 
 
-# The smallest normal float32 is 1.2e-38; its root, squared again, must not vanish in a quotient.
+# The smallest normal float32 is 1.2e-38; its root, squared again, must not underflow in a quotient.
 TINY = 1e-30

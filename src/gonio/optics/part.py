@@ -1,7 +1,7 @@
-"""What the parts of a microfacet material share: distributions of normals, masking terms and Fresnel kinds.
+"""The base of the parts of a microfacet material: distributions of normals, masking terms and Fresnel kinds.
 
-Each is a class whose one instance is known by name. One of the user's own is tried when it joins its family: what is
-missing, or cannot run, is an error with its line then, instead of a failure deep inside a render.
+Each is a class with one named instance. A user-defined part is tested when it joins its family, so that a missing or
+broken formula is reported with its line immediately, instead of deep inside a render.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ SAMPLES = {"vec3": (0.36, 0.48, 0.8), "vec2": (0.3, 0.4), "spectrum": (0.2, 0.5,
 
 
 class MissingFormula(InputError, NotImplementedError):
-    """A method that is asked for, and that a part of the user's own does not have."""
+    """A method that is called but not defined by a user-defined part."""
 
 
 class Part:
-    """Base of the three.
+    """Base of distributions of normals, masking terms and Fresnel kinds.
 
-    name      in options, scenes and manuals; made from the class name where a class does not give its own
-    formulas  method -> kinds of its arguments, and of what it returns; what is no kind of value `_given` gives
+    name      used in options, scenes and manuals; derived from the class name by default
+    formulas  method -> kinds of its arguments and of its result; `_given` supplies arguments that are not values
     """
 
     name: ClassVar[str] = ""
@@ -41,15 +41,15 @@ class Part:
             cls.name = "" if words.startswith("-") else words
 
     def missing(self) -> str:
-        """What must be written and is not, as its signature: "D(self, m, alpha)"; "" where nothing is missing."""
+        """The signature of a method that must be defined and is not: "D(self, m, alpha)"; "" if none is missing."""
         return ""
 
     def lacks(self, what: str, method: str) -> MissingFormula:
-        """The error where a method is asked for that is missing; `method` is its signature."""
+        """The error for a call of a missing method with signature `method`."""
         return MissingFormula(f"{type(self).__name__} has {what}", self.place(), f"write {method}; see {GUIDE}")
 
     def check_formulas(self) -> None:
-        """Raise InputError where a formula is missing, cannot run, or returns what it must not."""
+        """Raise InputError if a formula is missing, cannot run, or returns a wrong type."""
         missing = self.missing()
         if missing:
             raise self.lacks(f"no `{missing.partition('(')[0]}`", missing)
@@ -67,18 +67,18 @@ class Part:
             return ""
 
     def _given(self, kind: str) -> object:
-        """What stands for an argument that is no value, such as a distribution."""
+        """An argument that is not a value, such as a distribution."""
         raise NotImplementedError(kind)
 
     def _try(self, method: str, kinds: tuple[str, ...]) -> None:
-        """By recording, which compiles nothing; by running it where code is for Dr.Jit alone."""
+        """Test a formula by recording it, which compiles nothing; by running it if it uses Dr.Jit directly."""
         formula = inspect.unwrap(getattr(type(self), method)).__get__(self)
         *given, expected = kinds
         names = list(inspect.signature(formula).parameters)[: len(given)]
         try:
             inspect.signature(formula).bind(*given)
         except TypeError as error:
-            what = f"{method} of {type(self).__name__}: {error}; it is called with {len(given)} arguments and self"
+            what = f"{method} of {type(self).__name__}: {error}; it is called with self and {len(given)} arguments"
             raise InputError(what, self.place(method), f"see {GUIDE}") from None
         values = {name: kind for name, kind in zip(names, given, strict=True) if kind in SAMPLES}
         others: dict[str, Value] = {
@@ -91,7 +91,7 @@ class Part:
         except Exception:
             self._run(method, given)
             return
-        if kind not in (expected, "float"):  # one number serves all channels
+        if kind not in (expected, "float"):  # one number may serve all channels
             hint = "alpha is a pair: use alpha.x and alpha.y" if kind == "vec2" else "return one value per ray"
             what = f"{method} of {type(self).__name__} returned a {kind}, a {expected} expected"
             raise InputError(what, self.place(method), hint)
@@ -104,7 +104,7 @@ class Part:
         except GonioError:
             raise
         except Exception as error:
-            hint = f"it must run on Dr.Jit values, in the words of gonio.ops; see {GUIDE}"
+            hint = f"it must run on Dr.Jit values, with the functions of gonio.ops; see {GUIDE}"
             raise InputError(summary(error), user_line(error) or self.place(method), hint) from error
 
 

@@ -1,4 +1,4 @@
-"""Special functions that the optics needs, built from the vocabulary alone."""
+"""Special functions for optics, built from the vocabulary only."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..ops import Scalar, Spectrum, abs, clamp, erf, exp, fma, function, is_shor
 
 V = TypeVar("V", Scalar, Spectrum)
 
-# Giles2010, the single-precision polynomial: coefficients in falling powers.
+# Giles2010, the single-precision polynomial: coefficients in descending powers.
 # fmt: off
-_CENTRE = (
+_CENTER = (
     2.81022636e-08, 3.43273939e-07, -3.5233877e-06, -4.39150654e-06, 0.00021858087,
     -0.00125372503, -0.00417768164, 0.246640727, 1.50140941,
 )
@@ -31,7 +31,7 @@ _RAMP_UNDER = (3.54490742, -0.11616595, 1.10290261, 0.09772537, 0.10158618, 0.03
 
 @lru_cache
 def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes and weights of Gauss-Legendre on [0, 1]."""
+    """Nodes and weights of the Gauss-Legendre rule on [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(count)
     return 0.5 * (x + 1.0), 0.5 * w
 
@@ -40,19 +40,19 @@ def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def erfinv(x: Scalar) -> Scalar:
     """Inverse error function on (-1, 1): Giles2010's polynomial, relative error about 4e-7.
 
-    That is float32's last digits; in float64 a step of Newton's method follows, error 1e-12 up to |x| = 1 - 1e-7.
+    This is float32 precision; in float64 a step of Newton's method follows, error 1e-12 up to |x| = 1 - 1e-7.
     """
     w = -log((1.0 - x) * (1.0 + x))
-    centre = w < 5.0
-    t = where(centre, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
-    # outside of a material's formula a choice between two plain numbers has 32 bits: the sums are chosen from
-    value = where(centre, _CENTRE[0] * t + _CENTRE[1], _TAIL[0] * t + _TAIL[1])
-    for a, b in zip(_CENTRE[2:], _TAIL[2:], strict=True):
-        value = where(centre, value * t + a, value * t + b)
+    center = w < 5.0
+    t = where(center, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
+    # outside a formula `where` between two plain numbers has 32 bits, so the choice is between sums
+    value = where(center, _CENTER[0] * t + _CENTER[1], _TAIL[0] * t + _TAIL[1])
+    for a, b in zip(_CENTER[2:], _TAIL[2:], strict=True):
+        value = where(center, value * t + a, value * t + b)
     y = value * x
     if is_short(x):
         return y
-    # exp(y^2) magnifies the rounding of erf: further out the polynomial is better
+    # exp(y^2) magnifies the rounding of erf: farther out the polynomial is more accurate
     return where(abs(y) < 4.5, y - (erf(y) - x) * exp(sqr(y)) * (0.5 * SQRT_PI), y)
 
 
@@ -60,9 +60,9 @@ def erfinv(x: Scalar) -> Scalar:
 def gaussian_ramp(a: Scalar) -> Scalar:
     """int_-inf^a (a - x) exp(-x^2) dx / sqrt(pi) = a (1 + erf a) / 2 + exp(-a^2) / (2 sqrt(pi)), for a >= 0.
 
-    The part of a Gaussian's slopes below a. In float32 a rational function, within 8e-8 of it: with erf and exp
-    Beckmann's pdf took 1.8 times as long. Its coefficients are our own fit, by least squares of the relative error,
-    reweighted toward the largest at 4000 Chebyshev points; from a = 4 on it is a, to 2e-10.
+    The integral over a Gaussian's slopes below a. In float32 a rational function, within 8e-8 of it: with erf and exp
+    Beckmann's pdf took 1.8 times as long. The coefficients were fitted for Gonio by least squares of the relative error
+    at 4000 Chebyshev points, reweighted toward the largest; from a = 4 on the value is a, within 2e-10.
     """
     if not is_short(a):
         return 0.5 * a * (1.0 + erf(a)) + (0.5 / SQRT_PI) * exp(-sqr(a))
@@ -70,7 +70,7 @@ def gaussian_ramp(a: Scalar) -> Scalar:
 
 
 def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
-    """The polynomial with these coefficients, in rising powers."""
+    """The polynomial with these coefficients, in ascending powers."""
     value = fma(x, coefficients[-1], coefficients[-2])
     for c in reversed(coefficients[:-2]):
         value = fma(value, x, c)
@@ -79,9 +79,9 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 @function
 def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
-    """cos(theta)^p, from the squared sine where that is under 0.1: near 1 a cosine is rounded too coarsely for large p.
+    """cos(theta)^p, from the squared sine if that is below 0.1: near 1 a cosine is rounded too coarsely for large p.
 
-    log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)), whose next term is under 1e-18.
+    log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)); the first omitted term is below 1e-18.
     """
     t = minimum(sin2, 0.1)
     z = t / (t - 2.0)
@@ -93,7 +93,7 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
 
 @function
 def exprel(x: V) -> V:
-    """(e^x - 1) / x, 1 at x = 0: by its series up to |x| = 1/2, whose next term is under 2e-17 of it."""
+    """(e^x - 1) / x, 1 at x = 0: up to |x| = 1/2 by its series, whose first omitted term is below 2e-17 of it."""
     t = clamp(x, -0.5, 0.5)
     series = 1.0 + t * (1.0 / 13.0)
     for n in range(12, 1, -1):
@@ -104,7 +104,7 @@ def exprel(x: V) -> V:
 
 @function
 def logrel(x: Scalar) -> Scalar:
-    """log(1 + x) / x for x > -1, 1 at x = 0: up to |x| = 1/4 by 2 atanh(x / (2 + x)), next term under 1e-17 of it."""
+    """log(1 + x) / x for x > -1, 1 at x = 0: up to |x| = 1/4 by 2 atanh(x / (2 + x)), relative error below 1e-17."""
     t = clamp(x, -0.25, 0.25)
     z2 = sqr(t / (2.0 + t))
     series = 1 / 17 + z2 * (1 / 19)
@@ -116,21 +116,21 @@ def logrel(x: Scalar) -> Scalar:
 
 @function
 def power_integral(log_t: Scalar, q: Scalar) -> Scalar:
-    """int_1^t s^(q - 1) ds = (t^q - 1) / q from log t, log t itself at q = 0."""
+    """int_1^t s^(q - 1) ds = (t^q - 1) / q from log t; log t at q = 0."""
     return log_t * exprel(q * log_t)
 
 
 @function
 def power_quantile(area: Scalar, q: Scalar) -> Scalar:
-    """log t of the t up to which `power_integral` is `area`: a power law's distribution function turned round."""
+    """log t of the t for which `power_integral` is `area`: the inverse distribution function of a power law."""
     return area * logrel(q * area)
 
 
 @function
 def log_share(q: Scalar, p: Scalar) -> Scalar:
-    """log q of a share, p = 1 - q given beside it: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
+    """log q of a fraction, with p = 1 - q given: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
 
-    The next term of the series is under 4e-10 of its value.
+    The first omitted term of the series is below 4e-10 of its value.
     """
     t = minimum(p, 0.5)
     z = t / (t - 2.0)
@@ -143,7 +143,7 @@ def log_share(q: Scalar, p: Scalar) -> Scalar:
 
 @function
 def _stirling(x: Scalar) -> Scalar:
-    """The series of log Gamma beyond its leading terms; the next term is under 2e-9 at x = 4."""
+    """The series of log Gamma beyond its leading terms; the first omitted term is below 2e-9 at x = 4."""
     r = 1.0 / x
     r2 = sqr(r)
     series = 1 / 12 - r2 * (1 / 360 - r2 * (1 / 1260 - r2 * (1 / 1680 - r2 * (1 / 1188))))
@@ -154,9 +154,9 @@ def _stirling(x: Scalar) -> Scalar:
 def beta(a: Scalar, b: Scalar) -> Scalar:
     """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
 
-    Both arguments are moved up by three with B(a, b) = B(a + 1, b) (a + b) / a, then Stirling's series is taken with
-    its leading terms joined into ratios. Relative error under 1e-8 in float64, about 1e-6 in float32. Arguments over
-    1e8 count as 1e8: the fourth power of one must stay a float32.
+    Both arguments are shifted up by three with B(a, b) = B(a + 1, b) (a + b) / a; then Stirling's series is used with
+    its leading terms combined into ratios. Relative error below 1e-8 in float64, about 1e-6 in float32. Arguments above
+    1e8 count as 1e8: their fourth power must not overflow float32.
     """
     a, b = minimum(a, 1e8), minimum(b, 1e8)
     ratio: Scalar | float = 1.0

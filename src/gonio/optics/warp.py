@@ -25,7 +25,7 @@ def square_to_cosine_hemisphere_pdf(w: Direction) -> Scalar:
 def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
     """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994).
 
-    sin^2 is taken from the logarithm of the cosine: at p = 1e5 the difference 1 - cos^2 has no digits left in float32.
+    sin^2 is computed from the logarithm of the cosine: at p = 1e5 the difference 1 - cos^2 has no digits in float32.
     """
     log_cos = ops.log(1.0 - u1) / (p + 1.0)
     cos_theta = ops.exp(log_cos)
@@ -43,7 +43,7 @@ def square_to_power_lobe_pdf(cos_theta: Scalar, p: Scalar) -> Scalar:
 
 @function
 def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
-    """(axis.w)^p, from the distance of the two: near the peak their product has no digits left for a large p."""
+    """(axis.w)^p, from the distance of the two: near the peak their dot product has no digits left for large p."""
     off = w - axis
     versine = 0.5 * dot(off, off)
     return power_of_cosine(dot(axis, w), versine * (2.0 - versine), p)
@@ -51,7 +51,7 @@ def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
 
 @function
 def to_frame(axis: Direction, w: Direction) -> Direction:
-    """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
+    """w, given relative to +z, relative to a unit axis; the basis is discontinuous only at axis = -z (Duff2017)."""
     side = ops.copysign(ops.ones_like(axis.z), axis.z)
     a = -1.0 / (side + axis.z)
     b = axis.x * axis.y * a

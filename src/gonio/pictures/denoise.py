@@ -1,4 +1,5 @@
-"""Remove the noise of few samples with Intel Open Image Denoise, which comes with Gonio where pyoidn has a wheel."""
+"""Denoise pictures with Intel Open Image Denoise, which is installed with Gonio on platforms where pyoidn has a
+wheel."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ _HINT = f"{INSTALL}, or leave --denoise out"
 
 
 def available() -> str:
-    """The version of pyoidn in reach, "" where there is none; nothing is loaded."""
+    """The version of the installed pyoidn, "" if there is none; nothing is loaded."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -21,22 +22,22 @@ def available() -> str:
 
 
 def require() -> None:
-    """Raise MachineError where OIDN is missing: asked before a render, so that no time is lost."""
+    """Raise MachineError if OIDN is missing; called before a render, so that no time is lost."""
     if not available():
         raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _HINT)
 
 
 def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None) -> np.ndarray:
-    """The picture without noise: (H, W, 3) float32, linear, unbounded above.
+    """The denoised picture: (H, W, 3) float32, linear, unbounded above.
 
-    albedo  surface colour in [0, 1], noisy or not; keeps texture edges sharp
-    normal  shading normals in [-1, 1]; keeps geometric edges sharp; needs `albedo` (a rule of OIDN)
-    Biased: what looks like noise is taken for noise. Values that are not finite are taken as 0.
-    Raises MachineError where OIDN is missing or fails, InputError for arrays of other shapes.
+    albedo  surface color in [0, 1], noisy or not; preserves texture edges
+    normal  shading normals in [-1, 1]; preserves geometric edges; needs `albedo` (a rule of OIDN)
+    Biased: fine detail may be removed as noise. Values that are not finite are replaced by 0.
+    Raises MachineError if OIDN is missing or fails, InputError for arrays of other shapes.
     """
-    colour = _checked("image", image, np.asarray(image).shape)
+    color = _checked("image", image, np.asarray(image).shape)
     guides = {
-        name: np.clip(_checked(name, guide, colour.shape), low, 1)
+        name: np.clip(_checked(name, guide, color.shape), low, 1)
         for name, guide, low in (("albedo", albedo, 0), ("normal", normal, -1))
         if guide is not None
     }
@@ -46,7 +47,7 @@ def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndar
     try:
         from pyoidn.denoise import denoise as filter_picture
 
-        return np.asarray(filter_picture(np.maximum(colour, 0), hdr=True, **guides))
+        return np.asarray(filter_picture(np.maximum(color, 0), hdr=True, **guides))
     except ImportError as error:
         raise MachineError(f"pyoidn {available()} cannot be used: {error}", "--denoise", _HINT) from error
     except (RuntimeError, OSError) as error:

@@ -1,13 +1,14 @@
-"""Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written whole or not at all.
+"""Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written completely or not at all.
 
-A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. PNG is what a screen shows: times
-2^exposure, clamped, sRGB-encoded, 8 bit. The settings go into EXR attributes, PNG text chunks, comment lines
+A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. A PNG holds a screen's values: times
+2^exposure, clamped, sRGB-encoded, 8 bit. The settings are stored in EXR attributes, PNG text chunks, comment lines
 of the Radiance header, or an array named `metadata` in an .npz.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import zlib
@@ -23,8 +24,8 @@ from .. import archives, files
 from ..bridge import engine
 from ..bridge.faults.exr_threads import file_threads
 from ..catalog.operands import PICTURE_SUFFIXES
-from ..errors import InputError, did_you_mean
-from ..owner import alone
+from ..errors import InputError, MachineError, did_you_mean, encodable, summary
+from ..owner import exclusive
 from . import exposures, formats
 
 Value = str | int | float
@@ -33,14 +34,14 @@ Number = TypeVar("Number", bound=np.generic)
 Metadata = Mapping[str, Value]
 
 SUFFIXES = PICTURE_SUFFIXES
-_PREFIX = "gonio."  # keeps our attributes apart from the format's own, and finds them again
+_PREFIX = "gonio."  # distinguishes Gonio's attributes from the format's own
 
 _KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture read from `path`; `hdr` is False where the file holds a screen's values (.png)."""
+    """A picture read from `path`; `hdr` is False if the file holds a screen's values (.png)."""
 
     pixels: RGB
     path: Path
@@ -53,60 +54,77 @@ class Picture:
 
 def check_writable(path: str | Path) -> Path:
     """The file `path` will become (links followed), or an InputError before hours are spent on it."""
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        hint = did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
-        raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
-    return files.check_file(target)
+    _suffix(path)
+    return files.check_file(path)
 
 
-@alone
+def _suffix(path: str | Path) -> str:
+    """The suffix of a picture's file, in lower case. Raises InputError for one that no picture has."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown picture format '{Path(path).suffix}'", str(path), hint)
+    return suffix
+
+
+@exclusive
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
-    """Write a picture in the format its suffix names, whole or not at all.
+    """Write a picture in the format of its suffix, completely or not at all.
 
     exposure  stops; PNG only, since the other formats keep radiance as it is
+    Raises InputError for what is no picture, or no picture's name; InputError or MachineError where it cannot be
+    written, which says where the picture is instead.
     """
-    target = check_writable(path)
+    suffix = _suffix(path)
     if np.iscomplexobj(pixels):
         raise InputError("complex numbers given, an RGB picture expected", str(path))
     picture = np.ascontiguousarray(pixels, dtype=np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
-    settings = dict(metadata or {})
-    suffix = target.suffix.lower()
-    if suffix == ".png":
-        content = png_bytes(to_screen(picture, exposure), settings)
-    elif suffix == ".npz":
-        content = _npz_bytes(picture, settings)
-    elif suffix == ".hdr":
-        content = _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
-    else:
-        content = _bitmap_bytes(picture, settings, "OpenEXR")
+    # Names of files are bytes on some systems; no format can hold those that are no text.
+    settings = {key: encodable(value) if isinstance(value, str) else value for key, value in (metadata or {}).items()}
+    try:
+        content = _encoded(suffix, picture, settings, exposure)
+    except Exception as error:  # whatever a library says: the picture must not be lost
+        array = _npz_bytes(picture, {})
+        kept = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
+        hint = "nothing was written" if kept is None else f"it is kept as {kept}: `gonio convert` reads that"
+        raise MachineError(f"cannot be written as {suffix}: {summary(error)}", str(path), hint) from error
     return files.write_whole(path, content)
 
 
+def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> bytes:
+    if suffix == ".png":
+        return png_bytes(to_screen(picture, exposure), settings)
+    if suffix == ".npz":
+        return _npz_bytes(picture, settings)
+    if suffix == ".hdr":
+        return _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
+    return _bitmap_bytes(picture, settings, "OpenEXR")
+
+
 class Shown(NamedTuple):
-    """How a picture was written: the stops of a .png, None of other formats; what there is to say about it, or ""."""
+    """How a picture was written: the stops of a .png, None for other formats; and a notice for the user, or ""."""
 
     exposure: float | None
     notice: str
 
 
 def show(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0) -> Shown:
-    """Write a picture as `write` does, by an exposure that may be "auto", and say where a screen clips it."""
+    """Write a picture as `write` does, with an exposure that may be "auto"; the notice says what a screen clips."""
     if Path(path).suffix.lower() != ".png":
         write(path, pixels, metadata)
-        kept = f"{Path(path).suffix} keeps radiance as it is: --exposure is for .png"
-        return Shown(None, "" if exposure == 0 else kept)
+        notice = f"{Path(path).suffix} stores radiance: --exposure applies to .png"
+        return Shown(None, "" if exposure == 0 else notice)
     chosen = exposures.stops(exposure, pixels)
     write(path, pixels, {**(metadata or {}), "exposure": chosen}, chosen)
     return Shown(chosen, exposures.clipping(chosen, pixels, automatic=exposure == "auto"))
 
 
 def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:
-    """Write a picture again in the format that the suffix names, its settings kept; a .png by `exposure`, in stops.
+    """Write a picture in the format of the suffix, with its settings; a .png at `exposure`, in stops.
 
-    A .png as source is decoded from sRGB, and what it clipped stays so. Raises InputError as `read` and `write` do.
+    A .png as source is decoded from sRGB; clipped values stay clipped. Raises InputError as `read` and `write` do.
     """
     check_writable(output)
     picture = read(source)
@@ -115,14 +133,14 @@ def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure
 
 
 def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:
-    """Linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
+    """Convert linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
     x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
     return (encoded * 255 + 0.5).astype(np.uint8)
 
 
 def from_screen(values: NDArray[np.floating]) -> RGB:
-    """sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
+    """Convert sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
@@ -167,8 +185,8 @@ def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
 
 
 def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:
-    """A Radiance file with the settings as comment lines behind its first line."""
-    rest = radiance.split(b"\n", 1)[1]  # Mitsuba opens with "#?RGBE", which not every reader takes
+    """A Radiance file with the settings as comment lines after its first line."""
+    rest = radiance.split(b"\n", 1)[1]  # Mitsuba writes "#?RGBE", which not every reader accepts
     lines = [f"# {_PREFIX}{key}={_one_line(value)}".encode() for key, value in metadata.items()]
     return b"\n".join([b"#?RADIANCE", *lines, rest])
 
@@ -191,18 +209,18 @@ def _one_line(value: Value) -> str:
 ENCODINGS = ("srgb", "linear")
 
 
-@alone
+@exclusive
 def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 
-    encoding  of a .png: "srgb", as screens show it, or "linear", data such as a table, as they are stored
-    An .npz holds `radiance` (or one array only). Grey becomes three channels.
-    Raises InputError for a file that is missing, empty, damaged, of another format, or larger than its bytes
-    can hold.
+    encoding  of a .png: "srgb" for pictures, or "linear" for data such as a table, read as stored
+    An .npz holds `radiance` (or one array only). Gray pictures get three equal channels.
+    Raises InputError for a file that is missing, empty, damaged, of another format, or claims more pixels than its
+    bytes can hold.
     """
     if encoding not in ENCODINGS:
         raise InputError(f"unknown encoding '{encoding}'", "--encoding", did_you_mean(encoding, ENCODINGS))
-    source = Path(path).expanduser()
+    source = Path(os.path.expanduser(path))
     suffix = source.suffix.lower()
     if suffix not in SUFFIXES:
         what = f"unknown picture format '{source.suffix}'"
@@ -228,41 +246,41 @@ def _nearby(source: Path) -> str:
 
 
 def _read_bitmap(source: Path, content: bytes, suffix: str, encoding: str) -> tuple[RGB, dict[str, Value]]:
-    kind, where = _KINDS[suffix], str(source)
+    kind, location = _KINDS[suffix], str(source)
     if formats.kind_of(content) != kind:
-        raise InputError(f"this is no {suffix[1:].upper()} picture", where, "check the file or its suffix")
+        raise InputError(f"this is not a {suffix[1:].upper()} picture", location, "check the file or its suffix")
     try:
         values, _ = formats.decode(source, content, kind)
         metadata = _metadata(content, suffix)
     except formats.Unreadable as error:
-        raise InputError(f"this picture is damaged: {error}", where, "render or copy it again") from error
-    if suffix == ".png" and encoding == "srgb":  # by our own decoding: a 16-bit PNG would be taken for linear
-        pixels = from_screen(_three_channels(values, where))
+        raise InputError(f"this picture is damaged: {error}", location, "render or copy it again") from error
+    if suffix == ".png" and encoding == "srgb":  # decoded here, since a 16-bit PNG would be read as linear
+        pixels = from_screen(_three_channels(values, location))
     else:
-        pixels = _three_channels(values, where)
+        pixels = _three_channels(values, location)
     return np.ascontiguousarray(pixels, np.float32), metadata
 
 
 def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:
-    grey = values if values.ndim == 3 else values[..., None]
-    if grey.shape[2] in (1, 2):  # luminance, with or without alpha
-        return np.repeat(grey[..., :1], 3, axis=2)
-    if grey.shape[2] in (3, 4):
-        return grey[..., :3]
-    raise InputError(f"{grey.shape[2]} channels, expected RGB", str(path), "keep one layer only")
+    pixels = values if values.ndim == 3 else values[..., None]
+    if pixels.shape[2] in (1, 2):  # luminance, with or without alpha
+        return np.repeat(pixels[..., :1], 3, axis=2)
+    if pixels.shape[2] in (3, 4):
+        return pixels[..., :3]
+    raise InputError(f"{pixels.shape[2]} channels, expected RGB", str(path), "keep one layer only")
 
 
 def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
-    found: Iterator[tuple[str, Value]]
+    values: Iterator[tuple[str, Value]]
     if suffix == ".exr":
-        found = _exr_values(content)
+        values = _exr_values(content)
     elif suffix == ".hdr":
         lines = content.split(b"\n\n", 1)[0].decode("utf-8", "replace").splitlines()
         ours = (line[2:].partition("=") for line in lines if line.startswith(f"# {_PREFIX}"))
-        found = (_parsed(key, value) for key, _, value in ours)
+        values = (_parsed(key, value) for key, _, value in ours)
     else:
-        found = _png_texts(content)
-    return {key.removeprefix(_PREFIX): value for key, value in found if key.startswith(_PREFIX)}
+        values = _png_texts(content)
+    return {key.removeprefix(_PREFIX): value for key, value in values if key.startswith(_PREFIX)}
 
 
 def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
@@ -285,7 +303,7 @@ def _png_texts(content: bytes) -> Iterator[tuple[str, Value]]:
 
 
 def _parsed(key: str, value: str) -> tuple[str, Value]:
-    """Numbers come back as numbers."""
+    """A metadata entry with its text converted to a number if possible."""
     try:
         return key, int(value)
     except ValueError:
@@ -296,18 +314,18 @@ def _parsed(key: str, value: str) -> tuple[str, Value]:
 
 
 def _read_npz(source: Path) -> tuple[RGB, dict[str, Value]]:
-    where = str(source)
+    location = str(source)
     try:
         arrays = archives.read(source)
         metadata = json.loads(str(arrays.pop("metadata", "{}")))
     except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"this .npz cannot be read: {error}", where, "save it with np.savez(...)") from error
+        raise InputError(f"this .npz cannot be read: {error}", location, "save it with np.savez(...)") from error
     name = "radiance" if "radiance" in arrays else next(iter(arrays), "") if len(arrays) == 1 else ""
     if not name:
-        hint = "save it with np.savez(path, radiance=picture); found: " + ", ".join(arrays)
-        raise InputError("no array named 'radiance'", where, hint)
+        hint = "save it with np.savez(path, radiance=picture); it contains " + ", ".join(arrays)
+        raise InputError("no array named 'radiance'", location, hint)
     array = arrays[name]
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu" or array.size == 0:
         what = f"'{name}' is {array.dtype} of shape {array.shape}, expected (H, W, 3) numbers"
-        raise InputError(what, where)
-    return _three_channels(array.astype(np.float32), where), metadata if isinstance(metadata, dict) else {}
+        raise InputError(what, location)
+    return _three_channels(array.astype(np.float32), location), metadata if isinstance(metadata, dict) else {}

@@ -1,8 +1,8 @@
-"""How far one picture is from another: RMSE, relMSE, mean ratio, and FLIP.
+"""Differences between two pictures: RMSE, relMSE, mean ratio, and FLIP.
 
-All take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP asks
-what a person sees who flips between the two: contrast sensitivity of the eye, colour distance, edges and
-points, each after [Andersson2020]; pictures of high dynamic range after [Andersson2021], the worst of the
+All take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP predicts the
+differences that a person sees when flipping between the two: contrast sensitivity of the eye, color distance, edges
+and points, each after [Andersson2020]; for pictures of high dynamic range after [Andersson2021], the largest over the
 exposures at which the reference can be shown.
 """
 
@@ -20,30 +20,30 @@ from ..errors import InputError, did_you_mean
 
 Floats = NDArray[np.floating]
 
-# The usual desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m [Andersson2020, section 6].
+# The assumed desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m [Andersson2020, section 6].
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
 
-# relMSE divides by r^2 + this, so that a black reference pixel does not rule the mean; with radiances near
-# one, it caps the weight of a pixel at 100.
+# relMSE divides by r^2 + this, so that a black reference pixel does not dominate the mean; with radiances near
+# one, it limits the weight of a pixel to 100.
 RELATIVE_FLOOR = 0.01
 
 
 METRICS: dict[str, str] = {
     "rmse": "root of the mean squared difference, in the picture's own unit",
     "relmse": "mean of (x - r)^2 / (r^2 + 0.01)",
-    "flip": "mean FLIP, 0 (same) to 1: what a person sees who flips between the two",
+    "flip": "mean FLIP, 0 (same) to 1: the visible difference when flipping between the two",
 }
 
 
 READ_AS = {
-    "srgb": "sRGB, decoded to linear values (.png); --encoding linear takes data, such as tables, as they are stored",
+    "srgb": "sRGB, decoded to linear values (.png); --encoding linear reads data, such as tables, as stored",
     "linear": "data, as stored (.png)",
 }
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What a comparison is judged by: the metric, and the most that passes; None passes all."""
+    """The metric and the largest value that passes; None lets any value pass."""
 
     metric: str = "relmse"
     most: float | None = None
@@ -57,8 +57,8 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `gonio compare` reports; `exposures` are the stops that HDR-FLIP spans, None for LDR; `encoding` is how .png
-    files were read, None where there were none."""
+    """The results of `gonio compare`; `exposures` are the stops that HDR-FLIP spans, None for LDR; `encoding` is how
+    .png files were read, None if there were none."""
 
     rmse: float
     relmse: float
@@ -80,7 +80,7 @@ class Comparison:
         return {**asdict(self), **judged}
 
     def rows(self) -> dict[str, str]:
-        """The figures in words, by name."""
+        """The figures as text, by name."""
         kind = "LDR" if self.exposures is None else "HDR, {:+.1f} to {:+.1f} EV".format(*self.exposures)
         rows = {
             "RMSE": f"{self.rmse:.6g}",
@@ -103,13 +103,13 @@ class Comparison:
 def _pair(test: Floats, reference: Floats) -> tuple[Floats, Floats]:
     a, b = np.asarray(test, np.float64), np.asarray(reference, np.float64)
     if a.shape != b.shape:
-        raise InputError(f"the pictures differ in size: {_size(a)} against {_size(b)}", "", "render both at one --size")
+        raise InputError(f"the pictures differ in size: {_size(a)} and {_size(b)}", "", "render both at one --size")
     if a.ndim != 3 or a.shape[2] != 3 or a.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {a.shape}")
     for name, picture in (("first", a), ("second", b)):
         bad = int(np.count_nonzero(~np.isfinite(picture)))
         if bad:
-            raise InputError(f"the {name} picture holds {bad} values that are not finite numbers")
+            raise InputError(f"the {name} picture has {bad} values that are not finite")
     return a, b
 
 
@@ -130,18 +130,18 @@ def relmse_map(test: Floats, reference: Floats) -> Floats:
 
 
 def relmse(test: Floats, reference: Floats) -> float:
-    """mean((x - r)^2 / (r^2 + 0.01)): the squared relative error, that dark pixels cannot blow up."""
+    """mean((x - r)^2 / (r^2 + 0.01)): the squared relative error, bounded for dark pixels."""
     return float(relmse_map(test, reference).mean())
 
 
 def mean_ratio(test: Floats, reference: Floats) -> float:
-    """mean(x) / mean(r): 1 where no energy is lost or made; NaN where the reference is black."""
+    """mean(x) / mean(r): 1 if energy is conserved; NaN if the reference is black."""
     a, b = _pair(test, reference)
     return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
 
 
 def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()) -> Comparison:
-    """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
+    """All metrics; `hdr` False compares both pictures as shown on a screen, clamped to [0, 1]."""
     _pair(test, reference)
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
@@ -155,7 +155,7 @@ def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolera
 
 
 # --- FLIP ------------------------------------------------------------------------------------------------
-# Not NVIDIA's wheel `flip-evaluator`, whose 1.7 there is for neither Python 3.14 nor Linux on ARM. The two agree: over
+# Not NVIDIA's wheel `flip-evaluator`, whose version 1.7 supports neither Python 3.14 nor Linux on ARM. Both agree: over
 # the 16 pictures of examples/, with 20 % of noise, the means differ by at most 7e-6 and pixels by 4e-5 (it is float32).
 
 _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Andersson2020]
@@ -168,8 +168,8 @@ _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Ander
 _RGB_FROM_XYZ = np.linalg.inv(_XYZ_FROM_RGB)
 _WHITE = _XYZ_FROM_RGB.sum(axis=1)
 
-_HYAB_POWER = 0.7  # q_c, [Andersson2020, section 4.1.3]: squeezes large colour distances
-_KNEE_IN, _KNEE_OUT = 0.4, 0.95  # p_c, p_t: 40 % of the largest distance maps to .95
+_HYAB_POWER = 0.7  # q_c, [Andersson2020, section 4.1.3]: compresses large color distances
+_KNEE_IN, _KNEE_OUT = 0.4, 0.95  # p_c, p_t: 40 % of the largest distance maps to 0.95
 _FEATURE_WIDTH = 0.082  # w, degrees: the width of an edge or point that the eye detects
 _FEATURE_POWER = 0.5  # q_f
 
@@ -186,15 +186,15 @@ def flip_map(test: Floats, reference: Floats, hdr: bool = True, pixels_per_degre
     """FLIP per pixel, (H, W), 0 to 1.
 
     With `hdr` False both pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True
-    both are brought to the screen at several exposures by ACES tone mapping, and every pixel keeps its worst
-    [Andersson2021, eq. 6]; the exposures follow from the reference alone (see `exposure_range`).
+    both are tone mapped (ACES) at several exposures, and every pixel gets its largest value [Andersson2021, eq. 6];
+    the exposures depend on the reference alone (see `exposure_range`).
     Not symmetric in HDR: swapping the pictures changes the exposures.
     """
     a, b = _pair(test, reference)
     if not hdr:
         return _ldr_flip(np.clip(a, 0, 1), np.clip(b, 0, 1), pixels_per_degree)
     start, stop = exposure_range(b)
-    count = max(2, math.ceil(stop - start))  # one a stop [Andersson2021, section 3.2]
+    count = max(2, math.ceil(stop - start))  # one per stop [Andersson2021, section 3.2]
     worst = np.zeros(a.shape[:2])
     for exposure in np.linspace(start, stop, count):
         test_shown, reference_shown = (_aces(np.maximum(x, 0) * 2.0**exposure) for x in (a, b))
@@ -211,15 +211,15 @@ def _aces(x: Floats) -> Floats:
 
 
 def exposure_range(reference: Floats) -> tuple[float, float]:
-    """First and last exposure in stops (powers of two): where ACES maps the reference's brightest pixel, and
-    then its median, to 0.85 [Andersson2021, section 3.2]."""
+    """First and last exposure in stops (powers of two), at which ACES maps the reference's brightest pixel and its
+    median to 0.85 [Andersson2021, section 3.2]."""
     k0, k1, k2, k3, k4, k5 = _ACES
     a, b, c = k0 - 0.85 * k3, k1 - 0.85 * k4, k2 - 0.85 * k5
     x_max = -b / (2 * a) + math.sqrt((b / (2 * a)) ** 2 - c / a)  # solves _aces(x) = 0.85
     luminance = np.maximum(np.asarray(reference, np.float64), 0) @ _XYZ_FROM_RGB[1]
     if luminance.max() <= 0:
-        return 0.0, 0.0  # a black reference has no exposure of its own; it is shown as it stands
-    # A picture whose median is black would ask for endless stops: 2^-23 of the peak is below float32's step.
+        return 0.0, 0.0  # a black reference is compared at exposure 0
+    # A picture with a black median would need unlimited stops: 2^-23 of the peak is below float32's resolution.
     median = max(float(np.median(luminance)), float(luminance.max()) * 2.0**-23)
     return math.log2(x_max / luminance.max()), math.log2(x_max / median)
 
@@ -227,13 +227,13 @@ def exposure_range(reference: Floats) -> tuple[float, float]:
 def _ldr_flip(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
     """LDR-FLIP of two linear RGB pictures in [0, 1]: dE_c^(1 - dE_f) [Andersson2020, eq. 5]."""
     a, b = _opponent(test), _opponent(reference)
-    distance = _colour_distance(a, b, pixels_per_degree)
+    distance = _color_distance(a, b, pixels_per_degree)
     features = _feature_distance((a[..., 0] + 16) / 116, (b[..., 0] + 16) / 116, pixels_per_degree)
     return distance ** (1 - features)
 
 
 def _opponent(rgb: Floats) -> Floats:
-    """Linear RGB to YyCxCz, the linear twin of L*a*b* in which the eye's filter acts."""
+    """Linear RGB to YyCxCz, a linear counterpart of L*a*b* in which the eye's filter is applied."""
     x, y, z = np.moveaxis(rgb @ _XYZ_FROM_RGB.T / _WHITE, -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
@@ -245,7 +245,7 @@ def _from_opponent(ycc: Floats) -> Floats:
 
 
 def _hunt_lab(rgb: Floats) -> Floats:
-    """L*a*b* with the Hunt adjustment: colours seem fuller when brighter, a and b scale by 0.01 L."""
+    """L*a*b* with the Hunt adjustment: brighter colors appear more saturated, a and b scale by 0.01 L."""
     t = rgb @ _XYZ_FROM_RGB.T / _WHITE
     delta = 6 / 29
     x, y, z = np.moveaxis(np.where(t > delta**3, np.cbrt(t), t / (3 * delta**2) + 4 / 29), -1, 0)
@@ -254,19 +254,19 @@ def _hunt_lab(rgb: Floats) -> Floats:
 
 
 def _hyab(a: Floats, b: Floats) -> Floats:
-    """City-block in lightness, Euclidean in chroma: better than either for large differences."""
+    """City-block distance in lightness, Euclidean in chroma: better than either for large differences."""
     difference = a - b
     return np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2])
 
 
-def _colour_distance(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
-    def seen(ycc: Floats) -> Floats:
+def _color_distance(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
+    def perceived(ycc: Floats) -> Floats:
         filtered = np.stack(
             [_contrast_filter(ycc[..., i], *_SENSITIVITY[i], pixels_per_degree) for i in range(3)], axis=-1
         )
         return _hunt_lab(np.clip(_from_opponent(filtered), 0, 1))
 
-    power = _hyab(seen(test), seen(reference)) ** _HYAB_POWER
+    power = _hyab(perceived(test), perceived(reference)) ** _HYAB_POWER
     green, blue = _hunt_lab(np.eye(3)[1]), _hunt_lab(np.eye(3)[2])  # the farthest pair of the sRGB cube
     largest = float(_hyab(green, blue)) ** _HYAB_POWER
     knee = _KNEE_IN * largest
@@ -276,7 +276,7 @@ def _colour_distance(test: Floats, reference: Floats, pixels_per_degree: float) 
 
 
 def _contrast_filter(channel: Floats, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float) -> Floats:
-    """The eye's blur, a sum of two Gaussians, each separable, which together sum to one."""
+    """The eye's blur, a normalized sum of two separable Gaussians."""
     widest = max(b for row in _SENSITIVITY for b in (row[1], row[3]))
     radius = math.ceil(3 * math.sqrt(widest / (2 * math.pi**2)) * pixels_per_degree)
     x = np.arange(-radius, radius + 1) / pixels_per_degree
@@ -300,7 +300,7 @@ def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float)
     edge, point = -x * gauss, (x * x / sigma**2 - 1) * gauss
 
     def strength(luminance: Floats, detector: Floats) -> Floats:
-        # Positive and negative weights each sum to one, as those of the two-dimensional filter do.
+        # Positive and negative weights each sum to one, as in the two-dimensional filter.
         across = gauss / gauss.sum()
         along = np.where(detector < 0, detector / -detector[detector < 0].sum(), 0)
         along = along + np.where(detector > 0, detector / detector[detector > 0].sum(), 0)
@@ -311,9 +311,9 @@ def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float)
 
 
 def _filtered(channel: Floats, down: Floats, right: Floats) -> Floats:
-    """Correlate with a filter of that column and that row, the border pixels repeated outward.
+    """Correlate with the outer product of a column and a row filter; border pixels are repeated outward.
 
-    Correlation and convolution differ by a reflection; of our filters only the edge detector is odd, and of
-    it only the absolute value is used.
+    Correlation and convolution differ by a reflection; only the edge detector is odd, and only its absolute value
+    is used.
     """
     return correlate1d(correlate1d(channel, down, 0, mode="nearest"), right, 1, mode="nearest")

@@ -4,39 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from ..owner import public
+from .options import RenderKeywords, takes_render_options
 
 if TYPE_CHECKING:
     from ..material import BSDF
-    from ..pictures.exposures import RGB, Exposure
+    from ..pictures.exposures import RGB
     from .request import Request
 
 
 @public
+@takes_render_options
 def render(
     scene: str | Path | BSDF,
     *,
     output: str | Path | None = None,
-    spp: int | None = None,
-    size: tuple[int, int] | None = None,
-    integrator: str | None = None,
-    max_depth: int | None = None,
-    sampler: str | None = None,
-    seed: int | None = None,
-    device: str = "cpu",
-    spectral: bool = False,
-    threads: int | None = None,
     timeout: float | None = None,
-    denoise: bool = False,
-    exposure: Exposure = 0.0,
-    allow_outside: bool = False,
-    allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
     checkpoint: str | Path | None = None,
     until_error: float | None = None,
     gradient: Sequence[str] = (),
+    **options: Unpack[RenderKeywords],
 ) -> RGB:
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
@@ -79,29 +69,17 @@ def render(
     if not isinstance(scene, BSDF):
         accepted = {operands.Kind.SCENE, *operands.MATERIALS}
         if operands.kind_of(scene, accepted, "render: scene") is not operands.Kind.SCENE:
-            scene = notation.named(str(scene), allow_code=allow_code)[0]
+            scene = notation.named(str(scene), allow_code=options.get("allow_code", False))[0]
     request = Request(
         Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
         output=None if output is None else Path(output),
-        spp=spp,
-        size=size,
-        integrator=integrator,
-        max_depth=max_depth,
-        sampler=sampler,
-        seed=seed,
-        device=device,
-        spectral=spectral,
-        threads=threads,
         timeout=timeout,
-        denoise=denoise,
-        exposure=exposure,
-        allow_outside=allow_outside,
-        allow_code=allow_code,
         overrides=overrides or {},
         material=scene if isinstance(scene, BSDF) else None,
         checkpoint=None if checkpoint is None else Path(checkpoint),
         until_error=until_error,
         gradient=tuple(gradient),
+        **options,
     )
     return _picture(request, level=5)  # past the checks and the lock
 
@@ -120,7 +98,8 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None is the one that was asked for, if one was
+    output      file to write; None is the one that was asked for, if one was: in the checkpoint's folder, or under its
+                name beside the checkpoint, with a warning
     spp         samples per pixel in all; None is what was asked for
     allow_code  let it run Python files that its scene names
     Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
@@ -136,10 +115,11 @@ def resume(
         timeout=timeout,
     )
     change.check()
-    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=5)
+    request, notice = checkpoints.asked_again(Path(checkpoint), change, allow_code)
+    return _picture(request, 5, notice)
 
 
-def _picture(request: Request, level: int) -> RGB:
+def _picture(request: Request, level: int, notice: str = "") -> RGB:
     """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
     import warnings
 
@@ -150,14 +130,14 @@ def _picture(request: Request, level: int) -> RGB:
     from .execute import execute
     from .prepare import prepare
 
-    notices: list[str] = []
+    notices = [notice] if notice else []
     output, exposure = request.output, request.exposure
     with engine.put_back():
         prepared = prepare(request)
         notices += prepared.warnings
-        beside = None if output is None else checkpoints.beside(output)
-        stopped, keeper = execute(prepared, temporary=beside, tell=notices.append)
-        picture = finish.picture_of(prepared.render, request.denoise)
+        checkpoint = None if output is None else checkpoints.default_path(output)
+        stopped, keeper = execute(prepared, temporary=checkpoint, tell=notices.append)
+        picture = finish.picture_of(prepared.render, request.denoise, output)
         error, unmet = finish.estimated(prepared)
         notices += filter(None, [unmet])
         if output is not None:

@@ -13,17 +13,20 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, Field
 
+from .. import files
 from ..errors import GonioError, InputError
 from ..transport.passes import Progress, Renders
 from ..work import garbage, kept
 from ..work.kept import Arrays, Facts
 from .identity import check
 from .prepare import Prepared
-from .request import Request
-from .request_json import described, request_of
+from .request import MOST, Request
+from .request_json import STRICT, described, request_of, validated
 
 EVERY = 3.0  # seconds between two checkpoints: with a pass and the writing, less than 5 are lost
 MOST_COST = 0.015  # of the time; where writing takes more, it is done less often
@@ -33,18 +36,34 @@ KIND = "render"
 
 
 def load(path: Path) -> kept.Kept:
-    """The checkpoint in a file, or the one before where it is damaged. Raises InputError where there is none."""
-    found = kept.read(path)
-    if found.facts.get("kind") != KIND:
+    """The checkpoint in a file, or the one before where it is damaged. Raises InputError where there is none, and for
+    facts that no render has."""
+    saved = kept.read(path)
+    if saved.facts.get("kind") != KIND:
         raise InputError("this is no checkpoint of a render", str(path), "give one that `gonio render` has written")
-    return found
+    validated(_Facts, saved.facts, str(path))
+    return saved
 
 
-def restore(render: Renders, found: kept.Kept, where: str) -> None:
+class _Facts(BaseModel):
+    """What a checkpoint says beside its sums."""
+
+    model_config = STRICT
+    kind: str
+    done: int = Field(ge=0, le=MOST)
+    wanted: int = Field(ge=1, le=MOST)
+    size: tuple[int, int]
+    output: str  # the picture's file, where the render writes one
+    temporary: bool
+    request: dict[str, Any] | None
+    identity: dict[str, str]
+
+
+def restore(render: Renders, saved: kept.Kept, where: str) -> None:
     """Carry the sums over."""
     try:
-        render.restore(int(found.facts["done"]), found.arrays)
-    except (KeyError, TypeError, ValueError) as error:
+        render.restore(int(saved.facts["done"]), saved.arrays)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError("this checkpoint does not fit the picture", where, "render anew") from error
 
 
@@ -130,6 +149,7 @@ class Keeper:
             "done": self._prepared.render.done,
             "wanted": self._prepared.spp,
             "size": [*self._prepared.size],
+            "output": str(self._prepared.output.absolute()),
             "request": self._request,
             "temporary": self._temporary,
         }
@@ -152,9 +172,9 @@ class Keeper:
         self._cost = before + (time.thread_time() - began) / (os.cpu_count() or 1)
 
 
-def beside(output: Path) -> Path:
+def default_path(output: Path) -> Path:
     """Where the checkpoint of a picture is that nobody asked for."""
-    return output.with_name(output.name + SUFFIX)
+    return files.with_ending(output, SUFFIX)
 
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
@@ -166,34 +186,62 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
     if not kept.exists(path):
         return "", temporary
     try:
-        found = load(path)
-        check(found.facts, prepared.sources.identity(), str(path))
-        done = int(found.facts["done"])
+        saved = load(path)
+        check(saved.facts, prepared.sources.identity(), str(path))
+        done = int(saved.facts["done"])
         if done > prepared.spp:
             what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are asked for"
             raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
-        restore(prepared.render, found, str(path))
+        restore(prepared.render, saved, str(path))
     except InputError as error:
         if not temporary:
             raise
         kept.remove(path)
         return f"{path} is not used, and removed: {error.what}", temporary
     text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
-    if "lanes" in found.arrays:
-        share = float(np.mean(found.arrays["lanes"] >= prepared.spp))
+    if "lanes" in saved.arrays:
+        share = float(np.mean(saved.arrays["lanes"] >= prepared.spp))
         text = f"goes on from {path}: {share:.0%} of the pixels are done"
-    return text, temporary or bool(found.facts.get("temporary"))
+    return text, temporary or bool(saved.facts.get("temporary"))
 
 
-def asked_again(path: Path, change: Request, allow_code: bool) -> Request:
-    """The request of a checkpoint, changed as `gonio resume` was asked to: output, spp, timeout and threads."""
-    found = load(path)
-    old = request_of(found.facts.get("request") or {}, str(path), allow_code)
-    return replace(
+def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
+    """The request of a checkpoint, with what `gonio resume` was asked for (output, spp, timeout, threads); and what to
+    tell of where its picture is written.
+
+    writes  the picture is written, under the name that the scene gives it where the render was asked for no other
+    """
+    saved = load(path)
+    if saved.facts["request"] is None:
+        what = "its material is known to the program alone that made it"
+        raise InputError(what, str(path), "call that program again with the same checkpoint")
+    old = request_of(saved.facts["request"], str(path), allow_code)
+    output, notice = change.output, ""
+    if output is None and (old.output is not None or writes):
+        output, notice = _placed(old.output or Path(saved.facts["output"]), path)
+    request = replace(
         old,
-        output=change.output or old.output,
-        spp=change.spp or int(found.facts["wanted"]),
+        output=output,
+        spp=change.spp or saved.facts["wanted"],
         timeout=change.timeout,
         threads=change.threads,
         checkpoint=path,
     )
+    return request, notice
+
+
+def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
+    """Where the picture of an untrusted checkpoint is written: the file that it names if that lies in the checkpoint's
+    folder, else one of that name beside the checkpoint; and what to tell of that."""
+    folder = checkpoint.absolute().parent
+    try:
+        inside = output.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):
+        inside = False
+    placed, notice = output, ""
+    if not inside:
+        placed = folder / (output.name or "picture.exr")
+        notice = f"the picture goes to {placed}: the checkpoint names {output}, outside its folder; -o writes it there"
+    if placed.absolute() in (checkpoint.absolute(), default_path(checkpoint.absolute())):
+        raise InputError("the checkpoint itself has the picture's name", str(checkpoint), "name another file with -o")
+    return placed, notice

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..scene import mitsuba_scene
+from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Progress, run
 from ..work import crew
 from . import checkpoints
 from .checkpoints import Keeper
 from .prepare import Prepared
+
+
+def of_scene(prepared: Prepared) -> AbstractContextManager[None]:
+    """Inside, what the plugins of a Mitsuba scene cannot do is an error of the scene's."""
+    if not prepared.request.is_mitsuba:
+        return nullcontext()
+    return mitsuba_scene.rendering(prepared.request.scene, isinstance(prepared.render, MitsubaRender))
 
 
 def execute(
@@ -37,18 +47,18 @@ def execute(
     path = request.checkpoint or temporary
     unasked = request.checkpoint is None
     if path is not None:
-        found, unasked = checkpoints.earlier(path, prepared, unasked)
-        if found:
-            tell(found)
+        notice, unasked = checkpoints.earlier(path, prepared, unasked)
+        if notice:
+            tell(notice)
     gathered = None
     goal: int | Callable[[], int] = prepared.spp
     if isinstance(prepared.render, until.Until):
         drawing = prepared.render
         goal = lambda: drawing.goal  # noqa: E731
-        if crew.current().size > 1:
+        if crew.current().remote:
             what = "workers render parts of a picture, and its error is that of the whole"
             raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif crew.current().size > 1 and prepared.render.done < prepared.spp:
+    elif crew.current().remote and prepared.render.done < prepared.spp:
         tiles.travelling(prepared)  # what cannot travel is said before anything is written
         assert isinstance(prepared.render, integrators.Render)
         gathered = tiles.Gathered(prepared.render, prepared.spp)
@@ -65,14 +75,15 @@ def execute(
             )
             gathered.give()
         else:
-            stopped = run(
-                prepared.render,
-                goal,
-                width * height,
-                timeout=request.timeout,
-                report=after,
-                interrupted=interrupted,
-            )
+            with of_scene(prepared):
+                stopped = run(
+                    prepared.render,
+                    goal,
+                    width * height,
+                    timeout=request.timeout,
+                    report=after,
+                    interrupted=interrupted,
+                )
         keeper.end(bool(stopped))
     finally:
         keeper.close()

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import MachineError, summary
 from ..pictures import denoise, images
 from ..transport.passes import Interrupts, Progress, Renders
 from . import checkpoints
@@ -76,11 +77,11 @@ def render_to_file(
     with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
         prepared = prepare(request, writes=True)
         interrupts.check()
-        beside = checkpoints.beside(prepared.output)
+        checkpoint = checkpoints.default_path(prepared.output)
         stopped, keeper = execute(
-            prepared, temporary=beside, report=report, interrupted=lambda: interrupts.asked, tell=tell
+            prepared, temporary=checkpoint, report=report, interrupted=lambda: interrupts.asked, tell=tell
         )
-        picture = picture_of(prepared.render, request.denoise)
+        picture = picture_of(prepared.render, request.denoise, prepared.output)
         settings = prepared.settings | {"spp": prepared.render.done}
         error, unmet = estimated(prepared)
         if error is not None:
@@ -113,10 +114,17 @@ def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.
     return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
 
 
-def picture_of(render: Renders, denoised: bool) -> NDArray[np.float32]:
-    """The picture, denoised where asked."""
+def picture_of(render: Renders, denoised: bool, output: Path | None = None) -> NDArray[np.float32]:
+    """The picture, denoised where asked; where that fails, the noisy one is written to `output` before it is told."""
     picture = render.image()
     if not denoised:
         return picture
-    guides = render.aov()
-    return denoise.denoise(picture, guides.get("albedo"), guides.get("normal"))
+    try:
+        guides = render.aov()
+        return denoise.denoise(picture, guides.get("albedo"), guides.get("normal"))
+    except Exception as error:
+        if output is None:
+            raise
+        images.write(output, picture)
+        hint = "it has the picture with its noise; leave --denoise out"
+        raise MachineError(f"the picture was not denoised: {summary(error)}", str(output), hint) from error

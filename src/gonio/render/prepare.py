@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -47,11 +48,11 @@ def prepare(request: Request, writes: bool = False) -> Prepared:
     writes  the picture will be written: under the name that the scene gives it, where the request names no output
     """
     request.check()
-    if request.material is None and not request.scene.exists():
+    if request.material is None and not os.path.exists(request.scene):
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, request.spectral, request.threads)
     with garbage.kept():
-        if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
+        if request.is_mitsuba:
             prepared = _prepare_mitsuba(request, mi)
         else:
             prepared = _prepare_lab(request, mi, names_output=writes and request.output is None)

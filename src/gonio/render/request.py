@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from ..errors import InputError
 from ..material import BSDF
 from ..pictures import denoise, exposures, images
 from ..scene.film import check_film
+from .options import RenderOptions
 
 MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
 UNTIL_MOST = 1 << 16  # samples per pixel until an error is reached, where nobody says how many at most
@@ -20,30 +22,22 @@ MOST_THREADS = 1024
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to render and how; None means: as the scene says."""
+class Request(RenderOptions):
+    """What to render, and how."""
 
     scene: Path  # of a material alone, its name
     output: Path | None = None
-    spp: int | None = None
-    size: tuple[int, int] | None = None
-    integrator: str | None = None
-    max_depth: int | None = None
-    sampler: str | None = None
-    seed: int | None = None
-    device: str = "cpu"
-    spectral: bool = False
-    threads: int | None = None
     timeout: float | None = None
-    denoise: bool = False
-    exposure: exposures.Exposure = 0.0
-    allow_outside: bool = False
-    allow_code: bool = False
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # to be shown on a ball, in place of a scene
     checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
     until_error: float | None = None  # relMSE at which to stop; `spp` is then the most
     gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
+
+    @property
+    def is_mitsuba(self) -> bool:
+        """Whether the scene is a Mitsuba scene's file."""
+        return self.material is None and self.scene.suffix.lower() == ".xml" and os.path.isfile(self.scene)
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""

@@ -1,33 +1,39 @@
-"""A request as JSON: what a checkpoint and a worker of a cluster get."""
+"""A request as JSON: what a checkpoint and a worker of a cluster get. What is read is untrusted, as a scene is: every
+key, type and range is checked."""
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from ..catalog import notation
-from ..errors import GonioError, InputError
+from ..errors import InputError, summary
 from ..material import BSDF
 from ..work.kept import Facts
 from .request import Request
 
+LEFT_OUT = ("checkpoint", "timeout")  # of a request: they are those of the command that goes on
+STRICT = ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
+
 
 def described(request: Request) -> Facts:
     """A request as a file can hold it. Raises InputError for a material that this program alone knows."""
-    found: Facts = {}
+    values: Facts = {}
     for one in fields(Request):
         value = getattr(request, one.name)
-        if one.name in ("checkpoint", "timeout"):
+        if one.name in LEFT_OUT:
             continue
         if isinstance(value, Path):
             value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
-        found[one.name] = _plain(value)
-    return found
+        values[one.name] = _plain(value)
+    return values
 
 
 def _plain(value: Any) -> Any:
@@ -42,23 +48,52 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def request_of(found: Facts, where: str, allow_code: bool) -> Request:
+def request_of(given: Facts, where: str, allow_code: bool) -> Request:
     """The request that `described` made. A file alone never makes Gonio run Python: `allow_code` is asked for again."""
-    if not allow_code and (found.get("allow_code") or ".py:" in json.dumps(found)):
+    if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
         raise InputError(
             "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
         )
+    values = vars(validated(_fields(), given, where, "/request"))
     try:
-        values = {name: _rebuilt(value) for name, value in found.items()}
-        for name in ("scene", "output"):
-            values[name] = None if values[name] is None else Path(values[name])
-        values["size"] = None if values["size"] is None else tuple(values["size"])
-        values["gradient"] = tuple(values["gradient"])
-        return Request(**values)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, GonioError):
-            raise
-        raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None
+        material = _rebuilt(values["material"])
+        if not (material is None or isinstance(material, BSDF)):
+            raise InputError("no material", f"{where}#/request/material", "render anew")
+        request = Request(**{**values, "material": material, "overrides": _rebuilt(values["overrides"])})
+    except RecursionError:
+        raise InputError("materials inside each other without end", where, "render anew") from None
+    replace(request, output=None).check()
+    return request
+
+
+@functools.cache
+def _fields() -> type[BaseModel]:
+    """The fields that `described` writes, with their types."""
+    hints = get_type_hints(Request)
+    hints |= {"material": dict[str, Any] | None, "overrides": dict[str, Any]}
+    types: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in LEFT_OUT}
+    return create_model("RequestFields", __config__=STRICT, **types)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -> Model:
+    """The facts of an untrusted file as `model` has them.
+
+    pointer  where they stand in the file
+    Raises InputError with the place and what is expected there.
+    """
+    try:
+        return model.model_validate_json(json.dumps(given))  # from JSON a list is a tuple, and a text a path
+    except ValidationError as error:
+        if {"missing", "extra_forbidden"} & {one["type"] for one in error.errors(include_url=False)}:
+            raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None
+        first = error.errors(include_url=False)[0]
+        place = "/".join([pointer, *map(str, first["loc"])])
+        raise InputError(f"not as Gonio writes it: {first['msg']}", f"{where}#{place}", "render anew") from None
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"not as Gonio writes it: {summary(error)}", where, "render anew") from None
 
 
 def _rebuilt(value: Any) -> Any:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from .. import files
+from ..arguments import renamed
 from ..catalog import library, notation, operands, outside
 from ..catalog.operands import Kind
 from ..energy.tables import bake as baking
@@ -35,18 +36,19 @@ from ..pictures import images
 BAKED = frozenset({Kind.DISTRIBUTION, Kind.PICTURE, *operands.MATERIALS})
 
 
+@renamed(size="resolution", spp="samples", points="sampler")
 @public
 def bake(
     target: str | Path | BSDF,
     output: str | Path | None = None,
     *,
     lut: Sequence[str] | None = None,
-    size: int = 128,
+    resolution: int = 128,
     method: str = "quadrature",
     masking: str | None = None,
-    spp: int = 1024,
-    points: str = "hammersley",
-    seed: int = 0,
+    samples: int = 1024,
+    sampler: str = "hammersley",
+    seed: int | None = None,
     layout: str = "linear",
     aspect: float | None = None,
     azimuths: int = baking.AZIMUTHS,
@@ -65,9 +67,9 @@ def bake(
               environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
     output    folder to write, all files or none; None writes nothing
     lut       of "E", "Eavg", "dfg", "glass"; None is all that the target has, but glass
-    size      texels along each axis, 1 to 4096
-    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `spp` samples a texel
-              at `points` "hammersley" or "independent" (of `seed`)
+    resolution  texels along each axis, 1 to 4096
+    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
+              by the `sampler` "hammersley" or "independent" (of `seed`, 0 if None)
     masking   of a distribution; a material brings its own
     layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
     aspect    alpha_y / alpha_x of a distribution; other than 1 it adds the axis phi, of so many `azimuths`
@@ -79,8 +81,16 @@ def bake(
     folder = None if output is None else files.check_folder(output)
     ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
     if _is_picture(target, lut):
-        others: dict[str, object] = {"size": size, "method": method, "spp": spp, "points": points, "seed": seed}
-        others |= {"layout": layout, "aspect": aspect, "azimuths": azimuths, "store": store, "flip": flip}
+        others: dict[str, object] = {"resolution": resolution, "method": method, "samples": samples}
+        others |= {
+            "sampler": sampler,
+            "seed": seed,
+            "layout": layout,
+            "aspect": aspect,
+            "azimuths": azimuths,
+            "store": store,
+            "flip": flip,
+        }
         _check_default(others, "an environment takes --ndf, --levels and --masking")
         return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
@@ -98,12 +108,12 @@ def bake(
     baked = baking.cached(
         what,
         lut=tables,
-        size=size,
+        size=resolution,
         method=method,
         masking=masking,
-        spp=spp,
-        points=points,
-        seed=seed,
+        spp=samples,
+        points=sampler,
+        seed=0 if seed is None else seed,
         layout="linear" if homework else layout,
         aspect=aspect,
         azimuths=azimuths,

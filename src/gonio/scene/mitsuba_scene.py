@@ -12,7 +12,7 @@ from ..bridge import foreign, plugin_search
 from ..bridge.faults.exr_threads import file_threads
 from ..bridge.native import MitsubaBSDF
 from ..bridge.types import Plugin, PluginDict, Scene
-from ..errors import InputError
+from ..errors import GonioError, InputError, in_user_code, summary
 from . import mitsuba_xml
 from .mitsuba_xml import SceneText
 
@@ -63,6 +63,28 @@ def load(
     return scene
 
 
+@contextlib.contextmanager
+def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
+    """Inside, errors that a scene's file causes while it is rendered are InputErrors with Mitsuba's text.
+
+    own_integrator  the scene is rendered by its own integrator, so that all errors but those of Gonio's materials are
+                    Mitsuba's; else only what plugins say of themselves is, "[Texture] eval_1_grad(): not implemented!"
+    """
+    try:
+        yield
+    except (GonioError, MemoryError):
+        raise
+    except Exception as error:
+        cause: BaseException = error
+        while (inner := cause.__cause__ or cause.__context__) is not None:
+            cause = inner
+        ours = isinstance(cause, GonioError) or in_user_code(error) is not None
+        text = re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", summary(cause).partition(": ")[2])
+        if ours or not (own_integrator or text.startswith("[")):
+            raise
+        raise InputError(f"Mitsuba cannot render it: {text}", str(file), "correct the scene") from error
+
+
 def load_bsdf(path: Path) -> MitsubaBSDF:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene. It may read what lies in the file's folder.
 
@@ -74,7 +96,7 @@ def load_bsdf(path: Path) -> MitsubaBSDF:
     try:
         loaded = instantiated(text, path.parent, mi)
     except Exception as error:
-        raise foreign.refused(error, path.name) from None
+        raise foreign.rejected(error, path.name) from None
     if isinstance(loaded, mi.BSDF):
         return MitsubaBSDF(loaded)
     if isinstance(loaded, mi.Scene):

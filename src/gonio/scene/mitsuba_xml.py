@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -24,13 +25,14 @@ from ..bridge import plugin_search
 from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from ..measure import SAMPLE, parted
-from ..pictures import formats
+from ..pictures import formats, scene_files
 from . import files, meshes
 
 MAX_BYTES = 64 << 20  # of all files together, and of what parameters add to them
 MAX_ELEMENTS = 1_000_000
 MAX_DEPTH = 64
 MAX_INCLUDES = 15  # inside each other, as Mitsuba has it
+MAX_PARAMETER = 100  # characters of a parameter's name: as many are compared behind each $
 MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
 
 # elements that stand for an object, which a plugin makes
@@ -79,10 +81,11 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
     reader = _Reader(file, parameters, allow_outside, allow_code)
     reader.parse(file, [reader.folder, plugin_search.package()])
     reader.place_files()
+    reader.check_references()
     unused = [name for name in parameters if name not in reader.used]
     if unused:
         known = [name for name in reader.values if name not in unused]
-        hint = did_you_mean(unused[0], known) if known else "parameters stand as $name in its values"
+        hint = did_you_mean(unused[0], known[:200]) if known else "parameters stand as $name in its values"
         raise InputError(f"the scene has no parameter '{unused[0]}'", str(file), hint)
     return SceneText("\n".join(reader.lines) + "\n", reader.origins, reader.files, reader.sources, reader.runs_code)
 
@@ -96,7 +99,7 @@ def readable(name: str, path: Path, folder: Path, location: str, allow_outside: 
     """
     files.checked(path, name, folder, location, allow_outside)
     try:
-        formats.check_file(path)
+        scene_files.check_file(path)
         if path.suffix.lower() == ".ply" or meshes.is_ply(path):  # Mitsuba's reader believes counts and indices
             meshes.read_mesh(path, location, ".ply")
     except formats.Unreadable as error:
@@ -139,8 +142,9 @@ class _Reader:
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
-        self.folder = file.parent.resolve()
+        self.file, self.folder = file, file.parent.resolve()
         self.values, self.used = dict(parameters), set[str]()
+        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # of the parameters' names
         self.allow_outside, self.allow_code = allow_outside, allow_code
         self.lines: list[str] = []
         self.origins: list[tuple[Path, int]] = []
@@ -148,6 +152,7 @@ class _Reader:
         self.sources: list[str] = []
         self.folders: list[Path] = []
         self.texts: list[tuple[int, str, dict[str, str], str]] = []  # those of plugins: line, plugin, element, place
+        self.references: dict[str, set[str]] = {}  # from the id of an object to those that it needs
         self.runs_code = False
         self.version = ""  # of the scene's own file
         self.bytes = self.elements = self.grown = 0  # what was read, and what parameters have added to it
@@ -183,6 +188,25 @@ class _Reader:
             value = property_value(kind, name, value, location, locate, self.allow_code)
             self.lines[line] = _tag("string", {**attributes, "value": value})
 
+    def check_references(self) -> None:
+        """Raise InputError where references go round in a circle, or lead on from one object to the next too often:
+        Mitsuba follows them by recursion."""
+        depths = dict.fromkeys({*self.references, *(n for names in self.references.values() for n in names)}, 0)
+        waiting = Counter(name for names in self.references.values() for name in names)
+        ready = [name for name in depths if not waiting[name]]
+        for name in ready:  # it grows: objects whose references have all been followed
+            for inner in self.references.get(name, ()):
+                depths[inner] = max(depths[inner], depths[name] + 1)
+                waiting[inner] -= 1
+                if not waiting[inner]:
+                    ready.append(inner)
+        deepest = max(depths.values(), default=0)
+        if deepest > MAX_DEPTH or len(ready) < len(depths):
+            what = f"references lead on from one object to the next {deepest} times, at most {MAX_DEPTH} are possible"
+            if len(ready) < len(depths):
+                what = f"the object '{min(set(depths) - set(ready))}' is part of itself, or refers to one that is"
+            raise InputError(what, str(self.file), "leave some references out")
+
     def located(self, name: str, folders: list[Path], location: str) -> str:
         """The absolute path of a file that the scene names, once it is sure that it may be read."""
         try:
@@ -198,24 +222,40 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with the values of parameters in place of their names, the longest name first."""
+        """A value with the values of parameters in place of their names: behind each $ the longest name counts."""
         if "$" not in value:
             return value
-        for name in sorted(self.values, key=len, reverse=True):
-            parts = re.split(rf"(?<!\\){re.escape('$' + name)}", value)
-            if len(parts) == 1:
-                continue
+        first, *others = re.split(r"(?<!\\)\$", value)
+        result, length = [first.replace("\\$", "$")], len(first)
+        for text in others:
+            name = next((text[:n] for n in self.lengths if text[:n] in self.values), None)
+            if name is None:
+                unknown = re.match(r"\w*", text)[0]  # type: ignore[index]  # it matches any text
+                hint = did_you_mean(unknown, list(self.values)[:200]) if self.values else "give it a <default>"
+                raise InputError(f"the parameter ${unknown} has no value", location, hint)
             self.used.add(name)
-            more = (len(parts) - 1) * len(self.values[name])
-            self.grown += more
-            if len(value) + more > MAX_VALUE or self.grown > MAX_BYTES:
+            self.count(location)
+            rest = text[len(name) :].replace("\\$", "$")
+            length += len(self.values[name]) + len(rest)
+            self.grown += len(self.values[name])
+            if length > MAX_VALUE or self.grown > MAX_BYTES:
                 raise InputError(f"parameters such as ${name} make too long a text", location, "write values out")
-            value = self.values[name].join(parts)
-        unknown = re.search(r"(?<!\\)\$(\w*)", value)
-        if unknown:
-            hint = did_you_mean(unknown[1], list(self.values)) if self.values else "give it a <default>"
-            raise InputError(f"the parameter ${unknown[1]} has no value", location, hint)
-        return value.replace("\\$", "$")
+            result += [self.values[name], rest]
+        return "".join(result)
+
+    def add(self, name: str, value: str, location: str) -> None:
+        """A parameter's value, where none is given."""
+        if len(name) > MAX_PARAMETER:
+            raise InputError(f"a parameter's name of {len(name)} characters", location, f"use {MAX_PARAMETER} or fewer")
+        self.values.setdefault(name, value)
+        if len(name) not in self.lengths:
+            self.lengths = sorted({*self.lengths, len(name)}, reverse=True)
+
+    def count(self, location: str) -> None:
+        """One more element, or parameter that is replaced."""
+        self.elements += 1
+        if self.elements > MAX_ELEMENTS:
+            raise InputError(f"more than {MAX_ELEMENTS} elements", location, "keep large data in other files")
 
 
 class _File:
@@ -227,6 +267,7 @@ class _File:
         self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
         self.open: list[str] = []  # elements around, "" for those that are carried out here and not written
         self.kinds: list[str] = []  # of plugins, of the same elements
+        self.ids: list[str] = []  # of the same elements
         self.parser = expat.ParserCreate()
         self.parser.StartDoctypeDeclHandler = self.parser.EntityDeclHandler = self._refused
         self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
@@ -240,9 +281,7 @@ class _File:
 
     def _start(self, tag: str, given: dict[str, str]) -> None:
         scene = self.scene
-        scene.elements += 1
-        if scene.elements > MAX_ELEMENTS:
-            raise InputError(f"more than {MAX_ELEMENTS} elements", self.location, "keep large data in other files")
+        scene.count(self.location)
         if len(self.open) >= MAX_DEPTH:
             raise InputError(f"more than {MAX_DEPTH} elements inside each other", self.location)
         if len(self.open) > 1 and not self.open[-1]:
@@ -256,11 +295,13 @@ class _File:
             written = ""
         self.open.append(written)
         self.kinds.append(attributes.get("type", ""))
+        self.ids.append("" if tag == "ref" else attributes.get("id", ""))
         if written:
             self._write(tag, attributes)
 
     def _end(self, tag: str) -> None:
         self.kinds.pop()
+        self.ids.pop()
         if self.open.pop():
             self._line(f"</{tag}>")
 
@@ -282,11 +323,20 @@ class _File:
             attributes = {**attributes, "filename": scene.located(attributes["filename"], self.folders, self.location)}
         elif tag == "string" and "value" in attributes and len(self.kinds) > 1:
             scene.texts.append((len(scene.lines), self.kinds[-2], attributes, self.location))
+        self._note_reference(tag, attributes)
         self._line(_tag(tag, attributes))
+
+    def _note_reference(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Note to which objects a named one leads: those that it refers to, and those with names inside."""
+        references, name = self.scene.references, attributes.get("id", "")
+        if tag == "alias":
+            references.setdefault(attributes.get("as", ""), set()).add(name)
+        elif name and (outer := next(filter(None, reversed(self.ids[:-1])), "")):
+            references.setdefault(outer, set()).add(name)
 
     def _default(self, attributes: Mapping[str, str]) -> None:
         name, value = self._required("default", attributes, "name", "value")
-        self.scene.values.setdefault(name, value)
+        self.scene.add(name, value, self.location)
 
     def _path(self, attributes: Mapping[str, str]) -> None:
         (value,) = self._required("path", attributes, "value")

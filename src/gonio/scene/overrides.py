@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..bridge.types import Json
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, encodable
 from ..material import BSDF
 from .materials import described, part_of
 
@@ -20,12 +20,15 @@ from .materials import described, part_of
 def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
     """Set each path to its value, in place. Raises InputError where a path leads nowhere, or a value is no JSON."""
     for path, value in overrides.items():
+        _check_text(path, path)
         _set(raw, path, _plain(value, path))
 
 
 def _plain(value: object, path: str) -> Json:
     """The value as a scene file would hold it: tuples and arrays are lists."""
     if isinstance(value, Mapping):
+        for key in value:
+            _check_text(str(key), path)
         return {str(key): _plain(item, path) for key, item in value.items()}
     if isinstance(value, BSDF):
         return described(value)  # type: ignore[return-value]  # validation lets it through as it is
@@ -33,9 +36,17 @@ def _plain(value: object, path: str) -> Json:
         value = value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(item, path) for item in value]
+    if isinstance(value, str):
+        _check_text(value, path)
     if value is None or isinstance(value, str | int | float):
         return value
     raise InputError(f"{value!r} cannot stand in a scene", f"path {path}", "give a number, a name, a list or an object")
+
+
+def _check_text(text: str, path: str) -> None:
+    """Raise InputError for bytes that are no UTF-8, as the command line hands them on: no scene file can hold them."""
+    if encodable(text) != text:
+        raise InputError(f"'{text}' is no text", f"path {path}", "write it in UTF-8")
 
 
 def _set(raw: dict[str, Json], path: str, value: Json) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ..bridge.types import PluginDict
 from ..catalog import documents
 from ..errors import InputError
-from ..pictures import formats, images
+from ..pictures import formats, images, scene_files
 from ..pictures.images import RGB
 
 
@@ -24,8 +24,8 @@ def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | Non
     Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
     """
     name = path.name
-    if path.stat().st_size > formats.MOST_BYTES:
-        raise InputError(f"'{name}' is larger than {formats.MOST_BYTES >> 20} MiB", where, "scale it down")
+    if path.stat().st_size > scene_files.MAX_BYTES:
+        raise InputError(f"'{name}' is larger than {scene_files.MAX_BYTES >> 20} MiB", where, "scale it down")
     try:
         content = path.read_bytes()
     except OSError as error:

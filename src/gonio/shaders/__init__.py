@@ -1,4 +1,4 @@
-"""Shader code written from the models' own source. `go.emit(model)` is `bundle.emit`."""
+"""Shader code generated from the models' Python source. `go.emit(model)` is `bundle.emit`."""
 
 from .bundle import Bundle, bundle, emit
 from .languages import Language

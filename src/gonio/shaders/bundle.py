@@ -1,4 +1,4 @@
-"""A shader with all that a program needs to run it: text, manifest, tables."""
+"""A shader with everything that a program needs to use it: text, manifest, tables."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from ..material import BSDF, tree
 from ..material.recording import switched_off
 from ..ops import graph
 from ..ops.types import Value
-from ..owner import alone
+from ..owner import exclusive
 from . import program as programs
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment
 from .names import Names
 from .program import Program
 from .routine import RoutineWriter
-from .simplify import SIZES, Record, stem_of
 from .syntax import literal
 from .textures import READERS, axes, pixels, width
+from .values import SIZES, Record, stem_of
 
 Json: TypeAlias = Any  # a value that a JSON file may hold
 
-# how papers write a parameter
+# symbols of parameters in papers
 SYMBOLS = {
     "alpha": "\u03b1",
     "eta": "\u03b7",
@@ -47,10 +47,10 @@ SYMBOLS = {
 
 @dataclass(frozen=True)
 class Bundle:
-    """What `bundle` makes.
+    """The result of `bundle`.
 
     text      the shader: structs, helpers, functions; no version line, no main
-    manifest  what a program must know to use it: plain dicts, lists, numbers; see docs/emit.md
+    manifest  the interface of the shader: plain dicts, lists, numbers; see docs/emit.md
     tables    uniform name -> float32 array in the order of upload (x fastest), channels last
     """
 
@@ -59,7 +59,7 @@ class Bundle:
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write shader, manifest.json and one raw little-endian float32 file a table; the paths written."""
+        """Write shader, manifest.json and one raw little-endian float32 file per table; returns their paths."""
         folder = files.check_folder(folder)
         contents = {
             self.manifest["shader"]: self.text.encode(),
@@ -71,7 +71,7 @@ class Bundle:
         return [folder / file for file in contents]
 
 
-@alone
+@exclusive
 def emit(
     model: BSDF | str,
     lang: str = "glsl",
@@ -79,23 +79,23 @@ def emit(
     *,
     lean: bool = False,
 ) -> str:
-    """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
+    """A material as shader code: eval, pdf, sample and the functions that they need.
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
 
-    model      a material, or its text as the command line takes it: "conductor(preset=Au)"
-    lang       a language's name, such as "glsl"; `gonio.shaders.languages()` has them all
-    functions  of "eval", "pdf", "sample", "terms" (D, G, F, ...; where the model has them)
-    lean       leave out what the material's own values switch off, such as a coat of weight 0: that weight is no
-               field then. Of `openpbr` as it comes an eighth of the text is left
+    model      a material, or its text as on the command line: "conductor(preset=Au)"
+    lang       name of a language, such as "glsl"; `gonio.shaders.languages()` has all of them
+    functions  of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
+    lean       omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not a
+               field. An eighth of the text of a default `openpbr` remains
     Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
     "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
-    Raises InputError for a stochastic material (RandomWalk): there is no code for it.
+    Raises InputError for a stochastic material (RandomWalk), which has no shader code.
     """
     return bundle(model, lang, functions, lean=lean).text
 
 
-@alone
+@exclusive
 def bundle(
     model: BSDF | str,
     lang: str = "glsl",
@@ -106,17 +106,17 @@ def bundle(
 ) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`.
 
-    on  paths of weights that stay fields of a lean shader although they are off now
+    on  paths of weights that stay fields of a lean shader although they are switched off
     """
     language = Language.family.get(str(lang))
     if isinstance(model, str):
         model = notation.named(model)[0]
     functions = programs.check(model, functions, "emit")
-    numbers = dict(_numbers(model))  # raises where there is more than one material's worth
+    numbers = dict(_numbers(model))  # raises for arrays of materials
     try:
         made = Program(model, functions, [path for path in switched_off(model) if path not in on] if lean else ())
     except graph.RecordingError as error:
-        raise InputError(f"no shader code for it: {error.what}", error.where, error.hint) from error
+        raise InputError(f"it cannot be written as shader code: {error.what}", error.where, error.hint) from error
     names = Names(made, language)
     text = _text(made, names)
     tables = {f"table_{t.name}": pixels(t) for t in made.tables}
@@ -146,8 +146,8 @@ def _text(made: Program, names: Names) -> str:
         size = " x ".join(map(str, table.shape))
         channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
         readings = sorted(made.readings[id(table)])
-        rule = "linear between texel centres, " if "lookup" in readings else ""
-        about = f"// {size} texels, {channels}; {rule}held outside."
+        rule = "linear between texel centers, " if "lookup" in readings else ""
+        about = f"// {size} texels, {channels}; {rule}clamped outside."
         binding = language.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
         readers = [line for how in readings for line in ("", *READERS[how](language, table))]
         parts.append([*binding, "", about, *readers[1:]])
@@ -163,7 +163,7 @@ def _head(made: Program, names: Names) -> list[str]:
     lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
     if made.without:
         off = ", ".join(f"{path} = {tree.value_at(model, path):g}" for path in made.without)
-        lines += ["//", *(f"// {text}" for text in textwrap.wrap(f"Written without what is off: {off}.", 105))]
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap(f"Written without parts that are off: {off}.", 105))]
     if choices:
         lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
     lines += ["//"]
@@ -175,18 +175,18 @@ def _head(made: Program, names: Names) -> list[str]:
     lines += [
         "//",
         "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
-        f"// the shading normal. Colours are linear RGB. {language.precision}",
+        f"// the shading normal. Colors are linear RGB. {language.precision}",
     ]
     return lines
 
 
-# what the functions that a program calls give
+# descriptions of the functions that a program calls
 ENTRIES = {
-    "derive": "what follows from the parameters alone: call it once a draw",
+    "derive": "quantities that depend on the parameters alone: call it once per draw",
     "eval": "the BSDF times |cos theta_i|, RGB, 1/sr",
     "pdf": "density with which `sample` chooses wi, 1/sr",
     "sample": "wi, its weight eval / pdf, its pdf; u: three random numbers in [0, 1)",
-    "terms": "what eval is made of, to be looked at one by one",
+    "terms": "the factors of eval, for inspection",
 }
 
 
@@ -198,7 +198,7 @@ def _arguments(made: Program, method: str, language: Language) -> list[str]:
 
 
 def _choices(model: BSDF) -> list[tuple[str, Value]]:
-    """(path, value) of what shapes the code: materials by their class, choices and flags."""
+    """(path, value) of the choices that shape the code: classes of materials, options and flags."""
     return [
         *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
         *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),
@@ -216,7 +216,7 @@ def _structs(made: Program, names: Names) -> list[Record]:
 
 def _struct(record: Record, names: Names) -> list[str]:
     fields = [(names.language.type(type_), names.language.word(name)) for name, type_ in record.fields]
-    if not fields:  # a struct must have a member
+    if not fields:  # a struct needs at least one member
         fields = [(names.language.type("float"), "nothing")]
     lines = names.language.struct(names.language.word(record.name), fields)
     for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
@@ -251,7 +251,7 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
     ]
     terms = made.entries.get("terms")
     derived = made.derived
-    facts = made.bound  # of the code, whose parameters may take other values than the material has
+    facts = made.bound  # of the code, whose parameters may change
     return {
         "version": 1,
         "lang": language.name,
@@ -293,7 +293,7 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
 
 
 def layout(types: list[str], language: Language) -> tuple[list[int], int]:
-    """(offset of each field in bytes, size of the struct) in a uniform buffer: std140, WGSL's, or a cbuffer of HLSL."""
+    """(byte offset of each field, size of the struct) in a uniform buffer: std140, WGSL's, or an HLSL cbuffer."""
     offsets, end = [], 0
     for type_ in types:
         size = 4 * SIZES.get(type_, 1)
@@ -306,8 +306,8 @@ TERMS = {
     "D": "density of microfacet normals at the half vector, 1/sr",
     "G": "masking and shadowing",
     "F": "Fresnel reflectance at the half vector",
-    "single": "light scattered once: the base alone, times |cos theta_i|",
-    "multi": "what is added for light scattered more than once, times |cos theta_i|",
+    "single": "single scattering: the base alone, times |cos theta_i|",
+    "multi": "multiple scattering: the compensation, times |cos theta_i|",
 }
 
 
@@ -339,18 +339,18 @@ def _plain(value: object) -> object:
 
 
 def _numbers(model: BSDF) -> Iterator[tuple[str, Value]]:
-    """(path, value as its field holds it) of each numeric parameter."""
+    """(path, value in the form of its field) of each numeric parameter."""
     for path, parameter, value, owner in tree.surface(model):
         if parameter.numeric and value is not None:
             array = np.asarray(value, dtype=float)
-            where = f"emit: {type(owner).__name__}.{parameter.name}"
+            location = f"emit: {type(owner).__name__}.{parameter.name}"
             widest = {"spectrum": 3, "alpha": 2}.get(parameter.kind, 1)
             if array.ndim > 1 or array.size not in (1, widest) or (array.ndim == 1 and widest == 1):
-                what = "one value a ray given, one value expected"
-                raise InputError(what, where, "the shader's struct holds one material")
+                what = "one value per ray given, a single value expected"
+                raise InputError(what, location, "the shader's struct holds one material")
             if np.any(np.abs(array) > np.finfo(np.float32).max):
                 raise InputError(
-                    f"{np.abs(array).max():g} given, at most 3.4e38 expected", where, "shaders have float32"
+                    f"{np.abs(array).max():g} given, at most 3.4e38 expected", location, "shaders use float32"
                 )
             if parameter.kind == "spectrum":
                 array = np.broadcast_to(array, (3,))

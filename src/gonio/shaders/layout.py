@@ -1,4 +1,4 @@
-"""Lines of a shader: comments, and statements broken where they are long."""
+"""Layout of shader text: comments, and long statements broken into lines."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def comment(doc: str) -> list[str]:
 
 
 def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
-    """A statement in lines of at most `COLUMNS` characters, broken where the least is torn apart.
+    """A statement in lines of at most `COLUMNS` characters, broken at the loosest operators.
 
-    hang  what all lines but the first are indented by besides
+    hang  additional indentation of all lines but the first
     """
     text = indent + line
     cut = _break(text) if len(text) > COLUMNS else None
@@ -22,7 +22,7 @@ def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
 
 
 def _break(text: str) -> int | None:
-    """Where to break: at the shallowest operator or comma before the last column, the last of those."""
+    """Where to break: at the last one of the shallowest operators or commas before the last column."""
     depth, best = 0, None
     for i, c in enumerate(text[: COLUMNS + 1]):
         if c in "([{":
@@ -31,21 +31,21 @@ def _break(text: str) -> int | None:
             depth -= 1
         if i < len(text) - len(text.lstrip()) + 8:
             continue
-        place_ = None
+        cut = None
         if c == "," and i < COLUMNS:
-            place_ = i + 1
+            cut = i + 1
         elif c == " " and text[i + 1 : i + 3] in ("+ ", "- ", "? ", ": ", "* ", "/ ", "&&", "||"):
-            place_ = i
-        if place_ is not None:
+            cut = i
+        if cut is not None:
             loose = 0 if c == "," else 1 if text[i + 1] in "?:&|" else 2 if text[i + 1] in "+-" else 3
             rank = (depth, loose)
             if best is None or rank <= best[0]:
-                best = (rank, place_)
+                best = (rank, cut)
     return best[1] if best else None
 
 
 def common_head(parts: list[str]) -> str:
-    """The inner material whose fields these are: "base" for self.base_eta, self.base_k, ..."""
+    """The inner material to which these fields belong: "base" for self.base_eta, self.base_k, ..."""
     paths = [part.partition(".")[2] for part in parts if "." in part and "(" not in part]
     heads = {path.partition("_")[0] for path in paths if "_" in path}
     return heads.pop() if len(heads) == 1 and len(paths) == len(parts) and all("_" in p for p in paths) else ""

@@ -1,4 +1,4 @@
-"""What the routines of a shader share: their names, and the constants and structs that they come to need."""
+"""Names that the routines of a shader share: their own, and those of the constants and structs that they use."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import math
 from ..ops.graph import first_free
 from .languages import Language
 from .program import Program, place
-from .simplify import Kind, Record, Routine, Value, check_single, stem_of
 from .source import module_constant
 from .syntax import literal
+from .values import Kind, Record, Routine, Value, check_single, stem_of
 
 CONSTANTS = {"PI": math.pi, "TWO_PI": 2.0 * math.pi, "INV_PI": 1.0 / math.pi, "INV_TWO_PI": 0.5 / math.pi}
 
 
 class Names:
-    """Names in the shader of a program: of its routines, and of what they come to need while they are written.
+    """Names in the shader of a program.
 
-    routines   the name of each
-    constants  name -> (number, what it is)
+    routines   name of each routine
+    constants  name -> (number, description)
     records    name -> struct
     """
 
@@ -28,13 +28,13 @@ class Names:
         self.routines: dict[Routine, str] = {}
         self.records: dict[str, Record] = {}
         self.signatures: dict[tuple, Routine] = {}
-        taken: set[str] = set()
+        used: set[str] = set()
         for routine in program.routines:
-            name = self._routine_name(routine, taken)
-            taken.add(name)
+            name = self._routine_name(routine, used)
+            used.add(name)
             self.routines[routine] = name
 
-    def _routine_name(self, routine: Routine, taken: set[str]) -> str:
+    def _routine_name(self, routine: Routine, used: set[str]) -> str:
         name = self.language.word(stem_of(routine))
         of_floats = any(n == name and r.type == "float" for r, n in self.routines.items())
         if of_floats and routine.type == "vec3" and not self.language.overloads:
@@ -45,22 +45,23 @@ class Names:
             types = self._types(routine)
             if self.signatures.setdefault((name, types), routine) is routine and self._same_doc(name, routine):
                 return name
-        name = self._told_apart(name, routine) if name in taken else name
-        return first_free(name, taken)
+        name = self._distinguished(name, routine) if name in used else name
+        return first_free(name, used)
 
     def _types(self, routine: Routine) -> tuple[object, ...]:
-        """What tells overloads apart: the types of the arguments that are written, an object's being its struct."""
+        """The types that distinguish overloads: those of the written arguments, where an object counts as its
+        struct."""
         arguments = self.program.recorded[routine].arguments
-        found: dict[object, object] = {}
+        types: dict[object, object] = {}
         for index in sorted(routine.used):
             parameter = routine.parameters[index]
             root, rest, _ = place(parameter.static)
             struct = self.program.struct_of(arguments.get(root)) if rest else None
-            found[root if struct else index] = struct.record.name if struct else parameter.type
-        return tuple(found.values())
+            types[root if struct else index] = struct.record.name if struct else parameter.type
+        return tuple(types.values())
 
-    def _told_apart(self, name: str, routine: Routine) -> str:
-        """The name with what a copy was recorded for, where that is a flag or a word: "masking_shadowing_transmits"."""
+    def _distinguished(self, name: str, routine: Routine) -> str:
+        """The name with the flag or word that a copy was recorded for: "masking_shadowing_transmits"."""
         first = next(r for r, known in self.routines.items() if known == name)
         if first.source != routine.source:
             return name
@@ -73,11 +74,11 @@ class Names:
         return name
 
     def _same_doc(self, name: str, routine: Routine) -> bool:
-        """Whether a name stands for one function of the source, in different types."""
+        """Whether all routines of a name come from one function of the source, with different types."""
         return all(self.routines[r] != name or r.source == routine.source for r in self.routines)
 
     def note(self, record: Kind) -> str:
-        """The name of a type in the language; structs are noted, to be declared."""
+        """The name of a type in the language; structs are recorded for declaration."""
         if isinstance(record, Routine):
             record = record.record
         if isinstance(record, Record):
@@ -86,7 +87,7 @@ class Names:
         return self.language.type(record)
 
     def number(self, value: Value) -> str:
-        """A constant by its name, where it has one, or in digits."""
+        """A constant by its name if it has one, else as a literal."""
         number = float(value.static)
         check_single(number, value.source)
         if value.name and self.constants.get(value.name, (number,))[0] == number:

@@ -1,8 +1,8 @@
-"""Words of the vocabulary that shader languages lack, or compute too coarsely, written in the vocabulary itself.
+"""Functions of the vocabulary that shader languages lack or compute too inaccurately, written in the vocabulary itself.
 
-They are recorded like a model's functions, so one text serves every language. Ours, because the languages promise
-little: GLSL ES 3.00 and WGSL leave sin, cos, exp, log and atan an absolute error of 2^-11 or several units in the last
-place, and what is lost there no later line gives back.
+They are recorded like a model's functions, so one text serves every language. The languages guarantee little: GLSL ES
+3.00 and WGSL allow sin, cos, exp, log and atan an absolute error of 2^-11 or several units in the last place, which
+later lines cannot correct.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .. import ops
 from ..ops import Mask, Scalar, Spectrum, abs, floor, graph, maximum, sqr, where
 from ..ops.types import Value
 
-# pi / 2 as the sum of a float32 and a rest, so that whole quarters can be taken away without rounding
+# pi / 2 as the sum of a float32 and a rest, so that whole quarter turns can be subtracted without rounding
 QUARTER_TURN = 1.5707964
 QUARTER_REST = -4.371139e-8
 
@@ -36,7 +36,7 @@ def max_component(c: Spectrum) -> Scalar:
 
 
 def copysign(size: Scalar, other: Scalar) -> Scalar:
-    """|size| with the sign of the other."""
+    """|size| with the sign of `other`."""
     return where(other < 0.0, -abs(size), abs(size))
 
 
@@ -45,18 +45,18 @@ def isfinite(x: Scalar) -> Mask:
     return abs(x) <= 3.4028234e38
 
 
-# Our own fits, by least squares of the error reweighted toward the largest: of erf(x) / x in x^2 for |x| < 1 (error
-# 1e-9), and of -log(1 - erf(x)) in x for 0.9 <= x <= 4 (error of erf 2e-9); beyond 4 erf is 1 in float32.
-_ERF_CENTRE = (1.1283791, -0.37612626, 0.11283585, -0.026853811, 0.0051883273, -0.00080101914, 7.8538527e-05)
+# Least-squares fits, reweighted toward the largest error: of erf(x) / x in x^2 for |x| < 1 (error 1e-9), and of
+# -log(1 - erf(x)) in x for 0.9 <= x <= 4 (error of erf 2e-9); beyond 4 erf is 1 in float32.
+_ERF_CENTER = (1.1283791, -0.37612626, 0.11283585, -0.026853811, 0.0051883273, -0.00080101914, 7.8538527e-05)
 _ERF_TAIL = (0.00017747548, 1.1277497, 0.63705957, 0.104037508, -0.022277163, 0.0030556284, -0.00019718401)
 
 
 def erf(x: Scalar) -> Scalar:
-    """Error function: a polynomial near 0, 1 - exp of one beyond; error under 1e-7."""
+    """Error function: a polynomial near 0, 1 - exp of a polynomial beyond; error under 1e-7."""
     size = ops.minimum(abs(x), 4.0)
-    centre = size < 1.0
-    value = where(centre, x * _horner(sqr(x), _ERF_CENTRE), 1.0 - ops.exp(-_horner(size, _ERF_TAIL)))
-    return where(centre | (x > 0.0), value, -value)
+    center = size < 1.0
+    value = where(center, x * _horner(sqr(x), _ERF_CENTER), 1.0 - ops.exp(-_horner(size, _ERF_TAIL)))
+    return where(center | (x > 0.0), value, -value)
 
 
 def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
@@ -67,7 +67,7 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 
 def sine_quarters(x: Scalar, quarters: float) -> Scalar:
-    """sin(x + quarters pi / 2): Taylor's series within an eighth of a turn, error 1e-7; a GPU's own errs by 5e-4."""
+    """sin(x + quarters pi / 2) by Taylor series within an eighth of a turn: error 1e-7, a GPU's own has 5e-4."""
     count = floor(x * (2.0 / ops.pi) + 0.5)  # whole quarter turns
     r = (x - count * QUARTER_TURN) - count * QUARTER_REST
     r2 = sqr(r)
@@ -81,7 +81,7 @@ def sine_quarters(x: Scalar, quarters: float) -> Scalar:
 
 
 def exponent(x: Scalar) -> Value:
-    """e of x = m 2^e, 1 <= m < 2, for x > 0: out of the bits."""
+    """e of x = m 2^e, 1 <= m < 2, for x > 0, from its bits."""
     return graph.emit("exponent", "float", x)
 
 
@@ -91,9 +91,9 @@ def scaled(x: Scalar, e: Scalar) -> Value:
 
 
 def log(x: Scalar) -> Scalar:
-    """Natural logarithm of a normal float32 > 0, error 1e-7 of the value also near 1, where a GPU's has 5e-7 at best.
+    """Natural logarithm of a normal float32 > 0: relative error 1e-7, also near 1, where a GPU's is at best 5e-7.
 
-    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Of a colour, channel by channel.
+    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Colors channel by channel.
     """
     if isinstance(x, graph.Node) and x.type != "float":
         value: Value = graph.emit("vector", x.type, *(ops.log(channel) for channel in _channels(x)))
@@ -109,7 +109,7 @@ def log(x: Scalar) -> Scalar:
 
 
 SQRT_2 = 1.4142135
-LOG_2 = 0.693359375  # with so few bits that e LOG_2 is exact
+LOG_2 = 0.693359375  # with few bits, so that e LOG_2 is exact
 LOG_2_REST = -0.00021219444
 
 _SINE_QUARTERS = ops.function(sine_quarters)

@@ -1,8 +1,8 @@
-"""A model as the functions, structs and tables of a shader, in no language yet.
+"""A model as the functions, structs and tables of a shader, independent of the language.
 
-All methods are recorded into one graph, so that what eval, pdf and sample share is there once. What follows from the
-parameters alone (`BSDF.derive`) becomes a function of its own, whose result the others take as an argument: a shader
-computes it once a draw, not once a pixel.
+All methods are recorded into one graph, so that eval, pdf and sample share functions. Quantities that depend on the
+parameters alone (`BSDF.derive`) become a separate function, whose result the others take as an argument: a shader
+computes it once per draw instead of once per pixel.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from ..material import BSDF, binding, recording, tree
 from ..ops import Direction, graph
 from ..ops.table import Table
 from .polyfills import POLYFILLS
-from .simplify import Record, Routine, Value, routines, shape
+from .simplify import routines
+from .values import Record, Routine, Value, shape
 
 FUNCTIONS = ("eval", "pdf", "sample", "terms")
 
 
 class Struct:
-    """An argument made of fields: a model's parameters, or what was derived from them."""
+    """An argument made of fields: the parameters of a model, or quantities derived from them."""
 
     def __init__(
         self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
@@ -33,33 +34,33 @@ class Struct:
 
 
 class Program:
-    """What a shader of one model is made of.
+    """The parts of a model's shader.
 
     routines  in order of definition, callees first
-    entries   method -> its routine, "derive" among them where there is something to derive
+    entries   method -> its routine, including "derive" if there is something to derive
     structs   of parameters, derived values and results, in order of use
     without   paths of parameters that are off and shape the code
     tables    the tables that are read
-    readings  of each, by identity, how: "lookup" and "fetch"
+    readings  for each table, by identity, how it is read: "lookup" or "fetch"
     """
 
     def __init__(self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = ()) -> None:
         self.model, self.without = model, tuple(without)
         self.bound = recording.symbols(model, self.without)
         recorded = _record(self.bound, functions)
-        found = routines(recorded)
-        self.driver = found.pop()
-        functions_of = dict(zip((r.name for r in found), recorded.functions, strict=False))
-        self.recorded = {r: functions_of[r.name] for r in found}
+        simplified = routines(recorded)
+        self.driver = simplified.pop()
+        functions_of = dict(zip((r.name for r in simplified), recorded.functions, strict=False))
+        self.recorded = {r: functions_of[r.name] for r in simplified}
         self.entries: dict[str, Routine] = {}
         stem = graph.class_name(model)
-        for routine in found:
+        for routine in simplified:
             for method in (*functions, "derive"):
                 if routine.name == f"{stem}_{method}":
                     self.entries[method] = routine
         self._parameters: dict[tuple, Struct] = {}
         self._derived: dict[tuple, Struct] = {}
-        self.routines = self._reachable(found)
+        self.routines = self._reachable(simplified)
         self._trim_derived()
         self.tables = self._tables()
 
@@ -78,12 +79,12 @@ class Program:
         return self._parameters[key]
 
     def derived_of(self, value: object) -> Struct | None:
-        """The struct of what is derived from a model's parameters; also of the dict itself."""
+        """The struct of the quantities derived from a model's parameters; also for the dict itself."""
         key = tuple(derived_list(value))
         return self._derived.get(key)
 
     def _trim_derived(self) -> None:
-        """One struct for each structure of derived values, with the fields that somebody uses."""
+        """Make one struct for each structure of derived values, with the fields that are used."""
         used: dict[tuple, set[str]] = {}
         owner: dict[tuple, str] = {}
         for routine in self.routines:
@@ -103,25 +104,25 @@ class Program:
             if fields and key in owner:
                 name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
                 by = f"{graph.class_name(self.model)}_derive"
-                doc = f"What follows from the parameters alone: {by} computes it, once a draw."
+                doc = f"Quantities that depend on the parameters alone: {by} computes them, once per draw."
                 self._derived[key] = Struct(name, fields, doc)
         derive = self.entries.get("derive")
         if derive is None:
             return
-        struct = self._derived.get(tuple(derived_list(self._settled)))
-        if struct is None:  # nothing of it is used
+        struct = self._derived.get(tuple(derived_list(self._with_derived)))
+        if struct is None:  # none of its fields is used
             del self.entries["derive"]
             self.routines.remove(derive)
             return
-        kept = {place(f"derived.{path}")[1]: value for path, value in derive.results}
-        derive.results = [(path, kept[path]) for path in struct.paths]
+        by_path = {place(f"derived.{path}")[1]: value for path, value in derive.results}
+        derive.results = [(path, by_path[path]) for path in struct.paths]
         derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
         derive.record, derive.single = struct.record, False
-        self.routines = self._reachable(self.routines)  # without what served only fields that nobody uses
+        self.routines = self._reachable(self.routines)  # without routines that only unused fields needed
 
     @property
-    def _settled(self) -> object:
-        """An argument that has the derived values of the whole model."""
+    def _with_derived(self) -> object:
+        """An argument that holds the derived values of the whole model."""
         for method, routine in self.entries.items():
             if method != "derive":
                 return self.recorded[routine].arguments["self"]
@@ -129,21 +130,21 @@ class Program:
 
     @property
     def derived(self) -> Struct | None:
-        """The struct that the entries take besides the parameters."""
-        return self.derived_of(self._settled) if "derive" in self.entries else None
+        """The struct that the entries take in addition to the parameters."""
+        return self.derived_of(self._with_derived) if "derive" in self.entries else None
 
-    # ------------------------------------------------------------------ what is there
+    # ------------------------------------------------------------------ contents
 
-    def _reachable(self, found: list[Routine]) -> list[Routine]:
+    def _reachable(self, all_: list[Routine]) -> list[Routine]:
         wanted = set(self.entries.values())
-        for routine in reversed(found):  # callers come after callees
+        for routine in reversed(all_):  # callers come after callees
             if routine in wanted:
                 wanted |= {v.static for v in routine.values() if v.op == "call"}
-        for routine in found:
+        for routine in all_:
             unnamed = routine.record is None and not routine.single
             if routine in wanted and unnamed and routine.name != f"{graph.class_name(self.model)}_derive":
                 self._name_result(routine)
-        return [routine for routine in found if routine in wanted]
+        return [routine for routine in all_ if routine in wanted]
 
     def _name_result(self, routine: Routine) -> None:
         result = self.recorded[routine].result
@@ -158,20 +159,20 @@ class Program:
         routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)))
 
     def _tables(self) -> list[Table]:
-        found: dict[int, Table] = {}
+        tables: dict[int, Table] = {}
         self.readings: dict[int, set[str]] = {}
         for routine in self.routines:
             for value in routine.values():
                 if value.op == "texel":
                     table, _, how = value.static
-                    found.setdefault(id(table), table)
+                    tables.setdefault(id(table), table)
                     self.readings.setdefault(id(table), set()).add(how)
-        return list(found.values())
+        return list(tables.values())
 
 
 def _record(bound: BSDF, functions: tuple[str, ...]) -> graph.Graph:
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
-        """The driver of a recording; no part of the shader."""
+        """The driver of a recording; not part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
         return tuple(getattr(self, method)(wo, u if method == "sample" else wi) for method in functions)
@@ -182,17 +183,17 @@ def _record(bound: BSDF, functions: tuple[str, ...]) -> graph.Graph:
 
 @ops.function
 def derive(self: BSDF) -> dict[str, object]:
-    """What follows from the parameters alone: to be computed once, not for every pair of directions."""
+    """Quantities that depend on the parameters alone: computed once, not for every pair of directions."""
     return _derive(self)
 
 
 def _derive(material: BSDF) -> dict[str, object]:
-    """What every material of the tree derives, by its path."""
+    """The derived quantities of every material of the tree, by its path."""
     return {path: inner.derive() for path, inner in tree.walk(material) if inner.derives}
 
 
 def settle(material: BSDF, derived: dict[str, object], path: str = "") -> BSDF:
-    """A copy of a bound material whose tree holds what `derive` gave."""
+    """A copy of a bound material whose tree holds the result of `derive`."""
     below = {name: settle(inner, derived, tree.join(path, name)) for name, inner in tree.children(material).items()}
     return binding.bound_copy(material, below, derived.get(path))
 
@@ -214,13 +215,13 @@ def flat(path: str) -> str:
 
 
 def field_list(value: object) -> list[tuple[str, str]]:
-    """(path, type) of a model's numeric parameters, those of inner materials included."""
+    """(path, type) of a model's numeric parameters, including those of inner materials."""
     pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
     return [(rest, shape(type_)) for (_, rest, derived), type_ in pairs if not derived]
 
 
 def derived_list(value: object) -> list[tuple[str, str]]:
-    """(path, type) of derived values: of those that a model holds, or of a dict of them."""
+    """(path, type) of derived values, of a model or of a dict."""
     if not isinstance(value, BSDF | dict):
         return []
     pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
@@ -234,7 +235,7 @@ def _result_name(path: str, value: Value) -> str:
 
 
 def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
-    """(field, what it is, with unit and range) of a model's numeric parameters."""
+    """(field, description with unit and range) of a model's numeric parameters."""
     for path, parameter, _, _ in tree.surface(model):
         if parameter.numeric:
             doc = parameter.doc.partition(";")[0] if parameter.kind == "alpha" else parameter.doc
@@ -244,52 +245,52 @@ def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
 
 
 def listed(doc: str) -> Iterator[tuple[str, str]]:
-    """(name, what is said of it) in a docstring's list, "name  what it is" a line, continued by indented lines."""
-    name, said = "", ""
+    """(name, description) in a docstring's list of lines "name  description", continued by indented lines."""
+    name, text = "", ""
     for line in doc.splitlines():
-        found = re.match(r"(\w+)  +(\S.*)", line)
-        if name and (found or not line.startswith("  ")):
-            yield name, said
+        entry = re.match(r"(\w+)  +(\S.*)", line)
+        if name and (entry or not line.startswith("  ")):
+            yield name, text
             name = ""
-        if found:
-            name, said = found[1], found[2]
+        if entry:
+            name, text = entry[1], entry[2]
         elif name:
-            said += " " + line.strip()
+            text += " " + line.strip()
     if name:
-        yield name, said
+        yield name, text
 
 
-def check(model: object, functions: str | Sequence[str], where: str) -> tuple[str, ...]:
-    """The functions asked for that the model has, each once; InputError where there can be no shader code.
+def check(model: object, functions: str | Sequence[str], location: str) -> tuple[str, ...]:
+    """The requested functions that the model has, without repetition; InputError if no shader code can be written.
 
-    functions  names in a sequence, or in one string with commas between them
+    functions  names in a sequence, or in one string separated by commas
     """
     if not isinstance(model, BSDF):
-        raise InputError(f"{type(model).__name__} given, a material expected", where)
+        raise InputError(f"{type(model).__name__} given, a material expected", location)
     if isinstance(functions, str):
         functions = [name.strip() for name in functions.split(",") if name.strip()]
     try:
         asked = tuple(dict.fromkeys(str(name) for name in functions))
     except TypeError:
-        raise InputError(f"{functions!r} given, names of functions expected", where, _KNOWN) from None
+        raise InputError(f"{functions!r} given, names of functions expected", location, _KNOWN) from None
     for name in asked:
         if name not in FUNCTIONS:
-            raise InputError(f"unknown function '{name}'", where, did_you_mean(name, FUNCTIONS))
+            raise InputError(f"unknown function '{name}'", location, did_you_mean(name, FUNCTIONS))
     if not asked:
-        raise InputError("no function named", where, _KNOWN)
+        raise InputError("no function given", location, _KNOWN)
     random = stochastic(model)
     if random is not None:
         what = f"{type(random).__name__} is estimated by random walks and cannot be written as shader code"
-        raise InputError(what, where, "KullaConty is its closed form")
-    found = tuple(name for name in asked if name != "terms" or model.has_terms)
-    if not found:
-        raise InputError(f"{type(model).__name__} has no terms D, G, F", where, "name eval, pdf or sample")
-    return found
+        raise InputError(what, location, "KullaConty is its closed form")
+    available = tuple(name for name in asked if name != "terms" or model.has_terms)
+    if not available:
+        raise InputError(f"{type(model).__name__} has no terms D, G, F", location, "give eval, pdf or sample")
+    return available
 
 
 _KNOWN = "known: " + ", ".join(FUNCTIONS)
 
 
 def stochastic(model: BSDF) -> BSDF | None:
-    """The material, this or one inside, whose values are random numbers; else None."""
+    """The material, this one or a nested one, whose values are random numbers; else None."""
     return next((inner for _, inner in tree.walk(model) if inner.stochastic), None)

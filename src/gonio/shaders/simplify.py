@@ -1,135 +1,39 @@
-"""Recorded functions, made fit to be read: one `Value` for each thing computed, nothing that is not used.
+"""Simplification of recorded functions for readable shader text.
 
-A recording holds what Python did, number by number. Here equal values become one, constants are folded, branches that
-cannot be taken vanish, and a value chosen inside a choice by the same mask is taken at once: `where(b == 0, 0,
-a / where(b == 0, 1, b))` is a quotient that is looked at only where b is not 0.
+A recording holds every operation of the Python code. Here equal values are merged, constants are folded, branches that
+cannot be taken are removed, and a selection inside another one by the same mask is resolved: `where(b == 0, 0,
+a / where(b == 0, 1, b))` becomes a quotient that is selected only where b is not 0.
 """
 
 from __future__ import annotations
 
-import math
 import struct
-from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..errors import GonioError
 from ..ops import graph
 from ..ops.table import Table
 from .source import module_constant
-
-SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
-COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
-LOGIC = {"and", "or", "not"}
-ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
-
-Kind: TypeAlias = Any  # of a value: its name, or the `Record` that it is
-Static: TypeAlias = Any  # what is known of a value when it is written: a number, a name, a routine, a table
-
-
-class Value:
-    """One thing that a function computes.
-
-    op      as in a recording, or "constant", "parameter", "swizzle", "texel" (up to four channels of a table)
-    type    "float", "bool", "vec2", "vec3", "vec4", "bvec3", or the result of a call: a `Record`
-    args    Values
-    static  the constant, the parameter's place, the callee, the component or the letters of several, (table, group of
-            channels)
-    name    of the Python variable, where known; `source` the line that wrote it
-    """
-
-    __slots__ = ("args", "name", "op", "order", "source", "static", "type")
-
-    def __init__(self, op: str, type: Kind, args: tuple, static: Static, order: int) -> None:
-        self.op, self.type, self.args, self.static, self.order = op, type, args, static, order
-        self.name, self.source = "", ""
-
-    def __repr__(self) -> str:
-        return f"#{self.order}:{self.op}"
-
-
-class Record:
-    """The type of several values returned together: a struct of the shader.
-
-    docs  field -> what it is, with unit and range
-    """
-
-    def __init__(
-        self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
-    ) -> None:
-        self.name, self.fields, self.doc, self.docs = name, fields, doc, docs or {}
-
-    @property
-    def key(self) -> tuple:
-        return tuple(self.fields)
-
-
-class Routine:
-    """A function of the shader.
-
-    parameters  Values of op "parameter", with `static` the path ("self.base.alpha")
-    result      a Value, or a list of (path, Value) where several are returned
-    used        which parameters the result depends on
-    record      the type of several results
-    """
-
-    def __init__(self, function: graph.Function) -> None:
-        self.name, self.doc, self.source = function.name, function.doc, function.source
-        self.parameters: list[Value] = []
-        self.results: list[tuple[str, Value]] = []
-        self.single = False
-        self.used: set[int] = set()
-        self.record: Record | None = None
-
-    @property
-    def type(self) -> Kind:
-        return self.results[0][1].type if self.single else self.record
-
-    def values(self) -> list[Value]:
-        """Everything that the results depend on, in order of computation."""
-        found: dict[int, Value] = {}
-        pending = [value for _, value in self.results]
-        while pending:
-            value = pending.pop()
-            if value.order not in found:
-                found[value.order] = value
-                pending.extend(needed(value))
-        return [found[order] for order in sorted(found)]
-
-
-def needed(value: Value) -> list[Value]:
-    """The arguments that count: of a call those that the callee uses."""
-    if value.op == "call":
-        return [value.args[i] for i in sorted(value.static.used)]
-    return list(value.args)
-
-
-def stem_of(routine: Routine) -> str:
-    """A routine's name without the number that tells copies apart."""
-    stem, _, count = routine.name.rpartition("_")
-    return stem if stem and count.isdigit() else routine.name
+from .values import COMPARE, ELEMENTWISE, LOGIC, SIZES, Kind, Routine, Static, Value, shape
 
 
 def routines(recorded: graph.Graph) -> list[Routine]:
-    """Every function of a recording, simplified, callees first."""
+    """All functions of a recording, simplified, callees first."""
     known: dict[graph.Function, Routine] = {}
     for function in recorded.functions:
         known[function] = _Simplifier(function, known).routine
     return list(known.values())
 
 
-def shape(type_: str) -> str:
-    """A spectrum is three channels in a shader."""
-    return "vec3" if type_ == "spectrum" else type_
-
-
 class _Simplifier:
+    """Converts a recorded function into a simplified routine."""
+
     def __init__(self, function: graph.Function, known: dict[graph.Function, Routine]) -> None:
         self.known = known
         self.table: dict[tuple, Value] = {}
         self.count = 0
         self.assumed: dict[tuple, Value] = {}
-        self.parts: dict[int, tuple[Value, ...]] = {}  # of a vector, as Python put it together
+        self.parts: dict[int, tuple[Value, ...]] = {}  # components of a vector, as Python composed it
         self.routine = Routine(function)
         self.values: dict[graph.Node, Value] = {}
         for node in function.nodes:
@@ -157,7 +61,7 @@ class _Simplifier:
         return value
 
     def constant(self, number: Static, type_: str = "float", source: str = "") -> Value:
-        """A number; by name, where the line of the source that uses it does so."""
+        """A number, with its name if the line of the source uses one."""
         if isinstance(number, bool | np.bool_):
             return self.make("constant", "bool" if type_ == "float" else type_, (), bool(number))
         name = module_constant(float(number), source)[0] if source else ""
@@ -178,7 +82,7 @@ class _Simplifier:
             return self.constant(number, source=node.source)
         if op == "call":
             callee = self.known[node.static]
-            if callee.single:  # a function that says nothing needs no call
+            if callee.single:  # a function that only returns its argument or a constant needs no call
                 result = callee.results[0][1]
                 if result.op == "parameter":
                     return args[callee.parameters.index(result)]
@@ -223,7 +127,8 @@ class _Simplifier:
         return self.make("component", "float", (vector,), place)
 
     def vector(self, parts: tuple[Value, ...]) -> Value:
-        """Floats put together; what is the same in each component, or in x and y, is written once for all of them."""
+        """A vector of floats; operations common to all components, or to x and y, are written once as vector
+        operations."""
         type_ = f"vec{len(parts)}"
         made = self.joined(parts)
         if made is None:
@@ -233,7 +138,7 @@ class _Simplifier:
         return made
 
     def joined(self, parts: tuple[Value, ...]) -> Value | None:
-        """One operation on vectors that gives these components, by the same arithmetic; None where there is none."""
+        """One vector operation that computes these components by the same arithmetic; None if there is none."""
         type_, first = f"vec{len(parts)}", parts[0]
         if all(p.op == "component" and p.args == first.args for p in parts):
             places = "".join("xyzw"[p.static] for p in parts)
@@ -243,14 +148,14 @@ class _Simplifier:
             return None
         columns = list(zip(*(p.args for p in parts), strict=True))
         same = [column[0] if all(p is column[0] for p in column) else None for column in columns]
-        found = [same[i] or self.joined(column) for i, column in enumerate(columns)]
-        if all(same) or not any(found):
+        operands = [same[i] or self.joined(column) for i, column in enumerate(columns)]
+        if all(same) or not any(operands):
             return None
-        args = tuple(x if x is not None else self.vector(c) for x, c in zip(found, columns, strict=True))
+        args = tuple(x if x is not None else self.vector(c) for x, c in zip(operands, columns, strict=True))
         return self.build(first.op, args, type_)
 
     def swizzle(self, vector: Value, places: str) -> Value | None:
-        """Components by their letters, each once: `v.xy`."""
+        """Several components by their letters, without repetition: `v.xy`."""
         if len(set(places)) < len(places):
             return None
         if places == "xy" and vector.op == "vector" and vector.args[0].type == "vec2":
@@ -258,7 +163,7 @@ class _Simplifier:
         return self.make("swizzle", f"vec{len(places)}", (vector,), places)
 
     def build(self, op: str, args: tuple, declared: str) -> Value:
-        """An operation on values: folded where its arguments allow, else made."""
+        """An operation on values, folded if its arguments allow it."""
         type_ = self.type_of(op, args, declared)
         folded = self.fold(op, args, type_)
         return folded if folded is not None else self.make(op, type_, args)
@@ -283,9 +188,9 @@ class _Simplifier:
             mask, a, b = args
             return self.fold_where(mask, a, b, type_)
         if args and all(a.op == "constant" for a in args):
-            found = _compute(op, [a.static for a in args])
-            if found is not None:
-                return self.constant(found, type_)
+            number = _compute(op, [a.static for a in args])
+            if number is not None:
+                return self.constant(number, type_)
         if op == "sub" and args[0] is args[1]:
             return self.constant(0.0, type_)
         if op in ("add", "sub", "mul", "div"):
@@ -294,7 +199,7 @@ class _Simplifier:
             return args[0].args[0]
         if op == "not" and args[0].op == "not":
             return args[0].args[0]
-        if op in ("ne", "lt", "gt") and args[0] is args[1]:  # `never`; no NaN is asked for this way
+        if op in ("ne", "lt", "gt") and args[0] is args[1]:  # no source tests for NaN this way
             return self.constant(False, type_)
         if op in ("and", "or"):
             for a, b in (args, args[::-1]):
@@ -310,8 +215,8 @@ class _Simplifier:
         def is_number(x: Value, number: float) -> bool:
             return x.op == "constant" and x.static == number
 
-        def whole(x: Value) -> Value | None:
-            """x where it has the type of the result already."""
+        def typed(x: Value) -> Value | None:
+            """x in the type of the result."""
             if x.type == type_:
                 return x
             return self.constant(x.static, type_) if x.op == "constant" else self.make("splat", type_, (x,))
@@ -321,16 +226,16 @@ class _Simplifier:
         if op == "div" and is_number(a, 0.0):
             return self.constant(0.0, type_)
         if op == "mul" and is_number(a, 1.0):
-            return whole(b)
+            return typed(b)
         if op in ("mul", "div") and is_number(b, 1.0):
-            return whole(a)
+            return typed(a)
         if op == "mul" and (is_number(a, -1.0) or is_number(b, -1.0)):
             other = b if is_number(a, -1.0) else a
             return self.build("neg", (other,), other.type) if other.type == type_ else None
         if op == "add" and is_number(a, 0.0):
-            return whole(b)
+            return typed(b)
         if op in ("add", "sub") and is_number(b, 0.0):
-            return whole(a)
+            return typed(a)
         if op == "sub" and is_number(a, 0.0) and b.type == type_:
             return self.build("neg", (b,), type_)
         if op == "add" and b.op == "constant" and b.static < 0.0 and not b.name:
@@ -357,7 +262,7 @@ class _Simplifier:
             if a.op == "constant" or b.op == "constant":  # m ? false : b, m ? a : true
                 other, not_mask = (b if a.op == "constant" else a), self.build("not", (mask,), "bool")
                 return self.build("and" if a.op == "constant" else "or", (not_mask, other), "bool")
-        shifted = self._same_but_for_a_number(mask, a, b)
+        shifted = self._equal_up_to_constant(mask, a, b)
         if shifted is not None:
             return shifted
         a2, b2 = self.assume(a, mask, True), self.assume(b, mask, False)
@@ -365,8 +270,8 @@ class _Simplifier:
             return self.build("where", (mask, a2, b2), type_)
         return None
 
-    def _same_but_for_a_number(self, mask: Value, a: Value, b: Value) -> Value | None:
-        """mask ? x + 1 : x + 2, as x + (mask ? 1 : 2)."""
+    def _equal_up_to_constant(self, mask: Value, a: Value, b: Value) -> Value | None:
+        """mask ? x + 1 : x + 2 as x + (mask ? 1 : 2), else None."""
         numbers = []
         for value in (a, b):
             if value.op not in ("add", "sub") or value.name or value.args[1].op != "constant":
@@ -378,12 +283,12 @@ class _Simplifier:
         return self.build("add", (a.args[0], self.build("where", (mask, *numbers), numbers[0].type)), a.type)
 
     def assume(self, value: Value, mask: Value, holds: bool) -> Value:
-        """The value where it is known that `mask` holds, or that it does not."""
+        """The value under the assumption that `mask` holds, or that it does not."""
         key = (value.order, mask.order, holds)
-        found = self.assumed.get(key)
-        if found is None:
-            found = self.assumed[key] = self._assume(value, mask, holds)
-        return found
+        result = self.assumed.get(key)
+        if result is None:
+            result = self.assumed[key] = self._assume(value, mask, holds)
+        return result
 
     def _assume(self, value: Value, mask: Value, holds: bool) -> Value:
         if value is mask and value.type == "bool":
@@ -393,7 +298,7 @@ class _Simplifier:
             if chosen.type == value.type:
                 return self.assume(chosen, mask, holds)
         if value.name or value.op in ("call", "element", "texel", "parameter", "constant"):
-            return value  # shared with other lines: a second copy would be dearer than the choice
+            return value  # shared with other lines: a second copy would cost more than the selection
         args = tuple(self.assume(a, mask, holds) for a in value.args)
         if all(new is old for new, old in zip(args, value.args, strict=True)):
             return value
@@ -412,7 +317,7 @@ def _key(static: Static) -> object:
     return (type(static).__name__, static if isinstance(static, bool | int | str | None) else id(static))
 
 
-# what is computed here where all arguments are numbers
+# operations that are folded if all arguments are numbers
 _FOLD = COMPARE | LOGIC | ELEMENTWISE | {"sqrt", "exp", "log", "sin", "cos", "floor"}
 
 
@@ -422,12 +327,5 @@ def _compute(op: str, numbers: list) -> Static:
     try:
         with np.errstate(all="raise", under="ignore"):
             return graph.NUMPY[op](*numbers)
-    except FloatingPointError:  # left for the shader, as the source has it
+    except FloatingPointError:  # left to the shader, as in the source
         return None
-
-
-def check_single(number: float, where: str) -> None:
-    """Raise where a constant of the source is none of float32's."""
-    size = abs(number)
-    if math.isnan(number) or size > 3.4028234e38 or 0.0 < size < 1.17549435e-38:
-        raise GonioError(f"the constant {number!r} is no float32", where, "shader code computes in 32 bits")

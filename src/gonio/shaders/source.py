@@ -1,4 +1,4 @@
-"""What the Python source says of a value beyond the recording: the names of constants and of small helpers."""
+"""Information in the Python source beyond the recording: the names of constants and of small helpers."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pathlib import Path
 
 @functools.cache
 def module_constant(number: float, source: str) -> tuple[str, str]:
-    """(name, what is said of it) of a constant of a module, where the line of the source uses it; else ("", "")."""
+    """(name, comment) of a module's constant, if the line of the source uses it; else ("", "")."""
     path, _, line = source.rpartition(":")
     text = linecache.getline(path, int(line or 0))
     words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}
     for name in words if number not in (0.0, 1.0) else ():
-        for module in sorted(sys.modules.values(), key=lambda m: getattr(m, "__file__", None) != path):  # its own first
+        for module in sorted(sys.modules.values(), key=lambda m: getattr(m, "__file__", None) != path):  # own one first
             place = getattr(module, "__file__", None) or ""
             if place.startswith(_PACKAGE) and type(vars(module).get(name)) is float and vars(module)[name] == number:
-                about = _said_of(place, name)
+                about = _comment_on(place, name)
                 if about is not None:
                     return name.strip("_"), about
     return "", ""
@@ -28,8 +28,8 @@ def module_constant(number: float, source: str) -> tuple[str, str]:
 _PACKAGE = str(Path(__file__).parent.parent)
 
 
-def _said_of(path: str, name: str) -> str | None:
-    """The comment on a constant where it is defined, above it or after it; None where it is only imported."""
+def _comment_on(path: str, name: str) -> str | None:
+    """The comment on a constant at its definition, above it or after it; None if it is only imported there."""
     lines = linecache.getlines(path)
     for index, line in enumerate(lines):
         if line.startswith(f"{name} ="):
@@ -43,9 +43,9 @@ def _said_of(path: str, name: str) -> str | None:
 
 
 def returned_by(op: str, source: str, own: str) -> str:
-    """The name of the plain function whose result a value is, recorded as part of another; "" for any other value.
+    """The name of the plain function that returned a value, if it was recorded as part of another; "" otherwise.
 
-    source  the line that wrote it, "file:line";  own  that of the function whose part it became
+    source  the line that wrote the value, "file:line";  own  that of the function that contains it
     """
     path, _, line = source.rpartition(":")
     for function, statement in _returns(path) if path.startswith(_PACKAGE) else ():
@@ -73,7 +73,7 @@ _OPERATORS: dict[type, str] = {
 
 
 def _makes(expression: object, op: str) -> bool:
-    """Whether the outermost step of an expression is an operation."""
+    """Whether the outermost operation of an expression is `op`."""
     if isinstance(expression, ast.BinOp):
         return _OPERATORS.get(type(expression.op)) == op
     return isinstance(expression, ast.Call) and isinstance(expression.func, ast.Name) and expression.func.id == op

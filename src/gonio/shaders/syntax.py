@@ -1,10 +1,10 @@
-"""What the expressions of all languages share: operators, their precedence, and numbers."""
+"""Operators, their precedence, and number literals, which all languages share."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# precedence of what an expression is made of, loosest first
+# precedence of expressions, loosest first
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(9)
 
 OPERATORS = {
@@ -24,7 +24,7 @@ OPERATORS = {
 
 
 def literal(number: float) -> str:
-    """The shortest decimal that is the same float32."""
+    """The shortest decimal of the same float32."""
     text = repr(number)
     short = np.format_float_positional(np.float32(number), unique=True, trim="0")
     if len(text) > 9 and np.float32(float(text)) == np.float32(number):

@@ -1,4 +1,4 @@
-"""Tables as textures: their size and contents, and the functions that read one."""
+"""Tables as textures: their size and contents, and the functions that read them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def width(table: Table) -> int:
 
 
 def groups(table: Table) -> int:
-    """How many textures' worth of channels."""
+    """The number of texels per entry, each with up to four channels."""
     return -(-table.channels // width(table))
 
 
@@ -38,17 +38,17 @@ def pixels(table: Table) -> np.ndarray:
 
 
 def reader(language: Language, table: Table) -> list[str]:
-    """The function that reads a table: linear in each axis between texel centres, held outside (`gonio.ops.table`).
+    """The function that interpolates a table linearly between texel centers, clamped outside (`gonio.ops.table`).
 
-    A shader's own filtering would not do: its weights have eight bits.
+    Hardware filtering is too coarse: its weights have eight bits.
     """
     names, sizes, lines = _head(language, table, "lookup")
-    real, whole = language.type("float"), language.type("int")
+    real, integer = language.type("float"), language.type("int")
     for axis, count in sizes.items():
         at, cell = f"at_{axis}", f"{axis}0"
         for type_, name, text in (
             (real, at, f"clamp({axis} * {count}.0 - 0.5, 0.0, {count - 1}.0)"),
-            (whole, cell, f"min({whole}({at}), {max(count - 2, 0)})"),
+            (integer, cell, f"min({integer}({at}), {max(count - 2, 0)})"),
             (real, f"t_{axis}", f"{at} - {real}({cell})"),
         ):
             lines.append("    " + language.local(type_, name, text))
@@ -70,10 +70,10 @@ def reader(language: Language, table: Table) -> list[str]:
 
 
 def fetcher(language: Language, table: Table) -> list[str]:
-    """The function that reads one texel, at whole-numbered places; held outside (`gonio.ops.fetch`)."""
+    """The function that reads one texel at integer positions, clamped outside (`gonio.ops.fetch`)."""
     _, sizes, lines = _head(language, table, "fetch")
-    whole = language.type("int")
-    places = [f"{whole}(clamp({axis}, 0.0, {count - 1}.0))" for axis, count in sizes.items()]
+    integer = language.type("int")
+    places = [f"{integer}(clamp({axis}, 0.0, {count - 1}.0))" for axis, count in sizes.items()]
     return [*lines, f"    return {_texel(language, table, places)};", "}"]
 
 
@@ -81,7 +81,7 @@ READERS = {"lookup": reader, "fetch": fetcher}
 
 
 def _head(language: Language, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
-    """Names of the axes in the order of a lookup, slowest first; their texels; and the function's first line."""
+    """Names of the axes in the order of a lookup, slowest first; their numbers of texels; the function's first line."""
     names = list("xyz"[: len(table.shape)])
     channels = width(table)
     real = language.type("float")
@@ -92,7 +92,7 @@ def _head(language: Language, table: Table, how: str) -> tuple[list[str], dict[s
 
 
 def _texel(language: Language, table: Table, places: list[str]) -> str:
-    """A texel at places along the axes, slowest first."""
+    """A texel at positions along the axes, slowest first."""
     at = places[::-1]
     if groups(table) > 1 and len(at) == 3:
         at[2] = f"group * {table.shape[0]} + {at[2]}"

@@ -1,1 +1,1 @@
-"""How light is followed through a scene: integrators, lights, media, random numbers, passes."""
+"""Light transport through a scene: integrators, lights, media, random numbers, passes."""

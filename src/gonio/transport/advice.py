@@ -1,4 +1,4 @@
-"""What to tell a person about the integrator that was chosen for a scene."""
+"""Advice to the user about the choice of integrator for a scene."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from .lights.solid_angles import is_sphere
 from .scene_data import SceneData
 
-# A lamp that mirrors and smooth glass see under less than so many steradians is seldom met by chance behind them: in
+# Paths behind mirrors and smooth glass rarely hit a lamp that subtends less than so many steradians there: in
 # examples/glass-caustic it is 0.008.
 SMALL = 0.03
 
 
 def on_small_lights(data: SceneData) -> str:
-    """A word where `path` will hardly find the light that mirrors or smooth glass throw on other surfaces; else ""."""
+    """A hint if `path` will hardly find the light that mirrors or smooth glass cast on other surfaces; else ""."""
     if not data.smooth:
         return ""
     mi, flags = data.mi, data.mi.EmitterFlags
@@ -23,7 +23,7 @@ def on_small_lights(data: SceneData) -> str:
         if shape is not None:
             place = np.array(shape.bbox().center(), float).ravel()
             nearest = float(np.min(np.sum((centers - place) ** 2, axis=1)))
-            # seen from far, a ball shows a quarter of its area
+            # the projected area of a sphere is a quarter of its surface
             visible = float(np.max(np.array(shape.surface_area()))) * (0.25 if is_sphere(mi, shape) else 1.0)
             small = visible < SMALL * nearest
         else:
@@ -32,7 +32,7 @@ def on_small_lights(data: SceneData) -> str:
             )
         if small:
             return (
-                "a small lamp and mirrors or smooth glass: path hardly finds the light that they throw, "
+                "small lamps with mirrors or smooth glass: path hardly finds the light that they cast, "
                 "--integrator caustics does"
             )
     return ""

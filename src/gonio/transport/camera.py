@@ -9,7 +9,7 @@ import drjit as dr
 from ..bridge.types import Float, Radiance, Ray, Sensor, UInt
 from .sampler import PairFunction
 
-# Dimensions of a sample that the camera takes: each decision of a sample has a number of its own, see `sampler`.
+# Dimensions of a sample that the camera uses: each decision of a sample has its own number, see `sampler`.
 PIXEL, TIME, APERTURE, FIRST_FREE = 0, 1, 2, 3
 
 
@@ -25,7 +25,7 @@ class Camera:
     def ray(self, pixel: UInt, key: UInt, index: UInt, wavelength: Float | None = None) -> tuple[Ray, Radiance]:
         """A ray through a point of the pixel, and its weight.
 
-        wavelength  a number in [0, 1) that chooses the wavelengths; None: one that no other sample has
+        wavelength  a number in [0, 1) that chooses the wavelengths; None: a separate one for every sample
         """
         mi = self.mi
         row = pixel // self.width

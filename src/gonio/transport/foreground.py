@@ -1,12 +1,12 @@
-"""Surfaces without their background: radiance and coverage, for comparing with a picture that a GPU draws.
+"""Surfaces without their background: radiance and coverage, for comparison with a picture drawn by a GPU.
 
     >>> render = Foreground(balls, Settings("direct"), lights=lamps)
     >>> render.advance(16)
-    >>> render.image()              # (height, width, 4): light of the surfaces alone, and the share of the pixel
+    >>> render.image()              # (height, width, 4): light of the surfaces alone, and coverage
 
-The lights may stand in a scene of their own. Then each point of a surface sees all of them with nothing in between: no
-shadow ray is traced, and no surface lights another. That is what a shader computes that knows one point, and it is
-physically what would be seen if every surface stood alone and were convex.
+The lights may be in a separate scene. Then every point of a surface is lit by all of them without occlusion: no shadow
+ray is traced, and no surface illuminates another. This is what a fragment shader computes, and it is physically correct
+if every surface is isolated and convex.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Foreground(Render):
     """A render whose camera sees surfaces only, neither lights nor environment.
 
     scene   the surfaces
-    lights  a scene that holds the lights alone; None where they stand among the surfaces, with all shadows
+    lights  a scene that contains the lights alone; None if they are in `scene`, with all shadows
     """
 
     features = 1
@@ -38,9 +38,10 @@ class Foreground(Render):
     def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, lights: Scene | None = None):
         program = settings.program
         if not issubclass(program, LightTransport):
-            raise InputError(f"'{settings.integrator}' shows no light", "integrator", "give one that does")
+            raise InputError(f"'{settings.integrator}' computes no light", "integrator", "use path or direct")
         if lights is not None and program.depth(settings) > 2:
-            raise InputError("paths meet other surfaces", "integrator", "give direct, or put the lights in the scene")
+            hint = "use direct, or put the lights in the scene"
+            raise InputError("separate lights need paths of one vertex", "integrator", hint)
         self._lights = lights
         super().__init__(scene, settings, sensor)
 
@@ -53,7 +54,7 @@ class Foreground(Render):
 
 
 class _SurfacesOnly(SceneData):
-    """A scene of which paths begin at surfaces only; the feature is 1 where there is one."""
+    """A scene whose paths begin at surfaces only; the feature is 1 where there is one."""
 
     def begins_path(self, hit: Hit) -> Mask:
         return hit.is_valid()
@@ -63,7 +64,7 @@ class _SurfacesOnly(SceneData):
 
 
 class _LightsApart(_SurfacesOnly):
-    """The same under the lights of another scene, `apart`, with nothing in between."""
+    """The same under the unoccluded lights of another scene, `apart`."""
 
     def __init__(self, apart: Scene, *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
@@ -78,9 +79,9 @@ class _LightsApart(_SurfacesOnly):
 
 
 class _Transparent(Lights):
-    """Lights that do not hide each other: a ray meets every lamp on its way, and the environment behind them.
+    """Lights that do not occlude each other: a ray collects every lamp on its way, and the environment behind them.
 
-    Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
+    Light sampling traces no shadow ray here, so lights that a BSDF sample finds must not be occluded either.
     """
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:

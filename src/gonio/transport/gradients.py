@@ -1,13 +1,13 @@
-"""Derivatives of a picture with respect to values of its materials.
+"""Derivatives of a picture with respect to parameter values of its materials.
 
     render = Gradients(scene, settings, [Along(plugin, "alpha")])
     render.advance(64)
-    render.image(), render.slopes()         # (H, W, 3), and one of these for each value
+    render.image(), render.slopes()         # (H, W, 3), and one such array per value
 
-The samples are those of the integrator itself: where a path goes, and with which density, stays as it is while a value
-moves (detached sampling), and what its materials send along it is differentiated (attached evaluation). That is without
-bias for whatever does not move the paths: Vicini2021 has the theory. Derivatives go forward along the
-path with its throughput, so that one walk gives the picture and all of them.
+The paths are those of the integrator itself: their directions and densities stay fixed while a value changes (detached
+sampling), and the light that its materials scatter along them is differentiated (attached evaluation). This is unbiased
+for every value that does not move the paths; see Vicini2021 for the theory. Derivatives are propagated forward along
+the path with its throughput, so one traversal gives the picture and all of them.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from .scene_data import SceneData
 
 @dataclass(frozen=True)
 class Along:
-    """What a picture is differentiated along: a value of a material, or a channel of a colour.
+    """The variable of a derivative: a value of a material, or a channel of a color.
 
     plugin   the material in the scene, one of Gonio's
-    path     of the value in it: "alpha", "base.alpha"
-    channel  0 to 2; None: all channels together, and both widths of a pair
+    path     name of the value in it: "alpha", "base.alpha"
+    channel  0 to 2; None: all channels together, and both alphas of a pair
     """
 
     plugin: BSDFPlugin
@@ -61,28 +61,29 @@ class Along:
 
 
 class Gradients(Render):
-    """A render that carries derivatives along: `slopes` beside `image`.
+    """A render that also computes derivatives: `slopes` in addition to `image`.
 
-    Raises InputError for integrators and values that have none.
+    Raises InputError for integrators and values without derivatives.
     """
 
     def __init__(self, scene: Scene, settings: Settings, along: Sequence[Along], sensor: Sensor | None = None):
         program = settings.program
-        where = "gradient"
+        location = "gradient"
         if not issubclass(program, LightTransport) or program.splats or program.blurs:
-            raise InputError(f"{settings.integrator} has no derivatives", where, "use path or direct")
+            raise InputError(f"{settings.integrator} has no derivatives", location, "use path or direct")
         self.along = list(along)
         self.features = 3 * len(self.along)
         super().__init__(scene, settings, sensor)
         if not self.mi.is_rgb:
-            raise InputError(f"variant {self.mi.variant()}, and derivatives are of RGB", where, "leave out spectral")
+            what = f"variant {self.mi.variant()} is set, but derivatives need RGB"
+            raise InputError(what, location, "leave out spectral")
         index = any(isinstance(one.slot.parameter, IndexParameter) for one in self.along)
         assert isinstance(self._integrator, _ForwardDerivatives)
         if index and self._integrator.walked.media.known:
-            what = "an index in a scene of nested or absorbing media, whose neighbours depend on it"
-            raise InputError(what, where, "leave priority and absorption out, or name another value")
+            what = "the index of a medium that others in the scene depend on (nested or absorbing media)"
+            raise InputError(what, location, "leave priority and absorption out, or name another value")
         if self._integrator.walked.ambient is not None:
-            raise InputError("ambient light has no derivative", where, "leave ambient out")
+            raise InputError("ambient light has no derivative", location, "leave ambient out")
 
     def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
         walked = super()._integrator_of(partial(_AttachedData, self.along))
@@ -90,13 +91,13 @@ class Gradients(Render):
         return _ForwardDerivatives(walked, self.along)
 
     def slopes(self) -> list[NDArray[np.float32]]:
-        """The picture's derivative along each, (height, width, 3)."""
+        """The picture's derivative with respect to each value, (height, width, 3)."""
         return [self._mean(self._sums.features[3 * i : 3 * i + 3]) for i in range(len(self.along))]
 
 
 @dataclass
 class _Derivatives:
-    """A path, and along each value the derivatives of its throughput and of its radiance."""
+    """A path, and for each value the derivatives of its throughput and of its radiance."""
 
     path: PathState
     throughput: list[Radiance]
@@ -104,9 +105,9 @@ class _Derivatives:
 
 
 class _ForwardDerivatives(Integrator):
-    """The paths of another integrator, vertex by vertex, with derivatives along each value.
+    """The paths of another integrator, vertex by vertex, with derivatives.
 
-    walked  the integrator whose paths they are
+    walked  the integrator that generates the paths
     """
 
     def __init__(self, walked: LightTransport, along: Sequence[Along]):
@@ -117,7 +118,7 @@ class _ForwardDerivatives(Integrator):
         self.attached = scattering
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
-        """[r, g, b] of a sample, and of its derivative along each value."""
+        """[r, g, b] of a sample, and of its derivative with respect to each value."""
         mi = self.mi
         zeros = [mi.Spectrum(0) for _ in self.along]
         state = _Derivatives(self.walked.camera_path(pixel, key, index), zeros, list(zeros))
@@ -136,7 +137,7 @@ class _ForwardDerivatives(Integrator):
         return values
 
     def vertex(self, state: _Derivatives, key: UInt) -> _Derivatives:
-        """One vertex of the path, and what the chain rule makes of the derivatives."""
+        """One vertex of the path, with the derivatives propagated by the chain rule."""
         path, mi = state.path, self.mi
         with dr.resume_grad():
             throughput, radiance = mi.Spectrum(path.throughput), mi.Spectrum(path.radiance)
@@ -164,7 +165,7 @@ class _ForwardDerivatives(Integrator):
 
 
 class _AttachedData(SceneData):
-    """A scene whose materials are differentiated along some values."""
+    """A scene whose materials are differentiated with respect to some values."""
 
     def __init__(self, along: Sequence[Along], *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
@@ -176,7 +177,7 @@ class _AttachedData(SceneData):
 
 
 class _AttachedScattering(Scattering):
-    """BSDFs whose values and weights have derivatives; where they sample, and with which density, has none."""
+    """BSDFs whose values and weights have derivatives, while their sampled directions and densities have none."""
 
     def __init__(self, mi: ModuleType, media: Media, along: Sequence[Along]) -> None:
         super().__init__(mi, media)
@@ -189,7 +190,7 @@ class _AttachedScattering(Scattering):
         self._values: dict[Slot, dict[str, Float]] = {}
 
     def fresh_values(self) -> dict[Slot, dict[str, Float]]:
-        """Copies of the values that are differentiated, which the materials have from now on."""
+        """New copies of the differentiated values, which the materials use from now on."""
         self._values = {one: {key: type(v)(v) for key, v in one.values.items()} for one in self.slots}
         return self._values
 
@@ -212,12 +213,12 @@ class _AttachedScattering(Scattering):
     def _attach(
         self, vertex: Vertex, toward: Vector, value: Radiance, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[Radiance, Radiance]:
-        """The same value toward a light and weight of a sample, with derivatives where a material moves."""
+        """The same value toward a light and weight of a sample, with the derivatives of the materials attached."""
         mi, si = self.mi, vertex.si
         outer = 1.0 + si.duv_dx.x if self.media.known else None
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         density = dr.select(delta | (bs.pdf <= 0), 0, dr.rcp(bs.pdf))
-        with self._moved():
+        with self._differentiated():
             for plugin in self.plugins:
                 here = active & (vertex.bsdf == mi.BSDFPtr(plugin))
                 model = plugin.placed.at(si, here, outer=outer)
@@ -227,8 +228,8 @@ class _AttachedScattering(Scattering):
         return value, weight
 
     @contextmanager
-    def _moved(self) -> Iterator[None]:
-        """Inside, the materials have values that are differentiated, and derive what follows from them anew."""
+    def _differentiated(self) -> Iterator[None]:
+        """Inside, the materials use the differentiated values and recompute the quantities derived from them."""
         before = [(slot, slot.values) for slot in self.slots]
         derived = [(placed, placed.derived) for plugin in self.plugins for placed in _with_inner(plugin.placed)]
         try:
@@ -245,7 +246,7 @@ class _AttachedScattering(Scattering):
 
 
 def _with_inner(placed: PlacedMaterial) -> Iterator[PlacedMaterial]:
-    """A placed material and those inside it."""
+    """A placed material and those nested in it."""
     yield placed
     for _, held in placed.inner.values():
         if isinstance(held, PlacedMaterial):

@@ -1,11 +1,11 @@
-"""What light passes through between surfaces: absorption, and which of several media that overlap is there.
+"""Media between surfaces: absorption, and which of several overlapping media counts.
 
-By Schmidt2002 every medium has a priority, and where several overlap the highest counts: water that reaches a little
-into the glass around it has no surface there. Only a surface between the highest on both sides is one; through any
-other light goes straight on. Of equal priorities the material that the scene names first counts as the higher.
+Following Schmidt2002, every medium has a priority, and where several overlap the highest one counts: water that extends
+slightly into the glass around it has no surface there. Only a surface that separates different highest media is a real
+one; at any other, light passes straight through. At equal priority, the material that the scene names first is higher.
 
-A path carries how often it is inside of each medium, four bits each in one number, in the order of priorities: so the
-highest medium is where the number's highest bit stands.
+A path stores how many times it is inside each medium: four bits each in one number, in the order of priorities, so that
+the highest medium is that of the number's highest bit.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, Surf
 from ..errors import InputError
 from ..material.bsdf import Interior
 
-MOST = 8  # media, four bits each in 32
-CROSSINGS = 256  # on the way out of the scene, from where a camera stands
+MAX_MEDIA = 8  # four bits each in 32
+CROSSINGS = 256  # largest number of surfaces between the camera and the outside of the scene
 
 
 class Crossing(NamedTuple):
-    """What a path meets at a surface.
+    """A surface that a path hits, in terms of media.
 
-    here     the path's media before it, and beyond the surface
+    here     the path's media before the surface, and beyond it
     beyond
-    surface  whether there is one: else light goes straight on
-    outer    index of what the surface's own medium borders on
+    surface  whether it is a real surface; otherwise light passes straight through
+    outer    index of the medium adjacent to the surface's own
     """
 
     here: UInt
@@ -41,7 +41,7 @@ class Crossing(NamedTuple):
 
 
 class Media:
-    """The media of a scene, where any of them absorbs or has a priority; else none are known, and nothing is asked."""
+    """The media of a scene; unless one absorbs or has a priority, `known` is False and they are not tracked."""
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
@@ -50,27 +50,27 @@ class Media:
         self.known = any(np.any(np.asarray(i.absorption) > 0) or np.any(np.asarray(i.priority) != 0) for _, i in plain)
         if not self.known:
             return
-        if len(result) > MOST:
-            what = f"{len(result)} transparent materials, {MOST} at most where one absorbs or has a priority"
+        if len(result) > MAX_MEDIA:
+            what = f"{len(result)} transparent materials, {MAX_MEDIA} at most if one absorbs or has a priority"
             raise InputError(what, "absorption, priority", "give shapes the same material")
         order = sorted(range(len(result)), key=lambda i: (float(np.max(np.asarray(plain[i][1].priority))), -i))
         self.bsdfs = [result[i] for i in order]
         numbers = [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0]) for bsdf in self.bsdfs]
-        place = np.full(max([*numbers, *_pointers(mi, scene)]) + 1, MOST, np.uint32)
+        place = np.full(max([*numbers, *_pointers(mi, scene)]) + 1, MAX_MEDIA, np.uint32)
         place[numbers] = np.arange(len(numbers))
         self.place = mi.UInt32(place)
         dr.make_opaque(self.place)
 
     def containing(self, point: Point) -> UInt:
-        """The media that a point lies in, found by what a ray from there leaves without having entered it."""
-        mi, depth, inside = self.mi, [0] * MOST, [0] * MOST
+        """The media that contain a point: a ray from there leaves them without having entered them."""
+        mi, depth, inside = self.mi, [0] * MAX_MEDIA, [0] * MAX_MEDIA
         ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
         for _ in range(CROSSINGS):
             si = self.scene.ray_intersect(ray)
             if not dr.any(si.is_valid()):
                 break
             number = int(self._number(si.bsdf(ray))[0])
-            if number < MOST:
+            if number < MAX_MEDIA:
                 depth[number] += 1 if si.wi.z[0] > 0.0 else -1
                 inside[number] = max(inside[number], -depth[number])
             ray = si.spawn_ray(ray.d)
@@ -78,53 +78,53 @@ class Media:
         return dr.opaque(mi.UInt32, packed)
 
     def crossing(self, si: SurfaceInteraction, bsdf: BSDFPlugin, inside: UInt, active: Mask) -> Crossing:
-        """What it means to meet a surface while inside of these media."""
+        """The media on both sides of a surface that is hit from inside of these media."""
         mi = self.mi
         number = self._number(bsdf, active)
-        medium = active & (number < MOST)
-        one = mi.UInt32(1) << (4 * dr.minimum(number, MOST - 1))
+        medium = active & (number < MAX_MEDIA)
+        one = mi.UInt32(1) << (4 * dr.minimum(number, MAX_MEDIA - 1))
         entering = si.wi.z > 0.0
-        counted = (inside & (15 * one)) != 0  # else the path began in there, or the surface is an open one
+        counted = (inside & (15 * one)) != 0  # else the path began inside, or the surface is not closed
         others = dr.select(entering | ~counted, inside, inside - one)
         beyond = dr.select(medium, dr.select(entering, inside + one, others), inside)
         surface = ~medium | (others < one)  # all others are lower
         return Crossing(inside, beyond, surface, self.eta(others, si))
 
     def eta(self, inside: UInt, si: SurfaceInteraction) -> Float:
-        """The index of the highest of these media; 1 outside of all."""
+        """The index of the highest of these media; 1 outside of all media."""
         value = self.mi.Float(1.0)
         for here, interior in self._each(inside, si):
             value = dr.select(here, interior.eta, value)
         return value
 
     def absorption(self, inside: UInt, si: SurfaceInteraction) -> Radiance:
-        """Light lost per unit length in the highest of these media."""
+        """Absorption coefficient of the highest of these media."""
         value = self.mi.UnpolarizedSpectrum(0.0)
         for here, interior in self._each(inside, si):
             value = dr.select(here, interior.absorption, value)
         return value
 
     def transmitted(self, inside: UInt, si: SurfaceInteraction, length: Float) -> Radiance:
-        """What arrives after a length in the highest of these media: exp(-absorption length) (Beer and Lambert)."""
+        """Transmittance over a length of the highest of these media: exp(-absorption length) (Beer and Lambert)."""
         loss = self.absorption(inside, si)
         return self.mi.Spectrum(dr.select(loss > 0.0, dr.exp(-loss * length), 1.0))
 
     def _each(self, inside: UInt, si: SurfaceInteraction) -> Iterator[tuple[Mask, Interior]]:
-        """Each medium, and where it is the highest."""
+        """Each medium, and the lanes where it is the highest."""
         for number, bsdf in enumerate(self.bsdfs):
             lowest = 1 << (4 * number)
             here = (inside >= lowest) & ((inside >> (4 * number)) <= 15)
             interior = bsdf.placed.at(si, True, separates=True).interior
-            assert interior is not None, "only materials that have one are kept"
+            assert interior is not None, "only materials with an interior are listed"
             yield here, interior
 
     def _number(self, bsdf: BSDFPlugin, active: Mask = True) -> UInt:
-        """The place of a surface's material in the order of priorities, MOST for one without an inside."""
+        """Index of a surface's material in the order of priorities, MAX_MEDIA for one without an interior."""
         return dr.gather(self.mi.UInt32, self.place, dr.reinterpret_array(self.mi.UInt32, bsdf), active)
 
 
 def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
-    """The plugins of Gonio's that light enters, each once, in the order of the scene."""
+    """Gonio's plugins with an interior, each once, in the order of the scene."""
     visited: set[int] = set()
     for shape in scene.shapes():
         bsdf = shape.bsdf()
@@ -137,5 +137,5 @@ def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
 
 
 def _pointers(mi: ModuleType, scene: Scene) -> list[int]:
-    """What kernels hold in place of each material."""
+    """The numbers that kernels hold for the materials."""
     return [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(shape.bsdf()))[0]) for shape in scene.shapes()]

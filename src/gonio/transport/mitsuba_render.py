@@ -10,19 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge.types import Plugin, Scene
+from ..errors import InputError
 from ..work import garbage
 from .passes import power_of_two
 
-# Samples in flight of Mitsuba's own integrators, which hold one in each lane: half a second or so on a CPU.
+# Samples in flight of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.
 WAVEFRONT = 1 << 21
 
 
 class MitsubaRender:
-    """A Mitsuba scene by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
+    """A Mitsuba scene rendered by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
 
-    The picture depends on the seed and the film, not on the clock, up to the last bit: Mitsuba's film adds up with
-    atomics, in an order of their own. A sampler that needs a square number of
-    samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
+    The picture depends on the seed and the film, not on timing, except for the last bits: Mitsuba's film adds up with
+    atomics, in arbitrary order. A sampler that needs a square number of samples (stratified, multijitter) rounds each
+    pass up; `done` counts the samples actually taken.
     """
 
     def __init__(
@@ -38,32 +39,41 @@ class MitsubaRender:
         self._integrator = scene.integrator() if integrator is None else integrator
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
-        self.pass_size = min(spp, power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height)))))
+        self._largest_pass = power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height))))
+        self.pass_size = min(spp, self._largest_pass)
         self._sum: NDArray[np.float64] | None = None
         self._passes = 0
         self.done = 0
 
     def advance(self, count: int) -> None:
-        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
+        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # distinct from the passes of neighboring seeds
         picture = self._render(self._integrator, count, seed)
         samples = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * samples
+        if self._sum is not None and self._sum.shape != weighted.shape:
+            what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
+            raise InputError(what, "checkpoint", "render anew without it")
         self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += samples
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """The sum so far, and which passes it is of."""
+        """The sum so far, with the number and size of its passes."""
         assert self._sum is not None, "advance() comes first"
         return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError for another film."""
+        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError or KeyError for another
+        film."""
         width, height = self._sensor.film().crop_size()
-        if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
+        total, passes = state["sum"], state["passes"]
+        fits = total.ndim == 3 and total.shape[:2] == (int(height), int(width)) and total.shape[2] > 0
+        if not (fits and total.dtype == np.float64 and passes.dtype == np.int64 and passes.shape == (2,)):
             raise ValueError("no sum of this film")
-        self._sum, (self._passes, self.pass_size) = state["sum"], map(int, state["passes"])
+        if not (done > 0 and passes[0] >= 0 and 0 < passes[1] <= self._largest_pass):
+            raise ValueError("no count of passes")
+        self._sum, (self._passes, self.pass_size) = total, map(int, passes)
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
@@ -77,7 +87,7 @@ class MitsubaRender:
         return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
-        """Guides for the denoiser: 16 samples see every surface of a pixel that matters to an edge."""
+        """Guides for the denoiser: 16 samples per pixel cover every surface that matters for edges."""
         aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
         channels = self._render(aovs, 16, self._seed)[..., -6:]
         return {"albedo": channels[..., :3], "normal": channels[..., 3:]}

@@ -1,9 +1,9 @@
-"""Particles on their way from the lamps: the steps that `light` and `caustics` share.
+"""The flight of particles from the lamps: the steps that `light` and `caustics` share.
 
     leave -> [ intersect -> sample_bsdf, eval_bsdf -> follow ]
 
-A particle arrives at a surface with a flux; what leaves again is the adjoint of what a path does: radiance's (eta_o /
-eta_i)^2 is left out, and where shading and geometric normals differ the flux is corrected (Veach1997, sec. 5.3).
+A particle arrives at a surface with a flux and is scattered by the adjoint BSDF: radiance's factor (eta_o / eta_i)^2 is
+omitted, and where shading and geometric normals differ the flux is corrected (Veach1997, sec. 5.3).
 """
 
 from __future__ import annotations
@@ -31,38 +31,38 @@ from .lights.sources import Particle, Sources, Targets
 from .scattering import Vertex, keep_hero
 from .scene_data import SceneData
 
-# Dimensions of a particle: at the lamp, and at each vertex.
+# Dimensions of a particle at the lamp and at each vertex.
 PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
 LOBE, CHOICE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
 
-ROULETTE_DEPTH = 5  # segments, as along paths
+ROULETTE_DEPTH = 5  # segments, as for paths
 
 
 @dataclass
 class Flight:
-    """Particles on their way, one per lane."""
+    """The state of particles, one per lane."""
 
-    depth: UInt  # segments traced, the one to `hit` with them
+    depth: UInt  # segments traced, including the one to `hit`
     ray: Ray
     hit: Hit
-    flux: Radiance  # with which it left the lamp
-    throughput: Radiance  # the part of it that is left
-    eta: Float  # product of the relative indices on the way: of where it is over where it began
+    flux: Radiance  # at the lamp
+    throughput: Radiance  # fraction of it that remains
+    eta: Float  # product of the relative indices: the current index over that at the start
     hero_only: UInt
     inside: UInt
     active: Mask
 
     @property
     def dimension(self) -> UInt:
-        """Of the first random number of its next vertex."""
+        """Dimension of the first random number of its next vertex."""
         return self.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
 
 
 class Particles:
-    """The particles of a picture. Number n = (low, high) is the same whoever traces it: all are one sequence.
+    """The particles of a picture. Number n = (low, high) is the same wherever it is traced: all form one sequence.
 
-    max_depth  the longest path in segments, as data of the kernel
-    targets    where they go; None: everywhere
+    max_depth  the longest path in segments, as kernel data
+    targets    where they are aimed; None: everywhere
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, targets: Targets | None = None) -> None:
@@ -75,21 +75,21 @@ class Particles:
         self.bent = bends_normals(data.scene)
 
     def key(self, high: UInt) -> UInt:
-        """The sampler's key of particles whose number has these upper 32 bits."""
+        """The sampler's key for particles whose number has these upper 32 bits."""
         return sampler.pixel_key(high, self.seed)
 
     def number(self, index: UInt, pixel: UInt, pixels: UInt) -> tuple[UInt, UInt]:
-        """(key, lower 32 bits of the number) of the particle of a pixel's sample."""
+        """(key, lower 32 bits of the number) of the particle for a sample of a pixel."""
         mi = self.mi
         number = mi.UInt64(index) * mi.UInt64(pixels) + mi.UInt64(pixel)
         low = mi.UInt32(number)
         return self.key(mi.UInt32(number >> 32)), low
 
     def leave(self, key: UInt, low: UInt, wavelength: Float | None = None) -> tuple[Particle, Flight]:
-        """Particle `low` as it leaves its lamp, and on the way to the first surface that it meets.
+        """Particle `low` as it leaves its lamp, and its flight to the first surface that it hits.
 
-        wavelength  a number in [0, 1) that chooses its wavelengths, for which it stands; None: it has some of its own,
-                    and stands for all
+        wavelength  a number in [0, 1) that chooses its wavelengths, which its flux refers to; None: it samples its own,
+                    and its flux is weighted by their density
         """
         mi, data = self.mi, self.data
         pick, color = data.pair(key, low, PICK)
@@ -119,7 +119,7 @@ class Particles:
         return particle, flight
 
     def intersect(self, flight: Flight) -> Vertex:
-        """The surface that a particle meets; its throughput loses what media absorb on the way."""
+        """The surface that a particle hits; media on the way attenuate its throughput."""
         mi, data, active = self.mi, self.data, flight.active
         si = data.surfaces.interaction(flight.hit, flight.ray, active)
         vertex = Vertex(si, si.bsdf(flight.ray))
@@ -133,7 +133,7 @@ class Particles:
         return vertex
 
     def sample_bsdf(self, key: UInt, low: UInt, flight: Flight, vertex: Vertex) -> tuple[BSDFSample, Radiance]:
-        """A direction to go on in, and the weight of the flux that goes there."""
+        """A scattered direction, and the weight of the flux in that direction."""
         mi, data, si, active = self.mi, self.data, vertex.si, flight.active
         lobe, _ = data.pair(key, low, flight.dimension + CHOICE)
         u = mi.Point2f(*data.direction_pair(key, low, flight.dimension + LOBE))
@@ -143,16 +143,16 @@ class Particles:
             return bs, weight * adjoint(si, bs.wo)
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         value = self.eval_bsdf(vertex, bs.wo, active & ~delta) / dr.select(bs.pdf > 0, bs.pdf, 1)
-        between = si.wi + bs.wo * bs.eta  # along the normal that mirrors or refracts
+        between = si.wi + bs.wo * bs.eta  # along the normal that reflects or refracts
         bend = adjoint(si, bs.wo, si.to_world(between * dr.rsqrt(dr.maximum(dr.squared_norm(between), 1e-12))))
         return bs, dr.select(delta, weight * dr.select(dr.squared_norm(between) > 1e-6, bend, 1), value)
 
     def eval_bsdf(self, vertex: Vertex, toward: Vector, active: Mask) -> Radiance:
-        """The flux that a rough surface sends in a direction, with its cosine: what a path from there would find."""
+        """The flux that a rough surface scatters in a direction, including the cosine, by the adjoint BSDF."""
         si, bsdf = vertex.si, vertex.bsdf
         if not self.bent:
             return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
-        # As radiance from there: glass scales that by its index, and importance not.
+        # Evaluated in reverse as radiance: radiance is scaled by glass, importance is not.
         reverse = self.mi.SurfaceInteraction3f(si)
         reverse.wi = toward
         into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
@@ -160,7 +160,7 @@ class Particles:
         return value * (out / dr.maximum(into, 1e-12))
 
     def through_media(self, vertex: Vertex, value: Radiance, ds: DirectionSample) -> Radiance:
-        """What is left of the light that a vertex sends toward the camera, after media on the way."""
+        """The light that a vertex sends toward the camera, after absorption by media."""
         if vertex.crossing is None:
             return value
         side = vertex.side(vertex.si.to_local(ds.d))
@@ -169,7 +169,7 @@ class Particles:
     def follow(
         self, key: UInt, low: UInt, flight: Flight, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> Flight:
-        """To the next surface, in the direction of a sample."""
+        """The flight to the next surface, in the direction of a sample."""
         data, si = self.data, vertex.si
         throughput = flight.throughput * weight
         active = active & dr.any(throughput != 0) & (flight.depth + 1 < self.max_depth)
@@ -186,9 +186,9 @@ class Particles:
 
 
 def adjoint(si: SurfaceInteraction, wo: Vector, normal: Vector | None = None) -> Float:
-    """Factor of a particle's flux where the shading normal s is not the geometric one g: |wi.s wo.g / (wi.g wo.s)|.
+    """Factor of a particle's flux where the shading normal s differs from the geometric g: |wi.s wo.g / (wi.g wo.s)|.
 
-    normal  s where it is not that of the surface
+    normal  s, if it is not that of the surface
     """
     into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))
     shading = si.sh_frame.n if normal is None else normal

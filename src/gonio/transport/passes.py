@@ -1,8 +1,8 @@
 """The loop of a render: passes of about half a second, progress, Ctrl-C, time limit.
 
-The size of the passes follows the clock; the picture does not, to the bit: `integrators.Render` numbers its samples and
-sums them in order. A Mitsuba scene under its own integrator has no such numbering, so its passes are of one size,
-which follows from the film alone; there the passes also keep memory flat as samples grow.
+The size of the passes depends on timing, but the picture does not: `integrators.Render` numbers its samples and sums
+them in order. A Mitsuba scene with its own integrator has no such numbering, so its passes have a fixed size that
+depends on the film only; there the passes also bound memory as samples grow.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-PASS_SECONDS = 0.5  # long enough that a pass's start-up (some 10 ms) is small, short enough for Ctrl-C
+PASS_SECONDS = 0.5  # long compared with a pass's start-up (some 10 ms), short enough for Ctrl-C
 
-FIRST_PASS = 1 << 18  # samples: some 50 ms of work, and a first picture soon after the kernel is compiled
+FIRST_PASS = 1 << 18  # samples: about 50 ms, for a first picture soon after compilation
 
-# What ends a render: Ctrl-C, what batch systems send, and what a closing terminal sends; Windows lacks some.
+# Signals that end a render: Ctrl-C, those of batch systems, and that of a closing terminal; Windows lacks some.
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Renders(Protocol):
-    """What `run` can drive: `gonio.transport.integrators.Render`, `mitsuba_render.MitsubaRender`."""
+    """A render that `run` can drive: `gonio.transport.integrators.Render`, `mitsuba_render.MitsubaRender`."""
 
     @property
     def done(self) -> int: ...
@@ -48,7 +48,7 @@ class Renders(Protocol):
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a render stands: samples per pixel done and wanted, samples per second, seconds left (by the rate)."""
+    """The progress of a render: samples per pixel done and wanted, samples per second, estimated seconds left."""
 
     done: int
     wanted: int
@@ -67,16 +67,16 @@ def run(
     interrupted: Callable[[], object] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Advance `render` to `spp` samples per pixel; why it ended: "" (done), "interrupt" or "timeout".
+    """Advance `render` to `spp` samples per pixel; returns why it ended: "" (done), "interrupt" or "timeout".
 
-    At least one pass is made where samples are missing, so that there is always a picture. Both wishes to stop are
-    looked at between passes; near the time limit the passes shrink to what still fits.
+    At least one pass is made if samples are missing, so that there is always a picture. Interrupts and the time limit
+    are checked between passes; near the time limit the passes shrink to fit.
 
-    spp    asked after each pass where it is a function: no pass goes beyond what it has said
-    first  samples per pixel of the first pass, where the rate is known; 0 begins with a short one
+    spp    if a function, called after each pass: no pass goes beyond its latest value
+    first  samples per pixel of the first pass, if the rate is known; 0 begins with a short one
     """
     begin = clock()
-    fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
+    fixed = getattr(render, "pass_size", None)  # passes of a Mitsuba scene have a fixed size
     count = first or power_of_two(FIRST_PASS / pixels)
     compiled, counted_samples, counted_seconds = False, 0, 0.0
     goal = spp if callable(spp) else lambda: spp
@@ -88,7 +88,7 @@ def run(
         render.advance(min(count, wanted - render.done))
         wanted = goal()
         elapsed, samples = max(clock() - started, 1e-9), (render.done - before) * pixels
-        # The first pass also compiles; it says nothing about the rate unless it stays the only one.
+        # The first pass also compiles; it does not measure the rate unless it is the only one.
         if compiled or render.done >= wanted:
             counted_samples, counted_seconds = counted_samples + samples, counted_seconds + elapsed
         rate = counted_samples / counted_seconds if counted_seconds else samples / elapsed
@@ -110,8 +110,8 @@ def run(
 
 
 def _next_count(count: int, elapsed: float, compiled: bool) -> int:
-    """Samples per pixel of the next pass: what should take PASS_SECONDS, at most 8 times more than last time."""
-    if not compiled and elapsed > PASS_SECONDS:  # compiling, most likely
+    """Samples per pixel of a pass of about PASS_SECONDS, at most 8 times as many as in the last one."""
+    if not compiled and elapsed > PASS_SECONDS:  # probably the compilation
         return count
     return max(1, round(count * min(PASS_SECONDS / elapsed, 8)))
 
@@ -122,11 +122,11 @@ def power_of_two(x: float) -> int:
 
 
 class Interrupts:
-    """While it is open, the first signal that would end the process sets `asked`, its number, and Ctrl-C after that
-    ends the process at once. SIGTERM and SIGHUP may come together, as systemd sends them: no second one of them does.
+    """While entered, the first signal that would end the process sets `asked` to its number, and a later Ctrl-C ends
+    the process at once. SIGTERM and SIGHUP may arrive together, as systemd sends them: neither ends it as a second one.
 
-    A signal handler of Python runs only between two of its instructions, and a pass is one long call. So the
-    signal's byte is taken from the wake-up socket by a thread of its own, which runs while the pass does.
+    A Python signal handler runs only between two instructions of Python, and a pass is one long call. Therefore a
+    separate thread reads the signal from the wake-up socket while the pass runs.
     """
 
     def __init__(self, notice: Callable[[], None] = lambda: None) -> None:
@@ -134,8 +134,8 @@ class Interrupts:
         self._notice = notice
 
     def __enter__(self) -> Interrupts:
-        # Signals belong to the main thread; a shell that ignores Ctrl-C for a background job has its reasons, and so
-        # has nohup for SIGHUP.
+        # Only the main thread may set signal handlers. A shell ignores Ctrl-C for background jobs, and nohup ignores
+        # SIGHUP: such signals stay ignored.
         in_main = threading.current_thread() is threading.main_thread()
         numbers = [number for number in ENDING if in_main and signal.getsignal(number) is not signal.SIG_IGN]
         self._old = {number: signal.signal(number, lambda number, frame: None) for number in numbers}
@@ -147,11 +147,11 @@ class Interrupts:
         return self
 
     def check(self) -> None:
-        """End by the signal that came, if one did: for work that has nothing to keep yet."""
+        """End by the signal that arrived, if any: for work that has nothing to save yet."""
         if self.asked:
             self.__exit__()
             signal.raise_signal(self.asked)
-            raise KeyboardInterrupt  # where the signal's own handler does nothing
+            raise KeyboardInterrupt  # if the signal's handler returned
 
     def __exit__(self, *exc: object) -> None:
         if self._old:
@@ -169,7 +169,7 @@ class Interrupts:
                         continue
                     if self.asked and number == signal.SIGINT:
                         if sys.stderr.isatty():
-                            os.write(2, b"\x1b[?25h\n")  # the progress bar had hidden the cursor
+                            os.write(2, b"\x1b[?25h\n")  # show the cursor, which the progress bar has hidden
                         os._exit(128 + number)
                     if not self.asked:
                         self.asked = number

@@ -1,8 +1,8 @@
-"""The maps of a picture with caustics: particles that mirrors and smooth glass have thrown on other surfaces.
+"""The photon maps of a picture with caustics: particles that mirrors and smooth glass cast on other surfaces.
 
-A particle leaves a lamp toward smooth surfaces, goes through mirrors and glass, and stays on the first surface that is
-neither; from there it goes on once more, through mirrors and glass to a second one. SAMPLES_PER_MAP samples of every
-pixel share a map; from map to map the radius within which a particle counts shrinks.
+A particle leaves a lamp toward smooth surfaces, passes mirrors and glass, and is stored at the first surface that is
+neither; from there it continues once, through mirrors and glass to a second such surface. SAMPLES_PER_MAP samples of
+every pixel share a map; the radius within which a particle counts shrinks from map to map.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from .photons import Photon, PhotonDensity, PhotonMap
 from .scene_data import SceneData
 
 SAMPLES_PER_MAP = 4
-PER_PIXEL = 2.0  # particles of a map for each pixel,
+PER_PIXEL = 2.0  # particles of a map per pixel,
 MIN_PARTICLES, MAX_PARTICLES = 1 << 14, 1 << 19
-FOOTPRINT = 1.0  # first radius of a search, in pixels as they are seen on the scene on the median
+FOOTPRINT = 1.0  # first radius of a search, over the median width of a pixel on the visible surfaces
 SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
-DENSITY_CELL = 4.0  # radii wide: the cubes in which particles are counted
-WAVELENGTHS = 4  # of a sample in spectral variants
-WAVELENGTH_KEY = 0x48554553  # of the sequence that maps take them from
-PROBED = 48  # rays each way, to measure a pixel
+DENSITY_CELL = 4.0  # width, in radii, of the cubes in which particles are counted
+WAVELENGTHS = 4  # per sample in spectral variants
+WAVELENGTH_KEY = 0x48554553  # key of the sequence of the maps' wavelengths
+PROBED = 48  # rays per axis, to measure the width of a pixel
 
 
 @dataclass
 class _Trail:
-    """Particles on their way from a lamp by mirrors to a surface, and from there by mirrors to a second one."""
+    """Particles from a lamp by mirrors to a surface, and from there by mirrors to a second one."""
 
     flight: Flight
-    density: Float  # of étendue, where the present chain of mirrors began
+    density: Float  # over étendue, at the start of the current chain of mirrors
     mirrored: Mask  # whether such a chain has begun
     landed: Mask
     first: Photon
@@ -44,12 +44,12 @@ class _Trail:
 
 
 class PhotonMaps:
-    """The maps of a render, one at a time.
+    """The maps of a render, of which one exists at a time.
 
-    current  the map of the samples at work
-    density  how many particles arrive per area, roughly; of the first map, and the same for all
+    current  the map of the current samples
+    density  approximate number of arriving particles per area; computed from the first map and used for all
 
-    radius_factor  of the first radius, over what is chosen
+    radius_factor  factor of the first radius, relative to the default
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, radius_factor: float) -> None:
@@ -69,7 +69,7 @@ class PhotonMaps:
             trail, width = self._trace(0), DENSITY_CELL * self.radius
             self.density, self._is_dense = PhotonDensity(self.mi, trail.first, trail.landed, width, self.count), True
         if self._current is None or self._current[0] != number:
-            self._current = None  # before the next one: there is one at a time
+            self._current = None  # free it before the next one is made
             trail, radius = self._trace(number), self.radius * (number + 1) ** SHRINKING
             photons, landed = [trail.first, trail.second], [trail.landed, trail.landed_again]
             self._current = number, PhotonMap(self.mi, photons, landed, radius)
@@ -80,27 +80,27 @@ class PhotonMaps:
         return self._current[1]
 
     def path_weight(self, lobe: Float, density: Float) -> Float:
-        """Weight of a path that finds the lamp behind mirrors by itself, beside the particles (power heuristic).
+        """Weight of a path that finds the lamp behind mirrors, against the particles (power heuristic).
 
         lobe     density of its last direction before the mirrors, over the cosine
-        density  of the particles' étendue at the lamp, in the medium where the path set out
+        density  of the particles over étendue at the lamp, in the medium where the path began
         """
         particles = density * (self.total * dr.pi * dr.square(self.current.radius))
         ratio = particles / lobe
         return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
 
     def etendue_density(self, place: Point) -> Float:
-        """Roughly, of particles that arrive at a rough surface."""
+        """Approximate density over étendue of particles that arrive at a rough surface."""
         return self.density.at(place) * dr.inv_pi
 
     # ------------------------------------------------------------------ wavelengths
 
     def wavelength(self, number: UInt, turn: UInt) -> Float:
-        """The number in [0, 1) that chooses the wavelengths of a map's particles, and of the paths that look at it;
-        `turn` says which of them comes first.
+        """The number in [0, 1) that chooses the wavelengths of a map's particles, and of the paths that read the map;
+        `turn` selects the first of them.
 
-        Wavelengths are one number and it shifted by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio spread
-        all of them evenly over a quarter, and those of the root of 2 say which of them comes first.
+        The wavelengths are one number and its shifts by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio
+        distribute the number evenly over a quarter, and multiples of the square root of 2 select the first one.
         """
         key = sampler.pixel_key(self.mi.UInt32(WAVELENGTH_KEY), self.particles.seed)
         place, first = (
@@ -110,7 +110,7 @@ class PhotonMaps:
         return (place + self.mi.Float((self.mi.UInt32(WAVELENGTHS * first) + turn) % WAVELENGTHS)) / WAVELENGTHS
 
     def rotated(self, flux: Radiance, by: UInt) -> Radiance:
-        """The flux by wavelength, in the order that begins with number `by`."""
+        """The flux per wavelength, reordered to begin with number `by`."""
         values = list(flux)
         for step in range(1, WAVELENGTHS if self.mi.is_spectral else 1):
             values = [
@@ -121,7 +121,7 @@ class PhotonMaps:
     # ------------------------------------------------------------------ particles
 
     def _pixel_width(self) -> float:
-        """The width of a pixel on what is seen, on the median."""
+        """The median width of a pixel on the visible surfaces."""
         mi, sensor = self.mi, self.data.sensor
         across = int(sensor.film().crop_size()[0])
         x, y = dr.meshgrid(*[dr.linspace(mi.Float, 0.01, 0.99, PROBED)] * 2)
@@ -136,13 +136,13 @@ class PhotonMaps:
         return float(np.median(widths)) if len(widths) else 1e-3
 
     def _trace(self, number: int) -> _Trail:
-        """The particles of map `number`, at the end of their ways."""
+        """The particles of map `number`, traced to their ends."""
         mi, particles = self.mi, self.particles
         lane = dr.arange(mi.UInt32, self.count)
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
-        # Where wavelengths part, each of a map's goes on without the others with a part of the particles: of
-        # neighbors in the sequence, which are even by themselves.
+        # Where wavelengths separate, each of a map's continues alone for a part of the particles: contiguous in the
+        # sequence, so that each part is evenly distributed.
         turn = lane * WAVELENGTHS // dr.opaque(mi.UInt32, self.count)
         wavelength = self.wavelength(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
         particle, flight = particles.leave(key, low, wavelength)
@@ -155,18 +155,16 @@ class PhotonMaps:
             mode="symbolic",
             label="particles",
         )[0]
-        dr.eval(
-            trail.landed, trail.landed_again, trail.first, trail.second
-        )  # all, that it be one kernel for all who ask
+        dr.eval(trail.landed, trail.landed_again, trail.first, trail.second)  # one kernel for all uses
         return trail
 
     def _vertex(self, trail: _Trail, key: UInt, low: UInt, turn: UInt) -> _Trail:
-        """One vertex of a particle: it stays there, or goes on."""
+        """One vertex of a particle: it is stored there, or continues."""
         mi, particles, flight = self.mi, self.particles, trail.flight
         vertex = particles.intersect(flight)
         flags = vertex.bsdf.flags()
         smooth, rough = mi.has_flag(flags, mi.BSDFFlags.Delta), mi.has_flag(flags, mi.BSDFFlags.Smooth)
-        # A surface that is both a mirror and rough keeps every second particle, at twice its flux.
+        # A surface with both a delta and a rough lobe stores every second particle, at twice its flux.
         both = smooth & rough & trail.mirrored
         flight.throughput *= dr.select(both, 2, 1)
         coin = self.data.pair(key, low, flight.dimension + 2)[0]
@@ -185,7 +183,7 @@ class PhotonMaps:
         first, second = stays & ~trail.landed, stays & trail.landed
         bs, weight = particles.sample_bsdf(key, low, flight, vertex)
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        # From where it has arrived it goes on once more, to a second surface behind mirrors.
+        # From its first surface a particle continues once, to a second one behind mirrors.
         active = flight.active & ~second & (first ^ delta)
         flight.eta = dr.select(first, 1, flight.eta)
         following = particles.follow(key, low, flight, vertex, bs, weight, active)

@@ -1,8 +1,8 @@
-"""A map of particles that lie where they have arrived: how much light comes to a place, and from where.
+"""A photon map: particles stored where they have arrived, for the incident light at a point.
 
-The map is a grid of cells as wide as a search (two radii), hashed so that a row of cells along x is one row of memory:
-what may lie within the radius of a place stands in four such rows. Particles are sorted by cell and by number, so that
-sums over them do not depend on who computed them, or in what order.
+The map is a grid of cells as wide as a search (two radii), hashed so that a row of cells along x is contiguous in
+memory: all particles within the radius of a point are in four such rows. Particles are sorted by cell and by number, so
+that sums over them do not depend on the machine or on the order of computation.
 """
 
 from __future__ import annotations
@@ -16,26 +16,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge.faults.borrowed_memory import own
-from ..bridge.types import Float, Mask, Point, Radiance, UInt, Vector
+from ..bridge.types import Float, Mask, OfVariant, Point, Radiance, UInt, Vector
 from . import sampler
 
-ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
-LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
-FACING = 0.9  # and cosine of the angle between normals: what lies around an edge is elsewhere
-VISITED = 16  # particles of a row, about
+ROW = 4096  # distinct cells along x; particles further out are assigned to the outermost
+LEVEL = 0.25  # largest distance of a particle from the plane of the place, over the radius
+FACING = 0.9  # smallest cosine between the normals: particles around an edge do not count
+VISITED = 16  # approximate number of particles visited per row
 CUBES = 1 << 16  # entries of a PhotonDensity
-FIELDS = 16  # numbers of a particle, see Photon
+FIELDS = 16  # numbers per particle, see `Photon.packed`
 
 
 @dataclass
 class Photon:
-    """A particle at rest.
+    """A stored particle.
 
-    position, normal  where it lies, and the geometric normal of the surface there, whatever side it has come to
-    direction         where it came from, a unit vector away from the surface
-    flux              its share of the light
-    density           of étendue at its lamp, `sources.Particle.density`, over the square of the index there
-    depth             segments that it has behind it
+    position, normal  its position, and the geometric normal of the surface there, on whichever side it has arrived
+    direction         direction of origin, a unit vector away from the surface
+    flux              its flux
+    density           density over étendue at its lamp, `sources.Particle.density`, over the square of the index there
+    depth             segments of its path
+    second            whether it has arrived from another surface, not directly from a lamp's chain of mirrors
     """
 
     position: Point
@@ -48,26 +49,67 @@ class Photon:
 
     @staticmethod
     def none(mi: ModuleType) -> Photon:
-        """One that carries nothing."""
+        """A particle without flux."""
         zero = mi.Vector3f(0)
         return Photon(mi.Point3f(0), zero, zero, mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False))
 
     def packed(self) -> list[Float]:
-        """Sixteen numbers: what a search compares, then what it needs of those that it finds."""
+        """The particle as FIELDS numbers."""
         mi_float = type(self.density)
         flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
         first = [*self.position, *self.normal, mi_float(self.depth), self.density]
         return [*first, *self.direction, dr.select(self.second, mi_float(1), 0), *flux]
 
+    @staticmethod
+    def unpacked(mi: ModuleType, record: OfVariant, like: Radiance) -> Photon:
+        """The particle of a record of `packed`, with a flux of the type of `like`."""
+        values = [record[i // 4, i % 4] for i in range(FIELDS)]
+        return Photon(
+            mi.Point3f(*values[:3]),
+            mi.Normal3f(*values[3:6]),
+            mi.Vector3f(*values[8:11]),
+            type(like)(*values[12 : 12 + len(like)]),
+            values[7],
+            mi.UInt32(values[6]),
+            values[11] > 0,
+        )
+
+
+@dataclass
+class Search:
+    """A point whose surroundings on its surface are searched for particles.
+
+    Particles on surfaces that face the same way count on whichever side they have arrived, since a rough surface may
+    transmit light; on surfaces that face the other way, as parts of one mesh may, if they have arrived on the side of
+    `back`.
+
+    back  direction toward the viewer
+    u     a random number in [0, 1), see `PhotonMap.gather`
+    """
+
+    place: Point
+    normal: Vector
+    back: Vector
+    u: Float
+
+    def accepts(self, photon: Photon, radius: Float) -> Mask:
+        """Whether a particle is within the radius, close to the plane of the place, and on a matching side."""
+        offset = photon.position - self.place
+        distance2, height = dr.squared_norm(offset), dr.dot(offset, self.normal)
+        near = (distance2 < dr.square(radius)) & (abs(height) < LEVEL * radius)
+        alike = dr.dot(self.normal, photon.normal)
+        other_side = dr.dot(self.normal, self.back) * dr.dot(photon.normal, photon.direction) < 0
+        return near & ((alike > FACING) | ((alike < -FACING) & other_side))
+
 
 class PhotonMap:
-    """Particles, found by place. `radius` is data of the kernel like the particles: changed, it compiles nothing."""
+    """Particles, indexed by place. `radius` is kernel data like the particles: a new value compiles nothing."""
 
     def __init__(self, mi: ModuleType, photons: Sequence[Photon], landed: Sequence[Mask], radius: float):
         self.mi = mi
         self.radius = dr.opaque(mi.Float, radius)
         self.per_cell = dr.opaque(mi.Float, 0.5 / radius)
-        self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
+        self.low = dr.opaque(mi.Int32, -(ROW // 2))  # lowest cell along x, with the scene's origin in the middle
         rows, columns = [], []
         for photon, there in zip(photons, landed, strict=True):
             cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
@@ -77,19 +119,19 @@ class PhotonMap:
             columns.append(dr.select(there, self._along(cell[0]), ROW))
         dr.eval(rows, columns)
         column = np.concatenate([np.array(one) for one in columns])
-        lie = np.flatnonzero(column < ROW)
-        self.count = len(lie)
-        # Twice as many rows as particles, at least: more take longer to make and to read, fewer have them meet.
+        stored = np.flatnonzero(column < ROW)
+        self.count = len(stored)
+        # At least twice as many rows as particles: more take longer to make and to read, fewer collide more often.
         bits = max(self.count.bit_length() + 1, 10)
-        row = np.concatenate([np.array(one) for one in rows])[lie] & np.uint32((1 << bits) - 1)
-        key = row + column[lie]
+        row = np.concatenate([np.array(one) for one in rows])[stored] & np.uint32((1 << bits) - 1)
+        key = row + column[stored]
         self.mask = dr.opaque(mi.UInt32, (1 << bits) - 1)
         keys = (1 << bits) + ROW
         starts = np.zeros(keys + 1, np.uint32)
         np.cumsum(np.bincount(key, minlength=keys), out=starts[1:])
         self.starts = own(mi.UInt32, starts)
         rank = np.zeros(len(column), np.uint32)
-        rank[lie[_sorted(key)]] = np.arange(self.count, dtype=np.uint32)
+        rank[stored[_sorted(key)]] = np.arange(self.count, dtype=np.uint32)
         self.values = dr.empty(mi.Float, max(self.count, 1) * FIELDS)
         first = 0
         for photon, along in zip(photons, columns, strict=True):
@@ -111,32 +153,61 @@ class PhotonMap:
 
     def gather(
         self,
-        place: Point,
-        normal: Vector,
-        back: Vector,
-        u: Float,
+        search: Search,
         zero: Radiance,
         visit: Callable[[Photon, Float, Mask], Radiance],
         active: Mask,
         within: float = 0.0,
     ) -> tuple[Radiance, Radiance]:
-        """Sum over the particles around a place: `visit(particle, weight by distance in 1/m^2, mask)`; and by how much
-        it is above the sum over those `within` that part of the radius, where this is not 0.
+        """Sum over the particles of a search: `visit(particle, weight by distance in 1/m^2, mask)`; and its excess over
+        the sum over those `within` that fraction of the radius, if this is not 0.
 
-        On surfaces that face the same way they count whichever side they have come to, since a rough one may let light
-        through; on those that face the other way, as parts of one mesh may, if they have come to the side of `back`, a
-        direction toward who looks.
-
-        The weight is a paraboloid over the disc of the radius, with the integral 1. Where they lie close, every second,
-        third, ... one of a row is visited, from one on that the random number `u` chooses, and stands for the others.
+        The weight is a paraboloid over the disk of the radius, with integral 1. Where particles are dense, only every
+        second, third, ... one of a row is visited, from one on that the search's random number chooses, and weighted
+        for the others.
         """
         mi, radius2 = self.mi, dr.square(self.radius)
-        low = [mi.Int32(dr.floor((x - self.radius) * self.per_cell)) for x in place]
-        high = [mi.Int32(dr.floor((x + self.radius) * self.per_cell)) for x in place]
+        rows = self._rows(search)
+
+        def step(number: UInt, y: UInt, z: UInt, at: UInt, end: UInt, stride: UInt, total: Radiance, excess: Radiance):
+            # type: ignore[no-untyped-def]
+            here = at < end
+            photon = Photon.unpacked(mi, dr.gather(mi.Matrix4f, self.values, at, here), zero)
+            position = photon.position
+            here &= search.accepts(photon, self.radius)
+            # rows of other cells may share their memory
+            here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
+            here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
+            distance2 = dr.squared_norm(position - search.place)
+            weight = (1 - distance2 / radius2) * (2 / (dr.pi * radius2)) * mi.Float(stride)
+            light = dr.select(here, visit(photon, weight, here), 0)
+            total = total + light
+            if within:
+                inner2 = radius2 * (within * within)
+                inner = (1 - distance2 / inner2) * (2 / (dr.pi * inner2)) * mi.Float(stride)
+                excess = excess + light * (1 - dr.select(distance2 < inner2, inner / weight, 0))
+            at = at + stride
+            over = at >= end
+            following = rows(number + 1, over)
+            y, z, at, end, stride = (
+                dr.select(over, new, old) for new, old in zip(following, (y, z, at, end, stride), strict=True)
+            )
+            return number + dr.select(over, mi.UInt32(1), 0), y, z, at, end, stride, total, excess
+
+        begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
+        state = (begin, *rows(begin, active), zero, type(zero)(zero))
+        result = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
+        return result[-2], result[-1]
+
+    def _rows(self, search: Search) -> Callable[[UInt, Mask], tuple[UInt, UInt, UInt, UInt, UInt]]:
+        """A function of a row's number, 0 to 3, that returns (cell in y, in z, first and last particle, stride); rows
+        are empty if the search covers fewer than four."""
+        mi = self.mi
+        low = [mi.Int32(dr.floor((x - self.radius) * self.per_cell)) for x in search.place]
+        high = [mi.Int32(dr.floor((x + self.radius) * self.per_cell)) for x in search.place]
         along = self._along(low[0]), self._along(high[0]) + 1
 
         def row(number: UInt, wanted: Mask) -> tuple[UInt, UInt, UInt, UInt, UInt]:
-            """(cell in y, in z, first and last particle, step) of one of the four rows; empty where there are fewer."""
             up, far = (number & 1) != 0, (number & 2) != 0
             y, z = dr.select(up, high[1], low[1]), dr.select(far, high[2], low[2])
             there = wanted & (number < 4) & (~up | (high[1] != low[1])) & (~far | (high[2] != low[2]))
@@ -144,59 +215,24 @@ class PhotonMap:
             first = dr.gather(mi.UInt32, self.starts, begin + along[0], there)
             last = dr.select(there, dr.gather(mi.UInt32, self.starts, begin + along[1], there), first)
             stride = 1 + (last - first) // VISITED
-            return y, z, first + dr.minimum(mi.UInt32(u * mi.Float(stride)), stride - 1), last, stride
+            return y, z, first + dr.minimum(mi.UInt32(search.u * mi.Float(stride)), stride - 1), last, stride
 
-        def step(number: UInt, y: UInt, z: UInt, at: UInt, end: UInt, stride: UInt, total: Radiance, above: Radiance):  # type: ignore[no-untyped-def]
-            here = at < end
-            record = dr.gather(mi.Matrix4f, self.values, at, here)
-            near = [record[i // 4, i % 4] for i in range(8)]
-            position, other = mi.Point3f(*near[:3]), mi.Normal3f(*near[3:6])
-            offset = position - place
-            distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
-            here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius)
-            alike, came = dr.dot(normal, other), mi.Vector3f(*(record[2, i] for i in range(3)))
-            other_side = dr.dot(normal, back) * dr.dot(other, came) < 0
-            here &= (alike > FACING) | ((alike < -FACING) & other_side)
-            # rows of other cells may share their memory
-            here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
-            here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
-            rest = [record[i // 4, i % 4] for i in range(8, 16)]
-            flux = type(zero)(*rest[4 : 4 + len(zero)])
-            photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]), rest[3] > 0)
-            weight = (1 - distance2 / radius2) * (2 / (dr.pi * radius2)) * mi.Float(stride)
-            light = dr.select(here, visit(photon, weight, here), 0)
-            total = total + light
-            if within:
-                inner2 = radius2 * (within * within)
-                inner = (1 - distance2 / inner2) * (2 / (dr.pi * inner2)) * mi.Float(stride)
-                above = above + light * (1 - dr.select(distance2 < inner2, inner / weight, 0))
-            at = at + stride
-            over = at >= end
-            following = row(number + 1, over)
-            y, z, at, end, stride = (
-                dr.select(over, new, old) for new, old in zip(following, (y, z, at, end, stride), strict=True)
-            )
-            return number + dr.select(over, mi.UInt32(1), 0), y, z, at, end, stride, total, above
-
-        begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
-        state = (begin, *row(begin, active), zero, type(zero)(zero))
-        result = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
-        return result[-2], result[-1]
+        return row
 
 
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
-    """The order of keys, the first first among equals: one of whole numbers, the same whoever sorts.
+    """The stable order of keys.
 
-    By 16 bits at a time, which NumPy sorts by counting: 32 bits take twice as long.
+    Sorted by 16 bits at a time, which NumPy does by counting: 32 bits take twice as long.
     """
     order = np.argsort(key.astype(np.uint16), kind="stable")
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]
 
 
 class PhotonDensity:
-    """How many particles arrive per area, roughly: a number for each cube of space, from one map, that then stays.
+    """The approximate number of arriving particles per area: a number per cube of space, computed once from one map.
 
-    Weights are made of it, and any number will do for those, as long as it is the same whoever asks.
+    It only determines weights, for which any number is correct if all estimators use the same one.
     """
 
     def __init__(self, mi: ModuleType, photon: Photon, landed: Mask, width: float, traced: int):
@@ -209,12 +245,12 @@ class PhotonDensity:
 
     @staticmethod
     def nowhere(mi: ModuleType) -> PhotonDensity:
-        """No particles, before the first map exists; to a kernel it is like any other."""
+        """The density before the first map exists, 0 everywhere, with the same kernel as any other."""
         photon = Photon.none(mi)
         return PhotonDensity(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
-        """1/m^2, of one particle that is traced."""
+        """Density at a place, 1/m^2, per traced particle."""
         return dr.gather(self.mi.Float, self.values, self._place(place))
 
     def _place(self, point: Point) -> UInt:

@@ -1,4 +1,4 @@
-"""Where Mitsuba's shapes stand."""
+"""Placements of Mitsuba's shapes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..bridge.types import OfVariant, Shape
 
 
 def placement_reader(mi: ModuleType) -> Callable[[Shape], list[float]]:
-    """Reads where a shape stands, the 16 numbers of `to_world` row by row, in a fifth of `mi.traverse`'s time."""
+    """A function that reads a shape's `to_world`, 16 numbers row by row, in a fifth of the time of `mi.traverse`."""
     base: Any = mi.TraversalCallback
 
     class Reader(base):

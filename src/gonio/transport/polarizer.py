@@ -1,4 +1,4 @@
-"""A scene through a polarizer: Mitsuba's path tracer with Mueller matrices, and what the filter lets through."""
+"""A scene seen through a polarizer: Mitsuba's path tracer with Mueller matrices, and the filter's transmission."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..errors import InputError
 from .integrators import Settings
 from .mitsuba_render import MitsubaRender
 
-# A vertex multiplies two matrices of 4 x 4 spectra: what is in flight is sixteen times as large as without
+# A vertex multiplies two matrices of 4 x 4 spectra: samples in flight take sixteen times as much memory
 WAVEFRONT = 1 << 19
 
-TRACED = ("path", "direct")  # the integrators that Mitsuba's path tracer stands for
+TRACED = ("path", "direct")  # the integrators that Mitsuba's path tracer can replace
 
 
 class PolarizedRender(MitsubaRender):
     """A picture of the light that passes a linear polarizer.
 
-    The Stokes vector of each pixel is gathered, with Q > 0 along the picture's horizontal and U > 0 halfway to its
-    vertical. A filter that is turned by theta then lets (I + Q cos 2 theta + U sin 2 theta) / 2 through (Born1999).
+    It accumulates the Stokes vector of each pixel, with Q > 0 along the picture's horizontal and U > 0 halfway to its
+    vertical. A filter at angle theta transmits (I + Q cos 2 theta + U sin 2 theta) / 2 (Born1999).
 
-    degrees  the direction that the polarizer lets through, counterclockwise from the picture's horizontal
+    degrees  the direction of transmitted polarization, counterclockwise from the picture's horizontal
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, spp: int, settings: Settings, degrees: float) -> None:
@@ -50,7 +50,7 @@ class PolarizedRender(MitsubaRender):
         """I, Q, U and V of each pixel, (height, width, 4, 3), linear RGB."""
         assert self._sum is not None, "advance() comes first"
         mean = self._sum / self.done
-        return mean[..., 3:15].reshape(*mean.shape[:2], 4, 3)  # behind the picture itself
+        return mean[..., 3:15].reshape(*mean.shape[:2], 4, 3)  # after the channels of the picture
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
         with engine.using(self._variant):
@@ -62,10 +62,10 @@ class PolarizedRender(MitsubaRender):
             raise ValueError("no sum of Stokes vectors")
 
 
-def check(settings: Settings, where: str) -> None:
-    """Raise InputError for a picture that a polarizer cannot be laid over."""
+def check(settings: Settings, location: str) -> None:
+    """Raise InputError for a picture that cannot be combined with a polarizer."""
     if settings.integrator not in TRACED:
-        what = f"a polarizer, and the integrator '{settings.integrator}', which follows no polarized light"
-        raise InputError(what, where, "take " + " or ".join(TRACED))
+        what = f"a polarizer with the integrator '{settings.integrator}', which does not trace polarized light"
+        raise InputError(what, location, "use " + " or ".join(TRACED))
     if settings.ambient is not None and any(settings.ambient):
-        raise InputError("a polarizer, and ambient light, which has no polarization", where, "remove one of them")
+        raise InputError("a polarizer with ambient light, which has no polarization", location, "remove one of them")

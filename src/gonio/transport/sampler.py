@@ -1,8 +1,8 @@
-"""Sample points: where on the pixel, on the light and in the lobe the renderer looks.
+"""Sample points: positions on the pixel and on the light, and directions of lobes.
 
-A sampler here is a pure function of *(key, index, dimension)*: `key` names the pixel and the seed, `index` counts
-the samples of that pixel, `dimension` names the decision the numbers are for. Nothing is stored and nothing
-advances, so a picture can be cut into passes of any size, resumed, or spread over machines, and comes out the same.
+A sampler here is a pure function of *(key, index, dimension)*: `key` identifies the pixel and the seed, `index` counts
+the samples of that pixel, `dimension` identifies the decision that uses the numbers. There is no state, so a picture
+can be divided into passes of any size, resumed, or distributed over machines, and is bit-identical.
 
     >>> key = pixel_key(pixel, seed)
     >>> u = PAIRS["sobol"](key, index, dimension)    # two floats in [0, 1)
@@ -12,9 +12,9 @@ The indices of one (key, dimension) form a sequence: for Sobol points every alig
 *first n* samples are as even as n allows. Different dimensions are padded (Burley2020): each has its own shuffle of
 the indices, so that decisions are independent of each other while each is stratified.
 
-Nets suit what has edges: a pixel, a lamp. Directions are periodic, and mostly smooth: there a lattice, shifted by
-chance, errs far less (Sloan1994), by a factor of 3 to 100 for smooth functions at 16 to 64 points, and it takes half
-the arithmetic. `default` takes each where it is better.
+Nets suit integrands with edges: a pixel, a lamp. Functions of direction are periodic, and mostly smooth: there a
+randomly shifted lattice has a much smaller error (Sloan1994), by a factor of 3 to 100 for smooth functions at 16 to 64
+points, at half the cost. `default` uses each where it is better.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ PairFunction: TypeAlias = Callable[[UInt, UInt, UInt], Pair]  # of (key, index, 
 
 SAMPLERS: dict[str, str] = {
     "sobol": "Owen-scrambled Sobol pairs, shuffled per pixel and dimension; any number of samples",
-    "lattice": "lattices shifted by chance, shuffled per pixel and dimension; any number of samples",
-    "independent": "independent pseudo-random numbers: the textbook's sampler, the most noise",
+    "lattice": "randomly shifted lattices, shuffled per pixel and dimension; any number of samples",
+    "independent": "independent pseudo-random numbers: highest noise, for comparison",
 }
 
 
 def mix(a: UInt, b: UInt) -> UInt:
-    """Hash two 32-bit words into one (the `lowbias32` finaliser of C. Wellons: bias 0.17 bits of 32 after mixing).
+    """Hash two 32-bit words into one (the `lowbias32` finalizer of C. Wellons: bias 0.17 bits of 32 after mixing).
 
     Multiplying `b` by the golden ratio first spreads small integers over all bits.
     """
@@ -48,7 +48,7 @@ def mix(a: UInt, b: UInt) -> UInt:
 
 
 def pixel_key(pixel: UInt, seed: UInt) -> UInt:
-    """The key of a pixel under a seed: 32 bits, decorrelated between pixels and between seeds."""
+    """The key of a pixel and a seed: 32 bits, decorrelated between pixels and between seeds."""
     return mix(mix(pixel, seed), seed ^ 0xA511E9B3)
 
 
@@ -59,7 +59,7 @@ def owen_hash(x: UInt, seed: UInt) -> UInt:
     reversed words each digit depends on more significant digits alone, which is what nested uniform scrambling
     asks for. Constants of N. Vegdahl, as in pbrt-v4's FastOwenScrambler.
     """
-    x = x ^ (x * 0x3D20ADEA)  # never `^=`: on a Dr.Jit array that would change the caller's
+    x = x ^ (x * 0x3D20ADEA)  # never `^=`: which would modify the caller's Dr.Jit array
     x = (x + seed) * ((seed >> 16) | 1)
     x = x ^ (x * 0x05526C56)
     return x ^ (x * 0x53A22864)
@@ -93,20 +93,20 @@ def sobol_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
 
 
 def independent_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Two independent numbers: a counter hashed twice, as good as a stateful generator and free of state."""
+    """Two independent numbers: a counter hashed twice, as good as a stateful generator."""
     word = mix(mix(key, type(key)(dimension)), type(key)(index))
     return unit(mix(word, type(key)(0x51633E2D))), unit(mix(word, type(key)(0x68BC21EB)))
 
 
-# y over x of a lattice: of the 32-bit words whose lattices of 2, 4, ... 2^20 points all have a shortest dual vector of
-# at least .66 of the hexagonal one's (found bit by bit, keeping the best 400), the first. 16 points have .74, 64 .89.
+# y over x of a lattice: the first 32-bit word whose lattices of 2, 4, ... 2^20 points all have a shortest dual vector
+# of at least 0.66 of the hexagonal one's (searched bit by bit, with the best 400). 16 points have 0.74, 64 have 0.89.
 SLOPE = 1030637
 
 
 def lattice_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Point `index` of a lattice of rank 1, extensible in base 2 (Hickernell2000), shifted, its order shuffled.
+    """Point `index` of a rank-1 lattice, extensible in base 2 (Hickernell2000), randomly shifted and shuffled.
 
-    Every aligned block of 2^m indices is a lattice of 2^m points, moved as a whole.
+    Every aligned block of 2^m indices is a lattice of 2^m points, translated.
     """
     seed = mix(key, type(key)(dimension))
     x = owen_hash(dr.brev(type(key)(index)), seed)
@@ -120,5 +120,5 @@ PAIRS: dict[str, PairFunction] = {
     "independent": independent_pair,
 }
 
-#: What `sampler="default"` means for places (on a pixel, on a lamp), and for directions.
+#: The samplers of `sampler="default"`: for positions (on a pixel, on a lamp), and for directions.
 DEFAULT = ("sobol", "lattice")

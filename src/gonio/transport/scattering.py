@@ -1,4 +1,4 @@
-"""How integrators ask BSDFs at a vertex."""
+"""Evaluation and sampling of BSDFs at a vertex."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .media import Crossing, Media
 
 @dataclass
 class Vertex:
-    """A point where a path has met a surface.
+    """A point where a path has hit a surface.
 
-    crossing  the media on both sides of it, None in scenes where none matter
+    crossing  the media on both sides of it, None in scenes without media
     """
 
     si: SurfaceInteraction
@@ -30,7 +30,7 @@ class Vertex:
 
 
 class Scattering:
-    """BSDFs in a context of Mitsuba's that tells Gonio's what the integrator does with media and wavelengths."""
+    """BSDFs in a context that tells Gonio's plugins how the integrator treats media and wavelengths."""
 
     def __init__(self, mi: ModuleType, media: Media) -> None:
         self.mi = mi
@@ -54,7 +54,7 @@ class Scattering:
     def pass_through(
         self, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[BSDFSample, Radiance]:
-        """The sample, or where the media say that there is no surface after all, one that goes straight on."""
+        """The sample; where the media say that there is no real surface, one that passes straight through."""
         if vertex.crossing is None:
             return bs, weight
         mi, through = self.mi, active & ~vertex.crossing.surface
@@ -65,10 +65,10 @@ class Scattering:
 
 
 def keep_hero(mi: ModuleType, throughput: Radiance, hero_only: UInt, here: Mask) -> tuple[Radiance, UInt]:
-    """Go on with the first wavelength only where the index depends on it, at the weight of all.
+    """Continue with the first wavelength only where the index depends on it, weighted for all of them.
 
-    The wavelengths of a sample are shifted copies of one number, so that the first is distributed as each of them is:
-    it stands for all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero).
+    The wavelengths of a sample are shifted copies of one number, so the first has the same distribution as each of them
+    and can represent all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero wavelength).
     """
     count = dr.size_v(throughput)
     hero = mi.Spectrum(0)

@@ -1,4 +1,4 @@
-"""What the kernels of a render read of a scene: one object, made once and passed to the integrator."""
+"""The scene data of a render's kernels: one object, made once and passed to the integrator."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ CIE_Y_INTEGRAL = 106.7502593994140625
 
 
 class SceneData:
-    """The parts of a scene as integrators use them; lights and media are prepared when first asked for.
+    """The parts of a scene that integrators use; lights and media are prepared on first use.
 
     pair, direction_pair  the sampler's points: two numbers in [0, 1) of (key, index, dimension), for positions on
                           pixels and lamps, and for directions
     camera      rays through pixels
-    surfaces    what rays meet
-    media       what absorbs light between surfaces
-    lights      what emits it
-    scattering  how BSDFs are evaluated and sampled
-    aovs        whether albedo and normal of the first hit are wanted for the denoiser
+    surfaces    the surfaces that rays hit
+    media       absorption between surfaces
+    lights      the light sources
+    scattering  evaluation and sampling of BSDFs
+    aovs        whether albedo and normal of the first hit are needed for the denoiser
 
     sampler_name      a name of `sampler.SAMPLERS`, or "default"
-    ambient_color     scene-wide ambient radiance, None or 0 without any
-    mis_compensation  whether BSDFs are sampled beside the lights
+    ambient_color     scene-wide ambient radiance; None or 0 for none
+    mis_compensation  whether BSDFs are sampled in addition to the lights
     """
 
     def __init__(
@@ -84,13 +84,13 @@ class SceneData:
 
     @cached_property
     def ambient(self) -> Texture | None:
-        """The ambient light as a texture of radiance, None where no BSDF has an attribute "ambient" to reflect it."""
+        """The ambient light as a texture of radiance, None if no BSDF has an attribute "ambient" to reflect it."""
         color = self._ambient_color
         if color is None or not any(color):
             return None
         if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
             return None
-        # An rgb texture alone is a reflectance and ends at 1; d65 times one is a light, also in spectral variants.
+        # An rgb texture is a reflectance and clamped to 1; d65 times one is a light, also in spectral variants.
         scale = max(color)
         tint = {"type": "rgb", "value": [c / scale for c in color]}
         return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
@@ -114,12 +114,12 @@ class SceneData:
             return mi.UInt32(0)
         return self.media.containing(mi.Point3f(self.sensor.world_transform() @ mi.Point3f(0.0)))
 
-    # ------------------------------------------------------------------ what integrators ask
+    # ------------------------------------------------------------------ used by integrators
 
     def first_hit(
         self, pixel: UInt, key: UInt, index: UInt, active: Mask = True, wavelength: Float | None = None
     ) -> tuple[Ray, Radiance, Hit]:
-        """A sample's camera ray, its weight, and the first surface that it meets."""
+        """A sample's camera ray, its weight, and its first hit."""
         ray, weight = self.camera.ray(pixel, key, index, wavelength)
         ray = self.mi.Ray3f(ray)
         return ray, weight, self.surfaces.nearest(ray, active, coherent=True)
@@ -129,14 +129,14 @@ class SceneData:
         return self.mi.Bool(True)
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
-        """Lanes whose surface sees a point, which lies on none itself."""
+        """Lanes from whose surface a point that is on no surface is visible."""
         return active & ~self.surfaces.blocked(shadow_ray_to(si, point), active)
 
     def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
-        """Of the first vertex of a sample, what is averaged beside its color: albedo and normal where wanted.
+        """Features of a sample's first vertex, averaged besides its color: albedo and normal if needed.
 
         throughput   of the ray that the BSDF has sampled there
-        alive        lanes with a path; `active` those whose path has met a surface there
+        alive        lanes with a path; `active`: those whose path has hit a surface there
         """
         if not self.aovs:
             return []

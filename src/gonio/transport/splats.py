@@ -1,4 +1,4 @@
-"""The camera as particles see it: connections from points of the scene to pixels, and what they add up there."""
+"""The camera of particles: connections from points of the scene to pixels, and the light that they add there."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from ..bridge.faults.thin_lens_importance import camera_sample
 from ..bridge.types import Mask, Point, Radiance, Record, SurfaceInteraction, UInt, Vector
 from ..errors import InputError
 from . import sampler
-from .lights.sources import INFINITE, POINT, SURFACE, UNMET, Particle
+from .lights.sources import DELTA_DENSITY, INFINITE, POINT, SURFACE, Particle
 from .particles import FIRST_VERTEX, LENS, VERTEX_DIMENSIONS, Particles
 from .scene_data import SceneData
 from .sums import Sums
 
-CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # of Mitsuba's: those that a point in the scene can be seen by
+CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # Mitsuba's cameras that points of the scene can be connected to
 
-# A splat is counted in units of 2^-32 of the largest radiance that a lamp has: no picture is brighter on the mean, so
-# that 2^30 samples fit a word of 64 bits, and a thousandth of a unit is lost nowhere, since chance rounds.
+# A splat is counted in units of 2^-32 of the largest radiance of a lamp. No picture is brighter on average, so 2^30
+# samples fit into a 64-bit integer; random rounding makes the sum unbiased.
 BITS = 32
-PROBED = 4096  # points of the lamps, to find that radiance
-MAX_BITS = 58  # of one splat; a larger one is left out and counted as no number
+PROBED = 4096  # points on the lamps, to estimate that radiance
+MAX_BITS = 58  # of one splat; a larger one is skipped and counted as invalid
 DITHER = 0xD1B54A32
-NEAREST = 1e-2  # of the scene's size: how near to a lamp that is a point brightness still has a bound
-AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection of the lamp itself
+NEAREST = 1e-2  # fraction of the scene's size: distance to a point light at which its brightness is bounded
+AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection from the lamp itself
 
 
 class SplatCamera:
-    """The camera of a picture that particles splat.
+    """The camera of a picture made of splats.
 
-    unit  radiance that one of the whole numbers counts which splats are added up as
+    unit  radiance of one unit of the integers in which splats are added up
     """
 
     def __init__(self, data: SceneData, particles: Particles) -> None:
@@ -47,34 +47,35 @@ class SplatCamera:
 
     @staticmethod
     def check(data: SceneData, location: str) -> None:
-        """Raise InputError where particles cannot make the picture that is asked for."""
+        """Raise InputError if particles cannot make the requested picture."""
         sensor = data.sensor
         if data.aovs:
-            raise InputError("it has no features for the denoiser", location, "leave out --denoise, or use path")
+            hint = "leave out --denoise, or use path"
+            raise InputError("this integrator has no features for the denoiser", location, hint)
         if data.ambient is not None:
-            raise InputError("ambient light comes from no lamp", location, "leave ambient out, or use path")
+            raise InputError("ambient light is not emitted by a lamp", location, "leave ambient out, or use path")
         if sensor.class_name() not in CAMERAS:
-            what = f"a camera of the kind {sensor.class_name()}, which no point of the scene is connected to"
+            what = f"a camera of type {sensor.class_name()}, to which particles cannot be connected"
             raise InputError(what, location, "use a perspective camera, or path")
         if any(value[0] for name, value in data.mi.traverse(sensor) if name.startswith("principal_point_offset")):
-            what = "a camera with a principal point that is not in the middle, which Mitsuba does not project by"
+            what = "a camera with a principal point offset, which Mitsuba does not support for particles"
             raise InputError(what, location, "leave it out, or use path")
 
     def _brightest(self) -> float:
-        """A power of two above the largest radiance, of what can be probed of the lamps."""
+        """A power of two above the largest radiance among probed points of the lamps."""
         mi, sources = self.mi, self.particles.sources
         low = dr.arange(mi.UInt32, PROBED)
         particle, _ = self.particles.leave(self.particles.key(mi.UInt32(0)), low)
         size = dr.square(NEAREST * sources.radius)
         bright = dr.select(particle.kind == POINT, particle.flux / size, particle.flux * particle.density)
-        bright = dr.select((particle.kind == INFINITE) & (particle.density >= UNMET), particle.flux, bright)
+        bright = dr.select((particle.kind == INFINITE) & (particle.density >= DELTA_DENSITY), particle.flux, bright)
         values = np.array(dr.max(bright), np.float64)
         values = values[np.isfinite(values)]
         largest = float(values.max()) if len(values) else 0.0
         return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0
 
     def see_lamp(self, key: UInt, low: UInt, particle: Particle, sums: Sums) -> UInt:
-        """Splat the lamp itself, as the camera sees it from the point where a particle leaves it; as `splat`."""
+        """Splat the lamp itself, from the point where a particle leaves it; returns the same as `splat`."""
         mi = self.mi
         invalid = mi.UInt32(0)
         if SURFACE in self.particles.sources.known:
@@ -89,14 +90,14 @@ class SplatCamera:
             si.wavelengths = particle.place.wavelengths
             ds, importance = self.sample_direction(key, low, AT_LAMP, si, here)
             value = particle.direct_weight * importance * dr.square(ds.dist)
-            si.p = ds.p  # from the camera into the distance, where no surface is
+            si.p = ds.p  # the shadow ray runs from the camera to infinity
             invalid += self.splat(key, low, sums, ds.uv, value, si, None, here, -ds.d)
         return invalid
 
     def sample_direction(
         self, key: UInt, low: UInt, dimension: UInt | int, si: SurfaceInteraction, active: Mask
     ) -> tuple[Record, Radiance]:
-        """The direction sample from a point to the camera, and its importance there."""
+        """The direction sample from a point to the camera, and its importance."""
         lens = self.mi.Point2f(0.5)
         if self.sensor.needs_aperture_sample():
             lens = self.mi.Point2f(*self.data.pair(key, low, dimension + LENS))
@@ -114,9 +115,9 @@ class SplatCamera:
         active: Mask,
         away: Vector | None = None,
     ) -> UInt:
-        """Add to the pixel at `uv` the light that arrives there; returns 1 where that is no finite number.
+        """Add light to the pixel at `uv`; returns 1 where its value is not finite.
 
-        eye   the point that `si` must see; None where it must see infinity, in the direction `away`
+        eye   the point that must be visible from `si`; None for infinity, in the direction `away`
         """
         mi = self.mi
         x, y = mi.Int32(dr.floor(uv.x)), mi.Int32(dr.floor(uv.y))
@@ -135,7 +136,7 @@ class SplatCamera:
         place = mi.UInt32(y) * self.width + mi.UInt32(x)
         dither = mi.Float64(sampler.independent_pair(key, low, place ^ DITHER)[0])
         color = [mi.Float64(v) * self.per_unit for v in self.data.rgb(value, si.wavelengths)]
-        countable = abs(color[0]) + abs(color[1]) + abs(color[2]) < 2.0**MAX_BITS  # nor is it so for NaN
+        countable = abs(color[0]) + abs(color[1]) + abs(color[2]) < 2.0**MAX_BITS  # False for NaN as well
         for target, v in zip(sums.splats, color, strict=True):
             dr.scatter_add(target, mi.Int64(dr.floor(v + dither)), place, active & countable)
         return dr.select(active & ~countable, mi.UInt32(1), 0)

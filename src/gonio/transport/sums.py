@@ -1,4 +1,4 @@
-"""What the lanes of a picture add up."""
+"""Sums of samples, per lane of a picture."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..bridge.types import Float, Mask, UInt, Whole
 
 @dataclass
 class Sums:
-    """Sums in 64 bits, one entry a lane: radiance (r, g, b, and what else is of a whole sample), and features of what
-    samples see first.
+    """Sums in 64 bits, one entry per lane: radiance (r, g, b, and other values of a complete sample), and features of
+    the first hits.
 
-    splats  red, green and blue that particles have brought, one entry a pixel, whole numbers; none where there are none
+    splats  red, green and blue of particles, one entry per pixel, integers; empty for integrators without splats
 
-    A value that is not finite (a BSDF's overflow) is left out and counted, so that it does not cost the pixel.
+    A value that is not finite (overflow in a BSDF) is skipped and counted, so that the rest of the pixel remains valid.
     """
 
     radiance: list[Float]
@@ -32,20 +32,20 @@ class Sums:
 
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, radiance: int, features: int, pixels: int = 0) -> Sums:
-        """Of so many numbers each; `pixels`: of a picture that is splatted, else 0."""
+        """Zeros of so many numbers each; `pixels` of a picture with splats, else 0."""
         totals, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
         sums = Sums(totals, more, dr.zeros(mi.UInt32, lanes), splats)
-        dr.make_opaque(sums)  # zeros as data: else the first pass would be a kernel of its own
+        dr.make_opaque(sums)  # as kernel data: literal zeros would give the first pass a different kernel
         return sums
 
     def at(self, lane: UInt) -> Sums:
-        """Those of the lanes with these numbers."""
+        """The sums of the lanes with these numbers."""
         totals, more = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.radiance, self.features))
         return Sums(totals, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Each sum by its name; a view where the device is the CPU, but for splats, which are added to in place."""
+        """Each sum by its name; views on the CPU, but copies of splats, which are modified in place."""
         totals = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
         totals |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
         totals |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
@@ -53,7 +53,7 @@ class Sums:
 
     @staticmethod
     def of_arrays(mi: ModuleType, arrays: Mapping[str, NDArray[Any]], lanes: int, like: Sums) -> Sums:
-        """Sums of `arrays`. Raises ValueError where they are not so many of so many lanes."""
+        """Sums from `arrays`. Raises ValueError if their number or size does not match."""
         known = like.arrays()
         for name, values in known.items():
             entries = len(values) if name.startswith("splat") else lanes
@@ -70,14 +70,14 @@ class Sums:
         return totals
 
     def add(self, radiance: Sequence[Float], ended: Mask, features: Sequence[Float], begun: Mask) -> Sums:
-        """With the radiance of samples that have ended, and the features of those that have begun."""
+        """These sums plus the radiance of samples that have ended, and the features of those that have begun."""
         totals, lost = self._add(self.radiance, radiance, ended)
         more, lost_too = self._add(self.features, features, begun)
         lost = lost if lost_too is None else lost | lost_too
         return Sums(totals, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
 
     def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], Mask]:
-        """(sums, lanes of values that are not finite); none of these where there are no sums."""
+        """(sums, lanes of values that are not finite); None for the latter if there are no sums."""
         if not sums:
             return sums, None
         finite = dr.isfinite(sum(values))

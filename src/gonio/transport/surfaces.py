@@ -1,4 +1,4 @@
-"""What rays meet, and what they find there."""
+"""Intersections of rays with surfaces."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .placement import placement_reader
 
 
 class Surfaces:
-    """The surfaces of a scene as they are when this is made.
+    """The surfaces of a scene at construction time.
 
-    inline      traces rays in the kernel, in scenes of a few simple shapes; else Mitsuba does
-    placements  knows the surfaces of many shapes, or of those that are traced inline; the others are asked
+    inline      traces rays in the kernel, for scenes of a few simple shapes; otherwise Mitsuba does
+    placements  computes the surfaces of many shapes, or of those that are traced inline; the others are called
     """
 
     def __init__(self, mi: ModuleType, scene: Scene) -> None:
@@ -27,17 +27,17 @@ class Surfaces:
             self.placements = Placements.of(mi, scene, MANY if self.inline is None else 1)
 
     def nearest(self, ray: Ray, active: Mask = True, coherent: bool = False) -> Hit:
-        """The surface that a ray meets first; `coherent` where neighboring rays go the same way."""
+        """The first surface that a ray hits; `coherent` if neighboring rays have similar directions."""
         if self.inline is not None:
             return self.inline.nearest(ray, active)
         return self.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
 
     def blocked(self, ray: Ray, active: Mask = True) -> Mask:
-        """Whether a ray meets anything."""
+        """Whether a ray hits anything."""
         return self.scene.ray_test(ray, active) if self.inline is None else self.inline.blocked(ray, active)
 
     def interaction(self, hit: Hit, ray: Ray, active: Mask = True) -> SurfaceInteraction:
-        """Mitsuba's record of the surface that was met."""
+        """Mitsuba's record of the surface that was hit."""
         if self.placements is not None:
             return self.placements.interaction(hit, ray, active)
         return hit.compute_surface_interaction(ray, self.mi.RayFlags.All, active)

@@ -1,16 +1,16 @@
 """Rendering until the error is small enough.
 
-The samples are two halves, each a picture by a sequence of random numbers of its own. What sets one apart from the
-other is their noise, however even the points within each are: the variance of their mean is, without bias, a quarter of
-their squared difference. That of one pixel tells little, and those of thousands together the error of the picture.
+The samples form two halves, each a picture from a separate random sequence. Their difference is noise only, however
+even the points within each half are: a quarter of their squared difference estimates the variance of their mean without
+bias. The estimate for one pixel is uncertain, but the mean over thousands gives the error of the picture.
 
-Where noise is uneven, the first samples decide how many of those to come the tiles of 4 x 4 pixels get. These shares
-stay as they are from then on, and the samples that chose them are averaged with the rest by a weight that is the same
-for all pixels: a pixel whose number of samples followed its own values would be biased.
+If noise is uneven, the first samples determine how many of the later ones each tile of 4 x 4 pixels gets. These shares
+then stay fixed, and the first samples are averaged with the rest by a weight that is the same for all pixels: a pixel
+whose number of samples depended on its own values would be biased.
 
-An integrator that blurs (`caustics`) has an error besides, the same in both halves. Each half also says how far it is
-from a picture that is blurred four times less; of these differences the product of both halves is, without bias, the
-square, and the blur's own follows from it. Where it is too large a part of the error, all begins anew, less blurred.
+The blur of an integrator (`caustics`) is an additional error, equal in both halves. Each half also measures the
+difference to a less blurred picture; the product of two such measurements estimates the square without bias, and the
+blur's error follows from it. If blur is too large a part of the error, rendering starts over with a smaller radius.
 """
 
 from __future__ import annotations
@@ -30,39 +30,40 @@ from .integrators.progressive import SHARE, TILE, tiles
 Picture = NDArray[np.float32]
 Share = NDArray[np.uint32]
 
-FIRST = 16  # samples per pixel, both halves together, before the first look at the error
-FLOOR = 0.01  # relMSE = mean((x - r)^2 / (r^2 + FLOOR mean(r)^2)): a dim scene does not hide its noise
-MARGIN = 0.5  # standard errors of the estimate: of many looks the luckiest is the last
-# The error falls with a power of the samples, 1 to 1.5: by the larger one no look comes much too late.
+FIRST = 16  # samples per pixel of both halves, before the first estimate of the error
+FLOOR = 0.01  # relMSE = mean((x - r)^2 / (r^2 + FLOOR mean(r)^2)): noise counts relative to the scene's brightness
+MARGIN = 0.5  # standard errors added to the estimate, since rendering stops at the luckiest of several estimates
+# The error falls with the number of samples to a power of 1 to 1.5: with the larger one, no estimate comes much too
+# late.
 POWER = 1.5
-LEAST_STEP, MOST_STEP = 1.04, 2.5  # factors of samples from one look to the next
-LOW, HIGH = SHARE // 4, SHARE * 8  # what a tile gets at least and at most: the first samples miss rare light
-PAYS, PAYS_SAMPLES = 0.8, 1 << 24  # shares must leave at most that part of the samples, and save so many: some seconds
-# The square of a blur, over that of its difference to a blur four times narrower: 1.14 where light is smooth (it grows
-# with the square of the radius), 1.31 of an edge within a pixel (power 3/2), 1.90 of an edge across pixels (power 1/2);
-# measured .8 to 1.3. What stands for the true value below is too dark more often than not, so it is among the lower.
+MIN_STEP, MAX_STEP = 1.04, 2.5  # factors of samples from one estimate to the next
+LOW, HIGH = SHARE // 4, SHARE * 8  # limits of a tile's share, since the first samples miss rare light
+MAX_GAIN, MIN_SAVED = 0.8, 1 << 24  # shares must need at most that fraction of the samples, and save so many (seconds)
+# The square of a blur over that of its difference to a blur four times narrower: 1.14 for smooth light (blur grows with
+# the square of the radius), 1.31 for an edge within a pixel (power 3/2), 1.90 for an edge across pixels (power 1/2);
+# measured 0.8 to 1.3. The estimate of the true value below is too dark more often than not, so a lower one is used.
 BLUR = 1.1
-DARKEST = 0.4  # of a blurred pixel: what it may be in truth, at least
-BLUR_POWER = 1.5  # of the radius, by which it falls: the middle one
-MOST_BLUR, BLUR_AIM = 0.5, 0.25  # of the error that is wanted: where blur is more of it, all begins anew, for so much
-SURE = 3.0  # standard errors above that, before all begins anew
-NARROWEST = 1 / 64  # radius
-AROUND = 3 * TILE  # pixels: a tile's noise is that of itself and of its neighbours, half and half
+DARKEST = 0.4  # smallest true value of a blurred pixel, as a fraction of it
+BLUR_POWER = 1.5  # power of the radius by which the squared blur falls: the middle one
+MAX_BLUR, BLUR_AIM = 0.5, 0.25  # fractions of the requested error: above the first, start over, aiming at the second
+SURE = 3.0  # standard errors above that, before rendering starts over
+MIN_RADIUS = 1 / 64
+WINDOW = 3 * TILE  # pixels: a tile's noise is averaged half and half with that of this window
 
 
 def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
-    """What each pixel adds to the relMSE of the mean of two pictures whose noise is independent: (height, width)."""
+    """Contribution of each pixel to the relMSE of the mean of two pictures with independent noise: (height, width)."""
     true, floor = _agreed(a, b)
     result: NDArray[np.float64] = np.mean(0.25 * (a.astype(np.float64) - b) ** 2 / (true**2 + floor), axis=-1)
     return result
 
 
 def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
-    """The relMSE of the mean of two pictures by blur, of which `blurs` tells four times (two by `a`, two by `b`, all of
-    noise of their own) how far the pictures are from one that has less.
+    """The relMSE of the mean of two pictures caused by blur. `blurs` are four estimates (two from `a`, two from `b`,
+    all with independent noise) of the difference to a less blurred picture.
 
-    Where light was blurred over a dark place, its true value is far below that of the pictures: it is they less the
-    difference, by the two that are not in the product, else their noise would count as blur.
+    Where light was blurred over a dark place, the true value is far below that of the pictures: it is estimated as the
+    picture minus the difference, using the two estimates that are not in the product, to keep noise out of the result.
     """
     mean, floor = _agreed(a, b)
     d = [blur.astype(np.float64) for blur in blurs]
@@ -79,12 +80,12 @@ def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
 
 
 def _agreed(a: Picture, b: Picture) -> tuple[NDArray[np.float64], float]:
-    """What stands for the true value of each pixel, and the floor of its square.
+    """An estimate of the true value of each pixel, and the floor of its square.
 
-    A single bright sample would hide itself if the mean of both pictures stood for it, below its squared difference.
-    So the mean does only up to what the neighbours or both pictures agree on.
+    With the mean of both pictures, a single bright sample would reduce its own relative error. Therefore the mean is
+    limited to the value that the surrounding pixels or both pictures agree on.
     """
-    from scipy import ndimage  # here, since not every render loads SciPy
+    from scipy import ndimage  # imported here, since not every render needs SciPy
 
     mean = 0.5 * (a.astype(np.float64) + b)
     agreed = np.maximum(ndimage.median_filter(mean, (3, 3, 1)), np.minimum(a, b))
@@ -100,22 +101,22 @@ class Estimate:
 
     @staticmethod
     def mean(values: NDArray[np.float64]) -> Estimate:
-        """That of a number for each pixel."""
+        """The mean of one value per pixel."""
         return Estimate(float(np.mean(values)), float(np.std(values)) / math.sqrt(values.size))
 
     def with_another(self, other: Estimate) -> Estimate:
-        """What both say together: the mean, weighted by the inverse of their variance."""
+        """The combination of both: their mean, weighted by inverse variance."""
         a, b = (1.0 / max(one.deviation**2, 1e-300) for one in (self, other))
         return Estimate((a * self.value + b * other.value) / (a + b), (a + b) ** -0.5)
 
 
 @dataclass(frozen=True)
 class _Wide:
-    """Two halves that were too blurred, shown as long as those that have followed are worse.
+    """Two halves that were too blurred, shown as long as their successors are worse.
 
-    error  of their picture, and of this the part of their blur
-    width  `Until._width` of theirs
-    radius  `Settings.radius` of theirs
+    error  of their picture; `blur` is its part due to blur
+    width  their `Until._width`
+    radius  their `Settings.radius`
     """
 
     halves: tuple[Render, Render]
@@ -126,52 +127,52 @@ class _Wide:
 
 
 class Until:
-    """A render until its relMSE is estimated to be `error` at most: `passes.run` takes it to its `goal`.
+    """A render until its relMSE is estimated to be at most `error`: `passes.run` advances it to its `goal`.
 
-    most  samples per pixel, at most
+    most  largest number of samples per pixel
     """
 
     def __init__(self, scene: Scene, settings: Settings, error: float, most: int, aovs: bool = False) -> None:
         self._scene, self._aovs = scene, aovs
         self._settings = replace(settings, measures=True) if settings.program.blurs else settings
         self.error, self._most = error, most
-        # of the first samples, and of those that are shared out
+        # seeds of the first samples, and of the later ones, which are shared out
         self._seeds = [int(seed) for seed in np.random.SeedSequence(settings.seed).generate_state(4)]
         self._shares = not (settings.program.splats or settings.program.blurs)
         self._goal = FIRST
-        self._lost = 0  # samples of pictures that were too blurred
-        self._narrowed = 0  # how often that was so
+        self._lost = 0  # samples of discarded pictures that were too blurred
+        self._narrowed = 0  # how many times that happened
         self._halves = self._begun(settings.radius)
-        self._wide: _Wide | None = None  # the last of them
-        self._before = 0  # samples that have chosen the shares
-        self._pilot: tuple[Picture, Picture] | None = None  # what they have shown
+        self._wide: _Wide | None = None  # the last discarded halves
+        self._before = 0  # samples that determined the shares
+        self._pilot: tuple[Picture, Picture] | None = None  # their pictures
         self._share: Share | None = None
-        self._gain = 1.0  # samples that shares take to the same error, over those without
+        self._gain = 1.0  # samples needed with shares, over those without, at the same error
 
     def _pair(self, seeds: list[int], share: Share | None) -> tuple[Render, Render]:
         a, b = (Render(self._scene, replace(self._settings, seed=seed), aovs=self._aovs, share=share) for seed in seeds)
         return a, b
 
-    # ------------------------------------------------------------------ as `passes.run` sees it
+    # ------------------------------------------------------------------ the interface of `passes.run`
 
     @property
     def done(self) -> int:
-        """Samples per pixel so far, on the mean of the pixels."""
+        """Samples per pixel so far, averaged over the pixels."""
         return self._lost + self._before + sum(self._counts)
 
     @property
     def goal(self) -> int:
-        """Samples per pixel at the next look at the error; where it is small enough, those that are done."""
+        """Samples per pixel at the next estimate of the error; once the error is small enough, those that are done."""
         if self.done == self._goal:
             noise, blur = self._errors()
-            # where few pixels hold most of it, it is uncertain
+            # The estimate is uncertain if few pixels contain most of the error.
             error = noise.value + blur.value + MARGIN * math.hypot(noise.deviation, blur.deviation)
             if error > self.error:
                 self._go_on(error, noise, blur)
         return min(self._goal, self._most)
 
     def advance(self, count: int) -> None:
-        """So many samples more, or those that one half still needs: the halves take turns."""
+        """Render so many samples, or those that one half still needs: the halves alternate."""
         each = _halved(min(self._goal, self._most) - self._lost - self._before)
         needed = [most - n for most, n in zip(each, self._counts, strict=True)]
         behind = 0 if needed[0] >= needed[1] else 1
@@ -191,7 +192,7 @@ class Until:
         return np.asarray((first * a + second * b) / max(first + second, 1.0), np.float32)
 
     def _shown(self) -> tuple[Render, Render] | None:
-        """Wide halves, where they are better than those at work."""
+        """The discarded halves, if they are better than the current ones."""
         return self._wide.halves if self._wide is not None and self.estimate() == self._wide.error else None
 
     def aov(self) -> dict[str, Picture]:
@@ -206,11 +207,11 @@ class Until:
 
     @property
     def radius(self) -> float:
-        """`Settings.radius` by which the picture is made now."""
+        """`Settings.radius` of the current halves."""
         return self._settings.radius
 
     def estimate(self) -> float:
-        """The relMSE of the picture so far; inf where there is too little to tell."""
+        """The relMSE of the picture so far; inf if there are too few samples for an estimate."""
         least = math.inf if self._wide is None else self._wide.error
         if min(self._counts) == 0 and self._pilot is None:
             return least
@@ -218,7 +219,7 @@ class Until:
         return min(noise.value + blur.value, least)
 
     def _errors(self) -> tuple[Estimate, Estimate]:
-        """The error by noise, and by blur."""
+        """The errors by noise and by blur."""
         a, b = self._pictures()
         noise = Estimate.mean(squares(a, b))
         if not self._settings.measures:
@@ -227,13 +228,13 @@ class Until:
         if not blurs:
             return noise, Estimate(0.0, 0.0)
         blur = blur_error(a, b, blurs)
-        if self._wide is not None:  # with a small radius blur is small beside its noise; what was seen before helps
+        if self._wide is not None:  # at a small radius the noise of the blur dominates; the earlier estimate helps
             expected = self._wide.blur.value * (self._width() / self._wide.width) ** BLUR_POWER
             blur = blur.with_another(Estimate(expected, expected))
         return noise, Estimate(max(blur.value, 0.0), blur.deviation)
 
     def _width(self) -> float:
-        """What the radius of the maps so far is proportional to, on the mean."""
+        """A number proportional to the mean radius of the maps so far."""
         return self._settings.radius * float(sum(self._counts)) ** self._settings.program.shrinking
 
     def _pictures(self) -> tuple[Picture, Picture]:
@@ -247,22 +248,22 @@ class Until:
     # ------------------------------------------------------------------ how far
 
     def _go_on(self, error: float, noise: Estimate, blur: Estimate) -> None:
-        """Set the next goal, where the error is too large; after the first samples, share out the rest."""
-        # as it will be when the noise is small enough
+        """Set the next goal if the error is too large; after the first samples, share out the rest."""
+        # the factor of the radius when the noise will be small enough
         later = max(noise.value / ((1.0 - BLUR_AIM) * self.error), 1.0)
         later **= self._settings.program.shrinking
         sure = (blur.value - SURE * blur.deviation) * later**BLUR_POWER
-        if sure > MOST_BLUR * self.error and self._settings.radius > NARROWEST:
+        if sure > MAX_BLUR * self.error and self._settings.radius > MIN_RADIUS:
             factor = (BLUR_AIM * self.error / blur.value) ** (1.0 / BLUR_POWER) / later
             wide = _Wide(self._halves, noise.value + blur.value, blur, self._width(), self._settings.radius)
             self._lost, self._goal = self.done, self.done + FIRST
-            self._narrow(max(self._settings.radius * factor, NARROWEST), wide)
+            self._narrow(max(self._settings.radius * factor, MIN_RADIUS), wide)
             return
         if self._shares and self._share is None and self.done == FIRST:
             self._share_out(error)
-        # samples without shares that would be as good as those so far
+        # number of samples without shares that would be as good as those so far
         worth = self._before + (self.done - self._before) / self._gain
-        factor = min(max((error / self.error) ** (1.0 / POWER), LEAST_STEP), MOST_STEP)
+        factor = min(max((error / self.error) ** (1.0 / POWER), MIN_STEP), MAX_STEP)
         more = (factor - 1.0) * worth * self._gain
         self._goal = self.done + 2 * max(math.ceil(0.5 * more), 1)
 
@@ -270,7 +271,7 @@ class Until:
         a, b = self._pictures()
         share, gain = shares(squares(a, b))
         saved = (1.0 - gain) * self.done * (error / self.error - 1.0) * a.shape[0] * a.shape[1]
-        if gain <= PAYS and saved >= PAYS_SAMPLES:
+        if gain <= MAX_GAIN and saved >= MIN_SAVED:
             self._take(share, gain, (a, b))
 
     def _take(self, share: Share, gain: float, pilot: tuple[Picture, Picture]) -> None:
@@ -282,7 +283,7 @@ class Until:
         self._wide, self._halves = wide, self._begun(radius)
 
     def _begun(self, radius: float) -> tuple[Render, Render]:
-        """Two halves by a radius, with seeds of their own."""
+        """Two halves with a radius, with separate seeds."""
         self._settings = replace(self._settings, radius=radius)
         if self._narrowed == 0:
             return self._pair(self._seeds[:2], None)
@@ -304,13 +305,16 @@ class Until:
         return result | _sums("half", self._halves)
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on to the same bits. Raises ValueError or KeyError for sums of another film."""
+        """Go on to the same bits. Raises ValueError, LookupError or ArithmeticError for sums of another film."""
         if "share" in state:
             pilot = state["pilot0"], state["pilot1"]
             shape = self._halves[0].height, self._halves[0].width, 3
             if state["share"].shape != (shape[0] * shape[1],) or any(picture.shape != shape for picture in pilot):
                 raise ValueError("shares of another film")
-            self._take(state["share"], float(state["gain"][0]), pilot)
+            gain = float(state["gain"][0])
+            if state["share"].dtype != np.uint32 or not 0.0 < gain <= 1.0:
+                raise ValueError("no shares")
+            self._take(state["share"], gain, pilot)
         if "narrowed" in state:
             *counts, self._lost, times = map(int, state["narrowed"][:4])
             radius, error, value, deviation, *known = map(float, state["narrowed"][4:])
@@ -337,24 +341,24 @@ def _halved(samples: int) -> tuple[int, int]:
 
 
 def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
-    """How to share out samples, from each pixel's squared error: (share of each lane, samples that it takes to the same
-    error, over those of equal shares).
+    """Distribute samples by each pixel's squared error: (share per lane, samples needed for the same error over those
+    of equal shares).
 
-    By the root of the noise the error is least (Neyman's allocation); tiles, as `Render` has them, keep together what
-    is traced together.
+    The error is least for shares proportional to the root of the noise (Neyman's allocation); tiles, as in `Render`,
+    keep coherent rays together.
     """
     from scipy import ndimage
 
     height, width = noise.shape
     order = tiles(width, height)
-    smooth = 0.5 * (noise + np.maximum(ndimage.uniform_filter(noise, AROUND), 0.0))  # rounding goes below 0
+    smooth = 0.5 * (noise + np.maximum(ndimage.uniform_filter(noise, WINDOW), 0.0))  # rounding may give values below 0
     lane = smooth.ravel()[order]
     starts = np.arange(0, len(lane), TILE * TILE)
     sizes = np.diff([*starts, len(lane)])
     variance = np.add.reduceat(lane, starts) / sizes
     wanted = np.sqrt(variance)
     scale = 1.0
-    for _ in range(20):  # until what is cut off above and below is made up for
+    for _ in range(20):  # until the mean share is right despite the clipping
         result = np.clip(np.rint(scale * SHARE * wanted / max(float(np.mean(wanted)), 1e-300)), LOW, HIGH)
         scale *= SHARE / float(np.average(result, weights=sizes))
     total = float(np.average(variance, weights=sizes))

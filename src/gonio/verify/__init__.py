@@ -1,10 +1,10 @@
-"""The laws: prove any BSDF, Gonio's, Mitsuba's or your own.
+"""The laws: test any BSDF, Gonio's, Mitsuba's or your own.
 
     gonio verify conductor --param alpha=0.3
     go.verify(go.Conductor(alpha=0.3)).passed
 
-One law a file in `laws`, or in a package of your own. The room knows the BSDF protocol and nothing of any material.
-Names load when first used: `gonio verify` starts the process that judges before it loads anything itself.
+There is one file per law in `laws`, or in a package of your own. This package knows the BSDF protocol, but no material.
+Names load on first use: `gonio verify` starts the process that judges before it loads anything itself.
 """
 
 from __future__ import annotations

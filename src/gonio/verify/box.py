@@ -1,8 +1,8 @@
 """The parameter values at which a BSDF is judged, besides the given ones.
 
 A material that is right at its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of
-two parameters. So the laws are judged again, at less cost, at corners, edges and random points of the declared ranges,
-and behind every jump of the values in a scan along one parameter.
+two parameters. Therefore the laws are tested again, at less cost, at corners, edges and random points of the declared
+ranges, and behind every discontinuity in a scan along one parameter.
 
     for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
 
@@ -31,10 +31,10 @@ SCAN = 64  # values along one parameter
 RAYS = 96  # pairs of directions per value
 WIDE = 30.0  # ratio of the ends beyond which a range is scanned and sampled in equal ratios
 JUMP = 6.0  # least ratio of a jump to the neighboring steps
-MIN_JUMP = 0.004  # least jump, as a share of the value: smaller ones are invisible
+MIN_JUMP = 0.004  # smallest jump, relative to the value: smaller ones are invisible
 UNIFORM_PLACES = 1  # places of a material whose values must not vary from ray to ray
 PLACES_PER_CHOICE = 9
-MARGIN = 0.02  # of a range, where its ends are left out
+MARGIN = 0.02  # fraction of a range, if its ends are excluded
 MIN_ALBEDO = 0.01  # of plugins whose failed samples have weight 0: black samples would count as failed
 MIN_RATIO = 1e-4  # first value over the last of a range that starts at 0 and is divided in equal ratios
 
@@ -46,7 +46,7 @@ class Place:
     values   those that differ from the given material, by path
     why      "given", "choice", "corner", "edge", "interior" or "jump"
     subject  the BSDF there
-    along    the parameters that move; those of the subject itself where it is the given one
+    along    the parameters that vary; those of the subject itself for the given point
     """
 
     values: dict[str, Any]
@@ -81,7 +81,7 @@ class Place:
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The range of one parameter; `ratio` where it is divided in equal ratios."""
+    """The range of one parameter; `ratio` if it is divided in equal ratios."""
 
     path: str
     low: float
@@ -98,7 +98,7 @@ class Axis:
 
 
 def axes(subject: Subject) -> list[Axis]:
-    """The parameters that declare a range, inner materials' included."""
+    """The parameters that declare a range, including those of inner materials."""
     if not isinstance(subject.model, BSDF):
         return []
     axes_ = []
@@ -119,7 +119,7 @@ def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
     """Whether an inner material has a delta lobe at this value, while the outer one declares none: it was not written
     for such lobes."""
     if _hides_delta(subject.model):
-        return False  # also at the given values, which are to be judged
+        return False  # it already does at the given values, which are tested anyway
     try:
         return _hides_delta(subject.replace(**{path: value}).model)
     except InputError:
@@ -148,7 +148,7 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
 
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
-    """The points besides the given one, each once, in order of importance."""
+    """The points besides the given one, without repetition, in order of importance."""
     along, others = axes(subject), _choices(subject)
     if not (along or others) or effort.places <= 0:
         return []
@@ -186,8 +186,8 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
 
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
-    """Each other option of a choice, and each flag inverted; of several the first of each, then the next, as a change
-    of code costs more than one of a number."""
+    """Each other option of a choice, and each flag inverted; first one per choice, then the next, since a change of
+    code costs more than a change of a number."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
     turns: list[list[dict[str, str | bool]]] = []
@@ -200,7 +200,7 @@ def _choices(subject: Subject) -> list[dict[str, str | bool]]:
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
-    """The judged parameter values, in a sentence."""
+    """The tested parameter values, in a sentence."""
     if not tried:
         return "judged at the given values only" + ("" if axes(subject) else ": no parameter declares a range")
     kinds = Counter(place.why for place in tried)
@@ -234,7 +234,7 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
     for axis in along:
         if axis.path in subject.model.fixed:  # tables would be computed for each value
             continue
-        # not from 0 where steps are ratios: the first step would differ from all others
+        # not from 0 for equal ratios: the first step would differ from all others
         first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
         values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)
         try:
@@ -315,14 +315,14 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
 
 
 def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
-    """The value of a parameter as `per_ray` takes it."""
+    """The value of a parameter in the form that `per_ray` takes."""
     value = np.asarray(tree.value_at(subject.model, path), float)
     return np.full(count, float(value)) if value.ndim == 0 else np.tile(value, (count, 1))
 
 
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
-    """The subject with one value per ray of some parameters, by path, of a color (N,) or (N, 3), of a pair of widths
-    (N,) or (N, 2); None where it takes no arrays."""
+    """The subject with one value per ray of some parameters, by path: for a color (N,) or (N, 3), for a pair of alphas
+    (N,) or (N, 2); None if it takes no arrays."""
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():

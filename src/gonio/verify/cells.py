@@ -45,7 +45,7 @@ class Grid(NamedTuple):
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Cells around the pilot's samples; None where no sample has a density."""
+    """Cells around the pilot's samples; None if no sample has a density."""
     rng = np.random.default_rng([seed, 11])
     pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
     many = np.repeat(wo, pilot, axis=0)
@@ -58,9 +58,9 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
 
 
 def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf is positive.
+    """Cells around some samples (n, 3) of each wo, on the sides with samples or with a positive pdf.
 
-    A wo whose samples are so close together that the steps of float32 directions matter is left out.
+    A wo whose samples are so close together that the rounding of float32 directions matters is skipped.
     """
     sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
     resolved = [i for i, wi in enumerate(pilot) if _spread(wi) > FINEST]

@@ -1,4 +1,4 @@
-"""The albedos that integrators measure of one BSDF, each in its own way, and the bias of a picture that follows.
+"""The albedos that different integrators measure of a BSDF, and the bias of a picture that follows.
 
 A path tracer uses a BSDF in two ways. It follows samples, whose mean weight is an albedo; and it samples lights with
 `eval` and `pdf` and weights both by the balance heuristic (Veach1997, eq. 9.10). In a furnace of radiance 1, every
@@ -42,7 +42,7 @@ class Estimates(NamedTuple):
     noise     two standard errors of `sampled` and `both`
     parts     `value`, `sampled` and `consistent`, means over the channels, per bin of wi: (3, N, BINS)
     doubt     three standard errors of the latter two, (N, BINS)
-    unseen    share of light that rare samples of huge weight may still add, (N,)
+    unseen    fraction of light that rare samples of huge weight may add beyond those observed, (N,)
     claimed   int pdf dwi, (N,)
     drawn     share of samples that did not fail and are not delta samples, (N,)
     """
@@ -114,7 +114,7 @@ def _followed_weight(subject: Subject, wo: np.ndarray, s: SampleArrays) -> np.nd
     """Weights of the samples that a path tracer follows, 0 for the others, (N, channels)."""
     valid = s.pdf > 0.0
     if not subject.transmits:
-        # a sample through the surface of an opaque solid reaches its inside, which is dark
+        # a sample through the surface of an opaque solid ends in its dark interior
         valid = valid & (s.wi[:, 2] * wo[:, 2] > 0.0)
     return np.where(valid[:, None], np.nan_to_num(s.weight, posinf=0.0, neginf=0.0), 0.0)
 
@@ -234,7 +234,8 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
     # the same light from a lamp, per bin: an excess on one side does not make up for a lack on another
     value, drawn, own = light.parts
     apart = np.abs((own if part == "pdf" else drawn) - (own if part == "weights" else value))
-    # a lobe that the edge of a bin cuts in two lies on either side by chance: half a percent of all light is nothing
+    # the edge of a bin may cut a lobe, which puts samples on either side by chance: half a percent of all light is
+    # ignored
     doubt = light.doubt + 5e-3 * np.abs(value).sum(1, keepdims=True)
     apart = np.where(apart > doubt, apart, 0.0).sum(1, keepdims=True)
     lamp = summed(apart, light.value.mean(1, keepdims=True).clip(min=0.0), light.wo, light.mass, by_samples.kind)

@@ -1,4 +1,4 @@
-"""The evidence of laws, and the report's figures of it: Matplotlib's SVG as text."""
+"""The evidence of laws, and the report's figures of it, as Matplotlib's SVG."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class SampleCells:
     expected, observed  samples in each cell, (sides, rows, columns)
     rows, columns       edges of the cells, see `gonio.verify.cells`
     drawn               samples in all
-    wo, sides           the direction that they belong to, and the sides of the surface with cells
+    wo, sides           the direction of the test, and the sides of the surface with cells
     """
 
     expected: np.ndarray
@@ -116,7 +116,7 @@ class AlbedoCurves:
 
     quadrature, error  (N, channels)
     sampling, noise    mean weight and its standard error, (N, channels)
-    furnace, loss      albedo of the lossless variant, where there is one, and its average loss
+    furnace, loss      albedo of the lossless variant, if there is one, and its average loss
     """
 
     wo: np.ndarray
@@ -166,7 +166,7 @@ class AlbedoCurves:
 class ReciprocityMap:
     """The largest relative difference of f, by (theta_o, theta_i), over azimuths.
 
-    below  whether the angles go on to 180 degrees
+    below  whether the angles extend to 180 degrees
     """
 
     difference: np.ndarray

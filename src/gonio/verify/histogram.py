@@ -1,8 +1,8 @@
 """Pearson's chi-square test of a model's samples against its pdf, in cells that follow the samples.
 
 A second draw, independent of the pilot that placed the cells, is counted: sampling, binning and counting are one
-kernel, in which nothing is stored but the counts. Failed samples, delta samples and those outside of all cells are
-counted too: their expectation is 1 - int pdf.
+kernel, in which only the counts are stored. Failed samples, delta samples and those outside all cells are counted too:
+their expectation is 1 - int pdf.
 
     grid = cells.place(subject, wo, seed)
     outcome = compare(expect(subject, grid, tolerance), count(subject, grid, log_samples, seed), row)
@@ -24,14 +24,14 @@ from .subject import Subject, guarded
 
 COARSE = (10, 10)  # rows and columns per cell of the coarse test, which detects small errors of broad lobes
 DEPTH = 9  # divisions of a cell; cells with a step, such as that of total reflection, are divided to the last
-ASIDE = 1.1  # times: a step of a tenth next to the edges of a ring of cells is 1e-4 of all
+ASIDE = 1.1  # ratio: a step of a tenth at the edges of a ring of cells is 1e-4 of the total
 MAX_CELLS = 400_000  # of one round, some 10 M directions
 MIN_EXPECTED = 10.0  # of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and its error where
-    cells were not fully divided."""
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and its error from
+    cells that were not fully divided."""
 
     cells: np.ndarray
     total: np.ndarray
@@ -119,7 +119,7 @@ CHUNK = 1 << 22  # directions at a time
 
 
 class _ByRows:
-    """Of a function of rows (wo, wi)."""
+    """The pdf as a function of rows (wo, wi)."""
 
     def __init__(self, pdf: Density, wo: np.ndarray) -> None:
         self.pdf, self.wo = pdf, wo
@@ -138,7 +138,7 @@ class _ByRows:
 
 
 class _InKernel:
-    """Of a subject, its directions made in the kernel that asks it."""
+    """The pdf of a subject, with directions generated in its kernel."""
 
     def __init__(self, subject: Subject, wo: np.ndarray) -> None:
         self.subject = subject
@@ -206,7 +206,7 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
 
 
 def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
-    """As `count`, of given samples (n, 3), for the only wo of a grid; the other samples failed."""
+    """As `count`, for given samples (n, 3) of a grid's only wo; the other samples failed."""
     kind = backend.types("float32")
     wi = backend.vector_of(samples, 3, kind)
     return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
@@ -241,7 +241,7 @@ def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> C
 
 
 def random_numbers(kind: Types, index: Array, seed: int) -> Array:
-    """Three independent numbers in [0, 1) for each index: counters hashed, no state; another seed, another stream."""
+    """Three independent numbers in [0, 1) for each index by hashing, without state; each seed gives another stream."""
     dr = backend.drjit()
     UInt = kind.module.UInt32
     key = mix(mix(index, dr.opaque(UInt, seed & 0xFFFFFFFF)), UInt(0x9E3779B9))
@@ -260,8 +260,8 @@ def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> 
 def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None = None) -> Outcome:
     """p-values of one wo.
 
-    grid  the cells, where rounding is to be allowed for: cells hardly larger than the steps of float32 directions
-          gain or lose samples by rounding alone
+    grid  the cells, to allow for rounding: cells hardly larger than the spacing of float32 directions gain or lose
+          samples by rounding alone
     """
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]

@@ -1,5 +1,5 @@
 """Checks of delta lobes: direction, index, radiance against power, the way back, Fresnel's equations, rotation, tint,
-float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` makes a verdict of them.
+float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` turns them into a verdict.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .subject import Subject, guarded
 
 SINGLE = 2e-3  # error of float32
 SLOPES = 1e-4  # error of derivatives
-FORWARD = 1e-4  # share of light below which a lobe need not come back
+FORWARD = 1e-4  # fraction of light below which a lobe need not be reciprocal
 FLAT = 1e-3  # difference of an index from 1 that refracts nothing
 
 
@@ -79,7 +79,7 @@ def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def distinct(a: float, b: float) -> tuple[str, str]:
-    """Two numbers with as many digits as it takes to tell them apart, four at least."""
+    """Two numbers with as many digits as needed to distinguish them, at least four."""
     for digits in range(4, 18):
         texts = f"{a:.{digits}g}", f"{b:.{digits}g}"
         if texts[0] != texts[1]:
@@ -87,12 +87,12 @@ def distinct(a: float, b: float) -> tuple[str, str]:
     return texts
 
 
-# --------------------------------------------------------------------------- where a lobe goes
+# --------------------------------------------------------------------------- the direction of a lobe
 
 
 def direction(probe: Probe) -> Misses:
     """Directions are unit vectors, and refraction follows Snell's law with the lobe's own eta. Reflection off the
-    mirror direction, and transmission without refraction, are judged by the way back alone: gratings and corner cubes
+    mirror direction, and transmission without refraction, are tested for reciprocity only: gratings and corner cubes
     have them."""
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -136,8 +136,8 @@ def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misse
 
 
 def indices(probe: Probe) -> Misses:
-    """Reflection has eta = 1; eta from below is the inverse of that from above; a parameter that names the index agrees
-    with it."""
+    """Reflection has eta = 1; eta from below is the inverse of that from above; it agrees with a parameter that names
+    the index."""
     named = _named_index(probe.subject)
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -169,7 +169,7 @@ def _named_index(subject: Subject) -> float | None:
     return None
 
 
-# --------------------------------------------------------------------------- the light that a lobe carries
+# --------------------------------------------------------------------------- the light of a lobe
 
 
 def modes(probe: Probe) -> Misses:
@@ -219,7 +219,7 @@ def way_back(probe: Probe) -> Misses:
 
 
 def fresnel(probe: Probe) -> Misses:
-    """A material that names its index reflects by Fresnel's equations, or by Schlick's curve, times a constant."""
+    """A material that names its index reflects by Fresnel's equations, or by Schlick's curve, up to a constant."""
     subject, wo, power = probe.subject, probe.wo, probe.power
     index = _named_index(subject)
     through = power.through(wo)
@@ -274,7 +274,7 @@ def _schlick(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
 
 
 def rotation(probe: Probe) -> Misses:
-    """Isotropic lobes turn with wo."""
+    """Isotropic lobes rotate with wo."""
     if not probe.subject.isotropic:
         return
     angle = np.random.default_rng([probe.seed, 92]).uniform(0.0, 2.0 * np.pi, len(probe.wo))
@@ -289,7 +289,7 @@ def rotation(probe: Probe) -> Misses:
 
 
 def tint(probe: Probe) -> Misses:
-    """The light of a lobe is affine in each albedo, unless values are declared not to be."""
+    """The light of a lobe is affine in each albedo, unless values are declared to be otherwise."""
     if "linearity" in probe.subject.breaches:
         return
     for name, parameter in probe.subject.parameters.items():
@@ -304,7 +304,7 @@ def tint(probe: Probe) -> Misses:
 
 
 def float32(probe: Probe) -> Misses:
-    """float32 has the same lobes with the same light; not within 3 degrees of grazing, where an edge may be near."""
+    """float32 has the same lobes with the same light, except within 3 degrees of grazing, where an edge may be near."""
     rounded = lobes.of(probe.subject, probe.wo, probe.seed, precision="float32")
     for rows, _, o, i in probe.lobes(probe.radiance):
         exact, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)

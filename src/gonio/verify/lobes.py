@@ -1,6 +1,6 @@
 """The delta lobes of a BSDF, from its own samples: their directions, the light they carry, and their probabilities.
 
-`eval` is 0 for a delta lobe, but `sample` determines all of it: the direction, the probability (`pdf` of a delta
+`eval` is 0 for a delta lobe, but `sample` determines it completely: the direction, the probability (`pdf` of a delta
 sample), and the light that it carries, weight x pdf, which does not depend on how it is chosen.
 """
 
@@ -65,7 +65,7 @@ def of(
     s = subject.sample(np.repeat(wo, k, axis=0), np.tile(u, (n, 1)), mode, precision)
     wi, weight = s.wi.reshape(n, k, 3), s.weight.reshape(n, k, -1)
     pdf, eta = s.pdf.reshape(n, k), s.eta.reshape(n, k)
-    even = np.arange(k) < DRAWN  # those in equal steps, whose shares are probabilities
+    even = np.arange(k) < DRAWN  # samples in equal steps, whose fractions are probabilities
     left = s.delta.reshape(n, k) & (pdf > 0.0) & np.all(np.isfinite(wi), axis=2)
     rows = np.arange(n)
     parts: list[tuple[np.ndarray, ...]] = []
@@ -73,7 +73,7 @@ def of(
         first = np.argmax(left, axis=1)
         there = left[rows, first]
         direction = wi[rows, first]
-        # two orders of a grating may leave along one direction: their probabilities tell them apart
+        # two orders of a grating may leave along one direction: their probabilities distinguish them
         mine = (np.abs(wi - direction[:, None]).max(2) <= NEAR) & (
             np.abs(pdf - pdf[rows, first][:, None]) <= 1e-5 * pdf[rows, first][:, None]
         )

@@ -61,7 +61,7 @@ def page(report: Report) -> str:
     """The page's HTML."""
     title = report.cards[0].subject.target if report.cards else "nothing"
     broken = len(report.failures)
-    word = "All laws hold" if not broken else f"{broken} {'law is' if broken == 1 else 'laws are'} broken"
+    word = "All laws hold" if not broken else f"{broken} {'law is' if broken == 1 else 'laws are'} violated"
     kind = "pass" if not broken else "fail"
     tests = (
         f"{report.tests} statistical tests at {report.threshold:.2e} each, one false alarm in a hundred reports; "
@@ -132,7 +132,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     rows += [("note", html.escape(note)) for note in v.notes]
     if v.worst:
         rows.append(("worst case", html.escape(v.worst)))
-    rows.append(("see it again", f"<pre>{html.escape(v.command)}</pre>"))
+    rows.append(("reproduce", f"<pre>{html.escape(v.command)}</pre>"))
     if v.failed or v.status in (DECLARED, KNOWN):
         rows.append(
             ("in a picture", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning))
@@ -142,7 +142,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.cause:
         rows.append(("cause", html.escape(v.cause)))
     if v.reproduction:
-        program = f"<summary>a program that needs Mitsuba alone</summary><pre>{html.escape(v.reproduction)}</pre>"
+        program = f"<summary>a program that needs only Mitsuba</summary><pre>{html.escape(v.reproduction)}</pre>"
         rows.append(("without Gonio", f"<details>{program}</details>"))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""

@@ -33,11 +33,11 @@ ROUNDING = 1e-9  # relative variance below which it counts as 0
 class Quality:
     """Means over the directions wo with reflected or transmitted light.
 
-    failed    share of samples that fail: pdf = 0
+    failed    fraction of failed samples: pdf = 0
     variance  of the weight, relative to the square of its mean; a failed sample has weight 0
-    cosine    variance of the albedo when wi is drawn by the cosine (on both sides where light is transmitted), divided
-              by the model's own; None where there is a delta lobe, which the cosine never finds, or no variance at all
-    ideal     mean^2 / (mean^2 + variance): efficiency against sampling without variance
+    cosine    variance of the albedo if wi is sampled by the cosine (on both sides for transmitting materials), over the
+              model's own; None with a delta lobe, which cosine sampling never hits, or without any variance
+    ideal     mean^2 / (mean^2 + variance): efficiency relative to sampling without variance
     """
 
     failed: float
@@ -55,7 +55,7 @@ class Quality:
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """The four figures in words; "" where one is None."""
+        """The four figures as text; "" for one that is None."""
         return (
             f"{100.0 * self.failed:.2g} % fail",
             f"variance {_short(self.variance)}",
@@ -73,7 +73,7 @@ def _short(value: float) -> str:
 
 
 def of(subject: Subject, seed: int = 1) -> Quality | None:
-    """The quality of a subject's sampling; None where it cannot be sampled, or is black."""
+    """The quality of a subject's sampling; None if it cannot be sampled, or is black."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", GonioWarning)
@@ -105,7 +105,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
     rows = directions.single(np.repeat(wo, SAMPLES, axis=0))
-    # of power: the factor eta^2 of radiance cancels where light leaves again, and is not noise
+    # of power: the factor eta^2 of radiance cancels where light exits, and is not noise
     s = subject.sample(rows, directions.numbers(rng, len(rows)), POWER, "float32")
     shape = (len(wo), SAMPLES)
     valid = (s.pdf > 0.0).reshape(shape)

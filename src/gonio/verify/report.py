@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 SCHEMA = "gonio-verify/1"
-SIGNIFICANCE = 0.01  # of one false rejection in a whole report
+SIGNIFICANCE = 0.01  # probability of a false rejection in a whole report
 
 
 def significance(tests: int) -> float:
-    """p-value below which one of that many tests rejects, by Sidak's correction; SIGNIFICANCE where there are none."""
+    """p-value below which one of that many tests rejects, by Sidak's correction; SIGNIFICANCE if there are none."""
     return statistics.sidak(SIGNIFICANCE, tests)
 
 
@@ -28,7 +28,7 @@ class Report:
 
     tests      statistical tests in the whole report
     threshold  p-value below which one of them rejects, by Sidak's correction
-    mended     failures of the baseline that no longer occur, in words
+    mended     failures of the baseline that no longer occur, as text
     """
 
     cards: list[Card]
@@ -77,9 +77,9 @@ class Report:
         for card in self.cards:
             terminal.show_card(card, console)
         for line in self.mended:
-            console.print(f"mended: {line}", markup=False)
+            console.print(f"fixed: {line}", markup=False)
         broken = len(self.failures)
-        word = "[green]all laws hold[/]" if not broken else f"[bold red]{broken} broken[/]"
+        word = "[green]all laws hold[/]" if not broken else f"[bold red]{broken} violated[/]"
         tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (0.01 over all)"
         asked = tests if self.tests else "no statistical test"
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")

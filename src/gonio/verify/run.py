@@ -1,4 +1,4 @@
-"""A trial: every law on every subject, whatever the other laws find."""
+"""A trial: every law on every subject, independent of the results of other laws."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from .. import members
+from ..arguments import renamed
 from ..errors import GonioWarning, InputError
 from ..material import BSDF
 from ..owner import public
@@ -33,24 +34,25 @@ Target = BSDF | Subject | str
 Begin = Callable[[str], None]
 
 
+@renamed(sweep="vary", report="output", jobs="workers", limit="timeout")
 @public
 def verify(
     target: Target | Sequence[Target],
     *,
-    sweep: str = "",
+    vary: str = "",
     quick: bool = False,
     deep: bool = False,
-    seed: int = DEFAULT_SEED,
+    seed: int | None = None,
     law: str | Sequence[str] | None = None,
-    report: str | Path | None = None,
+    output: str | Path | None = None,
     junit: str | Path | None = None,
     sarif: str | Path | None = None,
     baseline: str | Path | None = None,
     write_baseline: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     isolated: bool | None = None,
-    jobs: int = 1,
-    limit: float | None = None,
+    workers: int = 1,
+    timeout: float | None = None,
     memory: float | None = None,
 ) -> Report:
     """Judge a BSDF, or several, by the laws.
@@ -58,27 +60,28 @@ def verify(
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    a material; or a target's name as `gonio verify` takes it; or a list of either
-    sweep     of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
+    vary      of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
     quick     a fast first check
     deep      more samples, more directions, more widths
-    seed      of all random numbers; the same seed gives the same report
+    seed      of all random numbers, 1 if None; the same seed gives the same report
     law       a law's name, or several; all where None
-    report    folder for report.html and report.json; None writes nothing
+    output    folder for report.html and report.json; None writes nothing
     junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
     progress  called with the steps done, all steps, and the name of the next
     isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
-    jobs      such processes at a time; the report is the same
-    limit     seconds per law there, 300 if not given
+    workers   such processes at a time; the report is the same
+    timeout   seconds per law there, 300 if not given
     memory    GB per process, half of the machine's if not given
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` gives the table of the terminal.
     Raises InputError for unknown laws and targets. A failing BSDF fails the law and raises nothing.
     """
+    seed = DEFAULT_SEED if seed is None else seed
     if seed < 0:
         raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")
-    outputs = Outputs(report, junit, sarif, baseline, write_baseline)
+    outputs = Outputs(output, junit, sarif, baseline, write_baseline)
     known = outputs.check()
     effort = "quick" if quick else "deep" if deep else "default"
     names = None if law is None else [law] if isinstance(law, str) else list(law)
@@ -87,17 +90,17 @@ def verify(
         from . import trials
         from .isolation import child
 
-        items = [child.Item(one, (), sweep) if isinstance(one, str) else child.item_of(one) for one in all_]
+        items = [child.Item(one, (), vary) if isinstance(one, str) else child.item_of(one) for one in all_]
         task = child.Task(items, effort, seed, names)
-        result = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+        result = trials.trial(task, jobs=workers, limit=timeout, memory=memory, progress=progress)
     else:
-        result = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
+        result = _here(_subjects(all_, vary), chosen(names), effort, seed, progress)
     outputs.write(result, known)
     return result
 
 
 def _isolable(targets: list[Target]) -> bool:
-    """Whether another process can load the targets by their names, without what this program has registered."""
+    """Whether another process can load the targets by their names, without registrations of this program."""
     if not all(isinstance(one, str) for one in targets) or not sys.executable:
         return False
     return not any(name in str(one) for one in targets for name in members.registered)
@@ -142,7 +145,7 @@ class Judged(NamedTuple):
     def card(self, threshold: float | None, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
         """The verdicts by a threshold, the severity of failures and their causes; the BSDF is called again for both.
 
-        threshold  that of a report of its own where None
+        threshold  None for that of a separate report
         """
         threshold = significance(len(self.p_values)) if threshold is None else threshold
         answers = []
@@ -197,7 +200,7 @@ class Asked(NamedTuple):
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
-    """The other parameter values; none where the BSDF fails when they are chosen, which the laws will report."""
+    """The other parameter values; none if the BSDF fails when they are chosen, which the laws will report."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", GonioWarning)  # the ends of the ranges are chosen on purpose
         try:
@@ -281,7 +284,7 @@ def decide(
     lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
     for trial in sorted(finding.trials, key=lambda trial: trial.p):
         if not trial.p < threshold or len(statistical) >= 3:
-            break  # three confirmed rejections say enough
+            break  # three confirmed rejections are enough
         trial.second = trial.repeat()
         if trial.second < CONFIRMATION:
             statistical.append(f"{trial.where}: p = {trial.p:.2g}, and with a second seed {trial.second:.2g}")
@@ -297,7 +300,7 @@ def decide(
             pass
         elif not over:
             if breach.certain and (place is None or place.why == "given"):
-                status, why = (FAIL, ["the law is declared to be broken, and is not: " + breach.reason])
+                status, why = (FAIL, ["the law is declared to be violated, but holds: " + breach.reason])
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED
             finding.notes.insert(0, f"declared: {breach.reason} (at most {breach.size:.4g})")
@@ -330,20 +333,20 @@ def decide(
 
 
 def _exceeds(finding: Finding) -> str:
-    """A figure above its tolerance, in words."""
+    """A description of a figure above its tolerance."""
     figure = finding.shown or f"{finding.figure:.3g}"
     return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
 
 
-def _subjects(targets: Sequence[Target], sweep: str) -> list[Subject]:
+def _subjects(targets: Sequence[Target], vary: str) -> list[Subject]:
     subjects: list[Subject] = []
     for target in targets:
         if isinstance(target, str):
             from .targets import resolve
 
-            subjects += resolve(target, sweep=sweep)
-        elif sweep:
-            raise InputError("a sweep of a Python object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
+            subjects += resolve(target, vary=vary)
+        elif vary:
+            raise InputError("a sweep of a Python object", "--vary", "name the target, such as 'conductor(preset=Au)'")
         else:
             subjects.append(subject.of(target))
     return subjects

@@ -1,4 +1,4 @@
-"""The severity of a broken law: the bias of a picture, and the grade that follows from it.
+"""The severity of a violated law: the bias of a picture, and the grade that follows from it.
 
 A bias is a share of the reflected light, at the worst direction wo, and averaged over the hemisphere of wo with the
 cosine, which is the average over a ball under an orthographic camera. `estimators` computes that of sampling.
@@ -32,7 +32,7 @@ class Grade(enum.StrEnum):
     """The severity of a failure; `LIMITS` holds the limits of the average and of the worst direction.
 
     NAN, NOISE, FITTING and INTERFACE (a call that integrators do not make, or whose result they ignore) do not bias a
-    picture; BY_NATURE and INNER mean that the fault is not this material's own.
+    picture; BY_NATURE and INNER mean that the defect is not this material's own.
     """
 
     INVISIBLE = "invisible"
@@ -162,7 +162,7 @@ def summed(
 def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
     """The bias of one value against another that it should equal: int |a - b| dwi / int |a| dwi.
 
-    None where nothing is reflected, or where values are random.
+    None if nothing is reflected, or if values are random.
     """
     if subject.stochastic or not subject.has_density or not subject.steady:
         return None

@@ -1,4 +1,4 @@
-"""A BSDF as the laws see it: its protocol, and the facts that it declares about itself.
+"""A BSDF as seen by the laws: its protocol, and the facts that it declares about itself.
 
 A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions it has, and gives a bound copy for
 wavefronts of Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a `Fault` that names
@@ -38,7 +38,7 @@ class Fault(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """A BSDF on trial.
+    """A BSDF under test.
 
     model     the material or plugin
     target    its name: "conductor", "glass.py:Glass", "mitsuba:plastic"
@@ -85,7 +85,7 @@ class Subject:
 
     @property
     def precisions(self) -> tuple[Precision, ...]:
-        """The precisions it can be evaluated in, the most precise last."""
+        """The precisions in which it can be evaluated, the most precise last."""
         return tuple(getattr(self.model, "precisions", backend.PRECISIONS))
 
     @property
@@ -113,10 +113,10 @@ class Subject:
         children = held if held is not None else tree.children(self.model) if isinstance(self.model, BSDF) else {}
         return [Subject(inner, f"{self.target}'s {name}") for name, inner in children.items()]
 
-    def around_sound(self) -> Subject:
+    def with_sound_inside(self) -> Subject:
         """The same with diffuse materials inside, which violate no law."""
-        if hasattr(self.model, "around_diffuse"):
-            return Subject(self.model.around_diffuse(), self.target, self.settings)
+        if hasattr(self.model, "with_diffuse_inside"):
+            return Subject(self.model.with_diffuse_inside(), self.target, self.settings)
         sound = models()["lambert"]()
         return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), sound)), self.target)
 
@@ -169,16 +169,16 @@ class Subject:
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values})
 
-    def anew(self) -> Subject | None:
+    def rebuilt(self) -> Subject | None:
         """A new object of the same BSDF, which has not been called; None where it cannot be made."""
-        make = getattr(self.model, "anew", None)
+        make = getattr(self.model, "rebuilt", None)
         return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:
         """The command line that judges this BSDF."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
-            # a file of the user's as it is named from here
+            # a file of the user's relative to the current folder
             text = notation.setting(self.model, name, value).removeprefix(f"{Path.cwd()}{os.sep}")
             parts += ["--param", f"{name}={text}"]
         return " ".join(part if part == "verify" else shlex.quote(part) for part in [*parts, *more])
@@ -231,7 +231,8 @@ class Subject:
         """`eval` of power (mode "importance") as a function of Dr.Jit vectors of 64 bits, in the best precision."""
         own, exact = backend.types(self.best), backend.types("float64")
         model = self.bound(self.best)
-        mode: Mode = "importance" if self.transmits else "radiance"  # both are the same, and one kernel is enough
+        # without transmission both modes are equal, and one kernel is enough
+        mode: Mode = "importance" if self.transmits else "radiance"
 
         def eval(wo: Direction, wi: Direction) -> Spectrum:
             value = guarded(self.model, "eval", lambda: model.eval(own.vec3(wo), own.vec3(wi), mode))
@@ -241,7 +242,7 @@ class Subject:
 
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
         if not (self.transmits or method == "sample" or "mode" not in more):
-            more["mode"] = "radiance"  # both modes are the same, and one kernel is enough
+            more["mode"] = "radiance"  # both modes are equal, and one kernel is enough
         takes = inspect.signature(getattr(self.model, method)).parameters
         if "mode" in more and "mode" not in takes and not isinstance(self.model, BSDF):
             del more["mode"]

@@ -7,55 +7,41 @@ mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
-gold.json                what a fit found, or a material in Gonio's notation
+gold.json                the result of a fit, or a material in Gonio's notation
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..catalog import notation, operands, outside, texts
 from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
 
-STEPS = 5  # of a sweep
 JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
-def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[Subject]:
-    """The subjects that a target names, one for each value of the sweep.
+def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[Subject]:
+    """The subjects that a target names, one for each value that varies.
 
     settings  "name=value" each
-    sweep     "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
+    vary      "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
     Raises InputError with the nearest known spelling.
     """
     given = dict(map(notation.assignment, settings))
-    if not sweep:
+    if not vary:
         return [_build(target, given)]
-    name, values = _sweep(sweep)
+    name, values = _values(vary)
     return [_build(target, {**given, name: value}) for value in values]
 
 
-def _sweep(text: str) -> tuple[str, list[str]]:
-    name, value = notation.assignment(text, "--sweep")
-    ends = re.fullmatch(r"(.+?)\.\.(.+)", value)
-    if not ends:
-        return name, value.split(",")
-    try:
-        low, high = float(ends[1]), float(ends[2])
-    except ValueError:
-        raise InputError(f"'{value}' is not a range", "--sweep", "such as --sweep alpha=0.01..1") from None
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"'{value}' is not an increasing range", "--sweep", "such as --sweep alpha=0.01..1")
-    many = np.geomspace(low, high, STEPS) if low > 0.0 and high >= 10.0 * low else np.linspace(low, high, STEPS)
-    return name, [f"{v:.6g}" for v in many]
+def _values(text: str) -> tuple[str, list[str]]:
+    name, value = notation.assignment(text, "--vary")
+    return name, texts.range_of(value) or value.split(",")
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:
@@ -79,9 +65,9 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     bsdf = outside.check_operators(bsdf)
     if kind is Kind.NAME:
         return Subject(bsdf, cls.name, values)
-    # what a file describes stands there; what is set beside it is told
-    beside = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
-    return Subject(bsdf, head, {name: value for name, value in values.items() if name in beside})
+    # The file documents its own values; the title shows those that were assigned in addition.
+    assigned = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
+    return Subject(bsdf, head, {name: value for name, value in values.items() if name in assigned})
 
 
 # --------------------------------------------------------------------------- Mitsuba

@@ -1,4 +1,4 @@
-"""A card as a table for the terminal, and the two numbers behind one pair of directions."""
+"""A card as a table for the terminal, and the values at one pair of directions."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Values(TypedDict):
 
 
 def pair(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> dict[str, object]:
-    """The values of a subject for one pair, both ways and in each precision, as plain numbers."""
+    """The values of a subject for one pair, in both directions and in each precision, as plain numbers."""
     answers = {
         label: {"fault": str(answer)} if isinstance(answer, Fault) else answer
         for label, answer in _answers(subject, wo, wi).items()

@@ -1,7 +1,7 @@
 """A trial in parts, one per target: each is stored once it is done, and other processes or machines may do them.
 
-How strict a statistical test must be depends on the number of tests in the whole report, known only at the end. A part
-is therefore judged by the number of its own tests, and again where the difference matters.
+The threshold of a statistical test depends on the number of tests in the whole report, which is known only at the end.
+A part is therefore tested with the number of its own tests, and again if the difference matters.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def trial(
 ) -> Report:
     """As `child.trial`, by the current executor of parts."""
     # Several processes here share the targets; quick looks end before anything could be lost.
-    if crew.current().size == 1 and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
+    if not crew.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     began = time.perf_counter()
     names = {str(path): path for item in task.items for path in _files(item)}
@@ -72,7 +72,7 @@ def _judged(
     judged: dict[int, list[Card]] = {}
     for index, arrays in crew.each(part, arguments, keys, files):
         if index >= 0:
-            # in the user's own folder, or from a worker that runs what it is sent anyway
+            # from the user's own folder, or from a worker that executes what it receives anyway
             judged[numbers[index]] = pickle.loads(arrays["cards"].tobytes())
             if progress:
                 target = task.items[numbers[index]].target
@@ -91,7 +91,7 @@ def _files(item: Item) -> list[Path]:
 def part(
     task: Task, threshold: float | None, limit: float | None, memory: float | None, hashes: dict[str, str]
 ) -> Arrays:
-    """One target's cards, judged in a process of their own."""
+    """One target's cards, tested in a separate process."""
     with tempfile.TemporaryDirectory(prefix="gonio-verify-") as folder:
         (item,) = task.items
         for name, content in hashes.items():

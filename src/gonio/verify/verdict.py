@@ -1,4 +1,4 @@
-"""The findings of laws on a subject, and the verdicts and cards made of them.
+"""The findings of laws on a subject, and the verdicts and cards derived from them.
 
 A law returns a `Finding`: a figure, and the p-values of its statistical tests. They are decided once the number of such
 tests in the whole report is known: `gonio.verify.run`.
@@ -19,7 +19,7 @@ from .severity import Bias, Grade
 from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
-KNOWN = "known"  # fails, as when the baseline was written
+KNOWN = "known"  # failed already when the baseline was written
 
 
 class Evidence(Protocol):
@@ -31,7 +31,7 @@ class Evidence(Protocol):
 
 @dataclasses.dataclass
 class Trial:
-    """One statistical test: its p-value, its subject in words, and how to repeat it with another seed."""
+    """One statistical test: its p-value, its description, and how to repeat it with another seed."""
 
     p: float
     where: str
@@ -43,14 +43,14 @@ class Trial:
 class Finding:
     """The result of a law.
 
-    figure     the measured size of the violation; compared with `tolerance`
-    tolerance  the largest figure that passes, and `reason`, its justification
-    shown      the figure in words, where a number alone is unclear; `allowed` the tolerance in the same unit
-    worst      the worst case in words; `at` its pair of directions, for the command that repeats it
-    settings   the parameter values of the worst case, where they are not the given ones
-    problems   violations that fail the law whatever the figure
+    figure     measured size of the violation; compared with `tolerance`
+    tolerance  largest figure that passes; `reason` is its justification
+    shown      the figure as text, if a number alone is unclear; `allowed` is the tolerance in the same unit
+    worst      description of the worst case; `at` is its pair of directions, for the command that repeats it
+    settings   parameter values of the worst case, if they are not the given ones
+    problems   violations that fail the law regardless of the figure
     notes      further information
-    breach     the size to compare with a declared breach, where that is not the figure
+    breach     size to compare with a declared violation, if that is not the figure
     evidence   data of the report's figure
     details    data for the law's own `bias` and `ratios`
     """
@@ -79,11 +79,11 @@ class DoesNotApply(Exception):
 class Verdict:
     """A law's verdict on one subject.
 
-    places  number of parameter settings at which it was judged, the given one included
-    bias    of a failure or a declared breach, the effect on a picture; None where it is unknown
-    grade   the severity of that; None likewise
-    cause   of a failure, the probable mistake; "" where none is clear
-    reproduction  of a failure of one of Mitsuba's plugins, a program that shows it without Gonio
+    places  number of parameter settings at which it was tested, including the given one
+    bias    for a failure or a declared violation, the effect on a picture; None if unknown
+    grade   the severity of that effect; None if unknown
+    cause   for a failure, the probable mistake; "" if none is clear
+    reproduction  for a failure of a Mitsuba plugin, a program that shows it without Gonio
     """
 
     number: int
@@ -122,10 +122,10 @@ class Verdict:
 class Card:
     """All verdicts on one subject.
 
-    covered    the parameter values at which it was judged
+    covered    the parameter values at which it was tested
     notes      its behavior: what it printed, what ended its process
-    quality    of its sampling; None where it could not be measured
-    p_values   of its statistical tests, and `threshold` below which they rejected
+    quality    of its sampling; None if it could not be measured
+    p_values   p-values of its statistical tests, and `threshold` below which they rejected
     """
 
     subject: Subject

@@ -1,4 +1,4 @@
-"""The figure of a capture: photographs, what was made of their pixels, the fit beside them, and how sure it is."""
+"""The figure of a capture: photographs, the classification of their pixels, the fit to them, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -18,40 +18,41 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
-COLOURS = ("#d9dee4", "#4d9a6a", "#c8354a", "#39465a", "#e0a030")  # beside the sample, then FATES
-LARGEST = 50.0  # % at which the scale of differences and of errors ends at most
+COLORS = ("#d9dee4", "#4d9a6a", "#c8354a", "#39465a", "#e0a030")  # outside the sample, then one per fate
+MAX_PERCENT = 50.0  # upper limit of the scales of differences and of errors
 
 
-def draw(found: Capture) -> Drawing:
+def draw(capture: Capture) -> Drawing:
     """The first photograph of a sample with the fit to it and the difference, the fate of its pixels, and over theta_h
-    and theta_d the samples' values and their standard errors; grey where nothing was seen."""
+    and theta_d the samples' values and their standard errors; gray without samples."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    shot = next(one for one in found.photographs if one.shot.sample != "reference")
+    shot = next(one for one in capture.photographs if one.shot.sample != "reference")
     with matplotlib.rc_context(figures.STYLE):
-        rows = 2 if found.fitted is not None else 1
+        rows = 2 if capture.fitted is not None else 1
         figure = Figure(figsize=(11.0, 3.6 * rows + 0.8), layout="constrained")
         axes = figure.subplots(rows, 3, squeeze=False)
         last = axes[-1]
-        if found.fitted is not None:
-            _beside(axes[0], found, shot)
-            _fates(last[0], found, shot)
+        if capture.fitted is not None:
+            _compare(axes[0], capture, shot)
+            _fates(last[0], capture, shot)
         else:
             _photograph(last[0], shot, "photograph")
-        _values(last[1], found)
-        _errors(last[2], found)
-        title = found.fit.text if found.fitted is not None else f"{len(found.samples.count)} samples"
+        _values(last[1], capture)
+        _errors(last[2], capture)
+        title = capture.fit.text if capture.fitted is not None else f"{len(capture.samples.count)} samples"
         figure.suptitle("\n".join(textwrap.wrap(title, 130)[:3]), fontsize=9)
-        counts = ", ".join(f"{found.counts[fate]} {fate}" for fate in FATES)
-        figure.supxlabel(f"pixels of {len(found.chosen.maps)} photographs: {counts}", fontsize=9)
-    return Drawing(figure, str(found))
+        counts = ", ".join(f"{capture.counts[fate]} {fate}" for fate in FATES)
+        figure.supxlabel(f"pixels of {len(capture.chosen.maps)} photographs: {counts}", fontsize=9)
+    return Drawing(figure, str(capture))
 
 
-def _beside(axes: list[Axes], found: Capture, shot: Photograph) -> None:
-    fitted = found.fitted
-    assert fitted is not None, "asked before"
-    lamp = found.scene.names.index(shot.shot.light)
+def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
+    """The photograph, the fit to it, and the difference."""
+    fitted = capture.fitted
+    assert fitted is not None, "the caller has checked it"
+    lamp = capture.scene.names.index(shot.shot.light)
     part = next(one for one in fitted.problem.parts if one.kind == shot.shot.sample)
     chosen = part.at(np.flatnonzero(part.lamp == lamp))
     predicted, _ = fitted.problem.predicted(chosen, fitted.numbers, False)
@@ -64,7 +65,7 @@ def _beside(axes: list[Axes], found: Capture, shot: Photograph) -> None:
     off = np.full(shot.radiance.shape[:2], np.nan)
     level = np.maximum(chosen.value.mean(axis=1), 1e-3 * white)
     off[row, column] = 100.0 * (predicted - chosen.value).mean(axis=1) / level
-    end = min(max(float(np.nanpercentile(np.abs(off), 98.0)), 1.0), LARGEST)
+    end = min(max(float(np.nanpercentile(np.abs(off), 98.0)), 1.0), MAX_PERCENT)
     image = axes[2].imshow(off, cmap="RdBu_r", vmin=-end, vmax=end, interpolation="nearest")
     axes[2].set_title("difference", fontsize=10)
     axes[2].set_axis_off()
@@ -77,29 +78,29 @@ def _photograph(axis: Axes, shot: Photograph, title: str) -> None:
 
 
 def _picture(axis: Axes, radiance: Floats, white: float, title: str) -> None:
-    """Linear radiance as a screen shows it; what has no value is light grey."""
+    """Linear radiance encoded for a screen; light gray without a value."""
     shown = np.clip(np.nan_to_num(radiance / white, nan=0.8), 0.0, 1.0) ** (1.0 / 2.2)
     axis.imshow(shown, interpolation="nearest")
     axis.set_title(title, fontsize=10)
     axis.set_axis_off()
 
 
-def _fates(axis: Axes, found: Capture, shot: Photograph) -> None:
+def _fates(axis: Axes, capture: Capture, shot: Photograph) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    codes = found.chosen.maps[shot.name]
-    axis.imshow(codes, cmap=ListedColormap(list(COLOURS)), vmin=-0.5, vmax=4.5, interpolation="nearest")
-    there = [number for number in range(1, len(COLOURS)) if np.any(codes == number)]
-    handles = [Patch(color=COLOURS[number], label=FATES[number - 1]) for number in there]
+    codes = capture.chosen.maps[shot.name]
+    axis.imshow(codes, cmap=ListedColormap(list(COLORS)), vmin=-0.5, vmax=4.5, interpolation="nearest")
+    there = [number for number in range(1, len(COLORS)) if np.any(codes == number)]
+    handles = [Patch(color=COLORS[number], label=FATES[number - 1]) for number in there]
     axis.legend(handles=handles, loc="lower right", fontsize=8, frameon=True, framealpha=0.9)
-    axis.set_title("what became of its pixels", fontsize=10)
+    axis.set_title("classification of its pixels", fontsize=10)
     axis.set_axis_off()
 
 
-def _values(axis: Axes, found: Capture) -> None:
-    """Samples by theta_h and theta_d, the mean over phi_d."""
-    total, count = _binned(found, found.samples.table.values)
+def _values(axis: Axes, capture: Capture) -> None:
+    """Samples over theta_h and theta_d, averaged over phi_d."""
+    total, count = _binned(capture, capture.samples.table.values)
     with np.errstate(invalid="ignore"):
         value = total / count[..., None]
     white = max(float(np.nanpercentile(np.cbrt(np.abs(value)), 97.0)), 1e-6)
@@ -110,10 +111,10 @@ def _values(axis: Axes, found: Capture) -> None:
     _angles(axis)
 
 
-def _binned(found: Capture, values: Floats) -> tuple[Floats, Floats]:
+def _binned(capture: Capture, values: Floats) -> tuple[Floats, Floats]:
     from ..instruments.capture.pixels import CELLS, half_difference
 
-    theta_h, theta_d, _ = half_difference(*found.samples.table.pairs())
+    theta_h, theta_d, _ = half_difference(*capture.samples.table.pairs())
     row = np.minimum((np.sqrt(theta_h / (0.5 * np.pi)) * CELLS[0]).astype(int), CELLS[0] - 1)
     column = np.minimum((theta_d / (0.5 * np.pi) * CELLS[1]).astype(int), CELLS[1] - 1)
     total, count = np.zeros((*CELLS[:2], 3)), np.zeros(CELLS[:2])
@@ -122,11 +123,11 @@ def _binned(found: Capture, values: Floats) -> tuple[Floats, Floats]:
     return total, count
 
 
-def _errors(axis: Axes, found: Capture) -> None:
-    sure = 100.0 * found.samples.confidence()
-    end = min(max(float(np.nanpercentile(sure, 95.0)), 0.1), LARGEST) if np.isfinite(sure).any() else 1.0
+def _errors(axis: Axes, capture: Capture) -> None:
+    error = 100.0 * capture.samples.confidence()
+    end = min(max(float(np.nanpercentile(error, 95.0)), 0.1), MAX_PERCENT) if np.isfinite(error).any() else 1.0
     image = axis.imshow(
-        sure.T, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", cmap="viridis_r", vmin=0.0, vmax=end
+        error.T, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", cmap="viridis_r", vmin=0.0, vmax=end
     )
     assert axis.figure is not None
     axis.figure.colorbar(image, ax=axis, shrink=0.85).set_label("%", fontsize=8)
@@ -135,7 +136,7 @@ def _errors(axis: Axes, found: Capture) -> None:
 
 
 def _angles(axis: Axes) -> None:
-    axis.set_facecolor(figures.FAINT)  # where nothing was seen
+    axis.set_facecolor(figures.FAINT)  # where there are no samples
     degrees = (0.0, 2.0, 10.0, 30.0, 60.0, 90.0)
     axis.set_xticks([float(np.sqrt(d / 90.0)) for d in degrees], [f"{d:g}" for d in degrees])
     axis.set_yticks([0.0, 30.0, 60.0, 90.0])

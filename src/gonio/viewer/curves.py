@@ -1,7 +1,7 @@
-"""What a material does with light, as numbers to draw: values and density in the plane of incidence, albedo.
+"""Scattering by a material as numbers to plot: values and density in the plane of incidence, albedo.
 
-`wo`, toward the viewer, leans to the left by theta_o; angles to the right of the normal, where a mirror would send the
-light, count positive.
+`wo`, toward the viewer, is tilted to the left by theta_o; angles to the right of the normal, on the side of the mirror
+direction, are positive.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from ..material import BSDF
 
 Floats = NDArray[np.floating]
 
-STEP = 0.05  # degrees between directions: a GGX lobe of alpha 0.01 is 0.6 degrees wide at half its height
+STEP = 0.05  # degrees between directions: a GGX lobe of alpha 0.01 is 0.6 degrees wide at half maximum
 SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, about 0.2 % of noise
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One view: values and density over the angle of wi (degrees), and what delta lobes reflect where. Both are nan
-    where the material's values are not known."""
+    """One view: values and density over the angle of wi (degrees), and the reflectance of delta lobes. The former are
+    nan where the material's values are not known."""
 
     view: float
     angles: Floats
@@ -36,18 +36,18 @@ class Curve:
         return self.values.mean(axis=1)
 
     @property
-    def grey(self) -> bool:
+    def gray(self) -> bool:
         values = np.nan_to_num(self.values)
         return bool(np.ptp(values, axis=1).max() <= 1e-4 * values.max())
 
     @property
     def peak(self) -> float:
-        """The highest value or density that is known."""
+        """The highest known value or density."""
         return max(float(np.nan_to_num(self.mean).max()), float(np.nan_to_num(self.pdf).max()))
 
     @property
     def full(self) -> bool:
-        """Whether it goes around below the surface."""
+        """Whether it extends below the surface."""
         return bool(self.angles[-1] > 90)
 
     def side(self, side: int) -> NDArray[np.bool_]:
@@ -77,19 +77,19 @@ def _toward(view: float) -> Floats:
 def _deltas(bsdf: BSDF, view: float) -> tuple[tuple[float, float], ...]:
     u = (np.arange(64) + 0.5) / 64
     drawn = bsdf.sample(np.broadcast_to(_toward(view), (64, 3)), np.stack([u, np.full(64, 0.5), np.full(64, 0.5)], 1))
-    found: dict[float, float] = {}
+    deltas: dict[float, float] = {}
     for index in np.flatnonzero(np.asarray(drawn.delta) & (np.asarray(drawn.pdf) > 0)):
         x, _, z = np.asarray(drawn.wi)[index]
-        # A delta lobe's share of the power: its weight times the probability with which it is chosen, without
-        # the (eta_o/eta_i)^2 of transmitted radiance.
+        # The fraction of the power in a delta lobe: its weight times its probability, without the factor
+        # (eta_o/eta_i)^2 of transmitted radiance.
         probability, eta = float(np.asarray(drawn.pdf)[index]), float(np.asarray(drawn.eta)[index])
         strength = float(np.mean(np.asarray(drawn.weight)[index])) * probability * eta**2
-        found[round(math.degrees(math.atan2(x, z)), 2)] = strength
-    return tuple(found.items())
+        deltas[round(math.degrees(math.atan2(x, z)), 2)] = strength
+    return tuple(deltas.items())
 
 
 def albedo(bsdf: BSDF, views: Floats) -> Floats:
-    """Share of the power that leaves, (views, channels): the mean weight of stratified samples.
+    """Fraction of the power that leaves, (views, channels): the mean weight of stratified samples.
 
     Transmitted radiance carries (eta_o/eta_i)^2; power does not, hence the factor sample.eta^2.
     """
@@ -97,7 +97,7 @@ def albedo(bsdf: BSDF, views: Floats) -> Floats:
     count = SAMPLES * SAMPLES
     x, y = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
     cells = np.stack([x.ravel(), y.ravel()], axis=1)
-    # The lobe's number is stratified too, in an order of its own.
+    # The number that selects the lobe is stratified too, in an independent order.
     u = np.concatenate([rng.permutation(count)[:, None] / count, cells / SAMPLES], axis=1)
     u = u + rng.random(u.shape) * [1 / count, 1 / SAMPLES, 1 / SAMPLES]
     rows = []

@@ -1,4 +1,4 @@
-"""Figures of energy: baked tables with axes, and the compensations side by side."""
+"""Figures of energy: baked tables with axes, and a comparison of compensations."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ SLICES = 4  # of a table with three axes, at most
 
 
 class _Panel(NamedTuple):
-    """One picture of a figure: a table over roughness and mu, or a curve."""
+    """One panel of a figure: a table over roughness and mu, or a curve."""
 
     title: str
     values: np.ndarray
-    curve: str = ""  # the axis that it runs along
+    curve: str = ""  # the axis of a curve
 
 
 def draw_tables(folder: str | Path) -> figures.Drawing:
-    """Draw a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
+    """Plot a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
 
-    Slices of a third axis stand side by side; E_avg, and what depends on the cosine alone, is a curve.
+    Slices of a third axis are placed side by side; E_avg, and anything that depends on the cosine alone, is a curve.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -60,7 +60,7 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
 
 
 def _levels(baked: Baked) -> Figure:
-    """The levels of an environment as a screen shows them: as bright that a twentieth of the map is white."""
+    """The levels of an environment encoded for a screen, with an exposure at which a twentieth of the map is white."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -97,7 +97,7 @@ def _title(manifest: dict[str, Any]) -> str:
 
 
 def _rows(baked: Baked, name: str) -> list[list[_Panel]]:
-    """The pictures of one table, a row for each channel that means something else: slices of a third axis."""
+    """The panels of one table, a row per distinct channel: slices of a third axis."""
     values, dims = baked.arrays[name], baked.manifest["dims"][name]
     if not dims:
         return []
@@ -120,7 +120,7 @@ def _rows(baked: Baked, name: str) -> list[list[_Panel]]:
 
 
 def _place(axis: str, value: float) -> str:
-    """A node of a third axis in words."""
+    """A node of a third axis as text."""
     if axis == "phi":
         return f"phi = {np.degrees(value):.0f}°"
     return f"eta = {(1.0 + value) / (1.0 - value):.2f}"
@@ -132,47 +132,48 @@ def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
         axes.imshow(panel.values, origin="lower", extent=(0, 1, 0, 1), cmap="gray", vmin=0, vmax=1)
         axes.set(xlabel="s(n.v) / s(1)" if stretched else "n.v", ylabel="roughness", title=panel.title)
         return
-    colours = figures.CHANNELS if panel.values.ndim == 2 else (figures.INK,)
-    for column, colour in zip(np.atleast_2d(panel.values.T), colours, strict=True):
-        axes.plot(baked.arrays[panel.curve], column, color=colour)
+    colors = figures.CHANNELS if panel.values.ndim == 2 else (figures.INK,)
+    for column, color in zip(np.atleast_2d(panel.values.T), colors, strict=True):
+        axes.plot(baked.arrays[panel.curve], column, color=color)
     top = max(1.02, 1.02 * float(panel.values.max()))
     axes.set(xlabel="n.v" if panel.curve == "mu" else panel.curve, xlim=(0, 1), ylim=(0, top), title=panel.title)
     axes.set_box_aspect(1)
     axes.grid()
 
 
-def plot_comparison(found: dict[str, Any], folder: Path) -> None:
+def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
     """Write compensation.png and compensation.json to a folder: albedo against roughness, and distance to the walk."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(figures.STYLE):
         figure = Figure(figsize=(13, 6.4), layout="constrained")
-        _compare(found, figure.subplots(2, len(found["albedo"])))
+        _compare(comparison, figure.subplots(2, len(comparison["albedo"])))
         picture = io.BytesIO()
         figure.savefig(picture, dpi=120, format="png", facecolor="white")
-    files.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": json.dumps(found).encode()})
+    numbers = json.dumps(comparison).encode()
+    files.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": numbers})
 
 
-def _compare(found: dict[str, Any], axes: Any) -> None:
-    """A column for each material: albedo of every method above, its distance to the walk below."""
-    roughness = found["roughness"]
-    middle = len(found["mu"]) // 2
-    colours = {m: f"C{index}" for index, m in enumerate(found["cost"])}
+def _compare(comparison: dict[str, Any], axes: Any) -> None:
+    """One column per material: albedo by every method above, its distance to the walk below."""
+    roughness = comparison["roughness"]
+    middle = len(comparison["mu"]) // 2
+    colors = {m: f"C{index}" for index, m in enumerate(comparison["cost"])}
     walk = {"color": "black", "marker": "o", "linestyle": "none", "fillstyle": "none"}
-    for column, name in enumerate(found["albedo"]):
-        by_method = {m: np.asarray(v) for m, v in found["albedo"][name].items()}
-        referee = by_method["random walk"]
+    for column, name in enumerate(comparison["albedo"]):
+        by_method = {m: np.asarray(v) for m, v in comparison["albedo"][name].items()}
+        reference = by_method["random walk"]
         for method, value in by_method.items():
-            line = {"color": colours[method], "linestyle": "--" if method in ("plain", "fdez-aguera") else "-"}
+            line = {"color": colors[method], "linestyle": "--" if method in ("plain", "fdez-aguera") else "-"}
             style = walk if method == "random walk" else line
             axes[0, column].plot(roughness, value[:, middle].mean(-1), label=method, **style)
             if method not in ("random walk", "plain"):
-                distance = np.sqrt(np.mean((value - referee) ** 2, axis=(1, 2)))
+                distance = np.sqrt(np.mean((value - reference) ** 2, axis=(1, 2)))
                 axes[1, column].plot(roughness, distance, label=method, **line)
         axes[0, column].set(title=name, xlabel="roughness", ylim=(0, 1.05))
         axes[1, column].set(xlabel="roughness")
-    axes[0, 0].set_ylabel(f"albedo at mu = {found['mu'][middle]:g}, mean of channels")
+    axes[0, 0].set_ylabel(f"albedo at mu = {comparison['mu'][middle]:g}, mean of channels")
     axes[1, 0].set_ylabel("RMS distance to the walk")
     axes[0, 0].legend(fontsize=7)
     axes[1, 1].legend(fontsize=7)

@@ -1,4 +1,4 @@
-"""`gonio compare` and `go.compare`: how far one picture, or one material, is from another, and where."""
+"""`gonio compare` and `go.compare`: the difference between two pictures, or two materials, and where it is."""
 
 from __future__ import annotations
 
@@ -55,21 +55,21 @@ def compare(
     output: str | Path | None = None,
     encoding: str = "srgb",
 ) -> metrics.Comparison | Difference:
-    """Say how far a picture is from another, or a material from another.
+    """Measure the difference of a picture from another, or of a material from another.
 
         go.compare("mine.exr", "reference.exr", metric="flip", tolerance=0.05).passed
         go.compare(go.OrenNayar(sigma=0.5), "lambert").largest
 
     test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top; or two materials,
                      of which the second may be text
-    metric           what `tolerance` and the map are for: of pictures "relmse", "rmse" or "flip", of materials "mean",
-                     "largest" or "albedo"; None is the first
-    tolerance        the most that passes
+    metric           for `tolerance` and the map: for pictures "relmse", "rmse" or "flip", for materials "mean",
+                     "largest" or "albedo"; None is the first of these
+    tolerance        the largest value that passes
     output           file of a map of the error, .png, .pdf or .svg; None writes nothing
     encoding         of .png files: "srgb", or "linear" for data such as a table
-    Returns a Comparison with all metrics and whether it passed; of materials a Difference: where f and the albedo
+    Returns a Comparison with all metrics and whether it passed; for materials, a Difference: where f and the albedo
     differ. FLIP is that of high dynamic range, unless a picture is a .png. Raises InputError for pictures that cannot
-    be read or differ in size, and for what is neither a picture nor a material.
+    be read or differ in size, and for arguments that are neither pictures nor materials.
     """
     if output is not None:
         figures.check_output(Path(output))
@@ -78,40 +78,41 @@ def compare(
     judged = metrics.Tolerance(metric or "relmse", tolerance)
     a, b = _picture(test, "test", encoding), _picture(reference, "reference", encoding)
     try:
-        found = metrics.compare(a.pixels, b.pixels, a.hdr and b.hdr, judged)
+        comparison = metrics.compare(a.pixels, b.pixels, a.hdr and b.hdr, judged)
     except InputError as error:
         raise InputError(error.what, f"{a.path}, {b.path}", error.hint) from error
     if output is not None:
         draw(a, b, judged.metric).save(output)
-    return found if a.hdr and b.hdr else replace(found, encoding=encoding)
+    return comparison if a.hdr and b.hdr else replace(comparison, encoding=encoding)
 
 
 def compare_materials(
     test: object, reference: object, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
-    """As `compare`, of two materials, both of which may be text."""
+    """As `compare`, for two materials, both of which may be text."""
     named = []
     for one in (test, reference):
         if not isinstance(one, BSDF | str):
-            raise InputError(f"{type(one).__name__} given, a material expected", "compare", "compare two of a kind")
+            what, hint = f"{type(one).__name__} given, a material expected", "compare two materials or two pictures"
+            raise InputError(what, "compare", hint)
         named.append((notation.written(one), one) if isinstance(one, BSDF) else (one, notation.named(one)[0]))
     (name_a, a), (name_b, b) = named
-    found = difference(a, b, metric, tolerance)
+    compared = difference(a, b, metric, tolerance)
     if output is not None:
-        difference_map.draw(name_a, name_b, a, b, found).save(output)
-    return found
+        difference_map.draw(name_a, name_b, a, b, compared).save(output)
+    return compared
 
 
 def _picture(given: str | Path | ArrayLike | BSDF, name: str, encoding: str) -> images.Picture:
     if isinstance(given, BSDF):
-        raise InputError("a picture and a material", "compare", "compare two of a kind, the material first")
+        raise InputError("a picture and a material", "compare", "compare two materials or two pictures")
     if isinstance(given, str | Path):
         return images.read(given, encoding)
     return images.Picture(np.asarray(given, np.float32), Path(name))
 
 
 def error_of(test: images.Picture, reference: images.Picture, metric: str) -> NDArray[np.floating]:
-    """The (H, W) map whose mean (rmse: root of the mean of squares) is the metric."""
+    """The (H, W) map whose mean is the metric (for rmse, the root of the mean of its squares)."""
     if metric == "flip":
         return metrics.flip_map(test.pixels, reference.pixels, test.hdr and reference.hdr)
     if metric == "relmse":
@@ -121,8 +122,8 @@ def error_of(test: images.Picture, reference: images.Picture, metric: str) -> ND
 
 
 def draw(test: images.Picture, reference: images.Picture, metric: str) -> figures.Drawing:
-    """Draw the map. The range is 0 to 1 for FLIP, else 0 to the 99.5th percentile, so that a few fireflies do
-    not turn the rest black; the bar shows by its arrow that there is more above."""
+    """Draw the map. The range is 0 to 1 for FLIP, otherwise 0 to the 99.5th percentile, so that a few fireflies do
+    not darken the rest; an arrow on the color bar shows that there are larger values."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -132,7 +133,7 @@ def draw(test: images.Picture, reference: images.Picture, metric: str) -> figure
     height, width = error.shape
     scale = min(1.0, 3000 / width) if width >= 480 else max(1, 480 // width)
     shown_width, shown_height = width * scale, height * scale
-    # The bar lies below: pictures are wide more often than high.
+    # The bar is at the bottom, since most pictures are wide.
     left, top, bottom = 16, 58, 62
     total_width, total_height = shown_width + 2 * left, shown_height + top + bottom
     with matplotlib.rc_context(figures.STYLE):
@@ -140,7 +141,7 @@ def draw(test: images.Picture, reference: images.Picture, metric: str) -> figure
         FigureCanvasAgg(figure)
         box = (left / total_width, bottom / total_height, shown_width / total_width, shown_height / total_height)
         axes = figure.add_axes(box)
-        # Magma: its lightness grows evenly, so that steps of error look like steps, also in grey print.
+        # Magma's lightness is uniform, so equal steps of error look equal, also in gray print.
         shown = axes.imshow(error, cmap="magma", vmin=0, vmax=highest, interpolation="antialiased", aspect="auto")
         axes.set_axis_off()
         bar_width = min(shown_width, 420)
@@ -150,7 +151,7 @@ def draw(test: images.Picture, reference: images.Picture, metric: str) -> figure
         bar.outline.set_linewidth(0.5)
         bar.ax.tick_params(labelsize=8, length=2)
         x = left / total_width
-        names = f"{test.path.name} against {reference.path.name}"
+        names = f"{test.path.name} and {reference.path.name}"
         figure.text(x, 1 - 26 / total_height, names, fontsize=12, fontweight="bold", va="baseline")
         about = f"{_TITLES[metric]}; mean {error.mean():.4g}, largest {error.max():.4g}"
         figure.text(x, 1 - 45 / total_height, about, fontsize=9, color=figures.SOFT, va="baseline")

@@ -1,6 +1,6 @@
-"""What `gonio explain` says of members of families that are no materials, and of the families themselves.
+"""The output of `gonio explain` for members of families other than materials, and for the families themselves.
 
-Verbs are left out: `gonio VERB --help` says it.
+Verbs are not included: `gonio VERB --help` describes them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ WIDTH = 100
 
 
 class Home(NamedTuple):
-    """Where a family's base class stands, and how a member is asked for."""
+    """Where a family's base class is defined, and how a member is used."""
 
     module: str
     base: str
@@ -27,7 +27,7 @@ class Home(NamedTuple):
 
 
 HOMES = (
-    Home("gonio.models", "BSDF", "gonio plot {name}"),
+    Home("gonio.material", "BSDF", "gonio plot {name}"),
     Home("gonio.optics.ndf", "NDF", "--param ndf={name}, gonio bake {name}"),
     Home("gonio.optics.masking", "Masking", "--param masking={name}"),
     Home("gonio.optics.fresnel", "Fresnel", "--param fresnel={name}"),
@@ -35,9 +35,9 @@ HOMES = (
     Home("gonio.verify.laws", "Law", "gonio verify TARGET --law {name}"),
     Home("gonio.shaders.languages", "Language", "gonio emit MODEL --lang {name}"),
     Home("gonio.instruments.surfaces.base", "Surface", "gonio measure --surface {name} -o FILE"),
-    Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --kind {name} -o FILE.gonio"),
+    Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --table {name} -o FILE.gonio"),
     Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values may stand"),
-    Home("gonio.measure.compression.base", "Method", "gonio compress FILE --method {name} -o OUT.gonio"),
+    Home("gonio.measure.compression.base", "Method", "gonio compress FILE --codec {name} -o OUT.gonio"),
     Home("gonio.catalog.documents", "Document", 'in a scene {{"type": "{name}", "file": ...}}'),
     Home("gonio.viewer.panels.base", "Panel", "a panel of gonio view"),
 )
@@ -45,12 +45,12 @@ HOMES = (
 
 @dataclass(frozen=True)
 class MemberPage:
-    """What is known of a member.
+    """The description of a member.
 
     kind      "masking term"
     doc       its docstring
-    formulas  what it defines of its own: name -> what its docstring says
-    use       how it is asked for
+    formulas  its own methods: name -> first line of the docstring
+    use       how it is used
     source    file
     """
 
@@ -65,7 +65,7 @@ class MemberPage:
         return asdict(self)
 
     def text(self, width: int = WIDTH) -> str:
-        """For a terminal of so many columns."""
+        """The page for a terminal with `width` columns."""
         heading = f"{self.name} ({self.kind})"
         lines = [heading, "=" * len(heading), self.doc, ""]
         lines += _listed(self.formulas, width)
@@ -74,7 +74,7 @@ class MemberPage:
 
 @dataclass(frozen=True)
 class FamilyPage:
-    """A family: what its members are, by name, with a line each."""
+    """A family: its members by name, with one line each."""
 
     name: str
     doc: str
@@ -85,29 +85,28 @@ class FamilyPage:
         return asdict(self)
 
     def text(self, width: int = WIDTH) -> str:
-        """For a terminal of so many columns."""
+        """The page for a terminal with `width` columns."""
         heading = _plural(self.name)
         lines = [heading, "=" * len(heading), self.doc, "", *_listed(self.members, width), ""]
         return "\n".join([*lines, f"Use: {self.use}"])
 
 
 def families() -> dict[str, tuple[Family[Any], Home]]:
-    """Every family by the name of its members' kind, "masking term"."""
-    found = ((getattr(import_module(home.module), home.base).family, home) for home in HOMES)
-    return {family.kind: (family, home) for family, home in found}
+    """Every family by the kind of its members, "masking term"."""
+    pairs = ((getattr(import_module(home.module), home.base).family, home) for home in HOMES)
+    return {family.kind: (family, home) for family, home in pairs}
 
 
 def index() -> FamilyPage:
-    """The families, for who asks for none."""
+    """The list of all families, for a call without a name."""
     names = {_plural(kind): ", ".join(family.all()) for kind, (family, _) in families().items()}
     lines = {kind: text for kind, text in names.items() if text}
-    return FamilyPage(
-        "family", "What Gonio has several of, and what a file of yours may add.", lines, "gonio explain NAME"
-    )
+    doc = "The kinds of parts of which Gonio has several, and to which your own files may add."
+    return FamilyPage("family", doc, lines, "gonio explain NAME")
 
 
 def pages(name: str) -> list[MemberPage | FamilyPage]:
-    """What is known of a name: a page for each member that has it, or that of a family. InputError where none has."""
+    """The pages for a name: one per member of that name, or that of a family. InputError for an unknown name."""
     if outside.names_code(name):
         return [_of_code(name)]
     known = families()
@@ -118,26 +117,27 @@ def pages(name: str) -> list[MemberPage | FamilyPage]:
         if _key(name) in _aliases(kind, family):
             return [FamilyPage(kind, _doc(_base(home)), family.titles(), home.use.format(name="NAME"))]
     names = [*(one for family, _ in known.values() for one in family.all()), *map(_plural, known)]
-    raise InputError(f"nothing is called '{name}'", "MODEL", _hint(name, names))
+    raise InputError(f"no member or family has the name '{name}'", "MODEL", _hint(name, names))
 
 
 def _hint(name: str, names: list[str]) -> str:
     near = did_you_mean(name, names)
-    return near if near.startswith("did") else "gonio explain alone lists what there is"
+    return near if near.startswith("did") else "gonio explain without a name lists the families"
 
 
 def _of_code(name: str) -> MemberPage:
-    """Of a class in a file that is a member of a family, or could be."""
+    """The page of a class in a file that is a member of a family, or could be."""
     cls = outside.thing(name, where="MODEL")
     home = next((home for home in HOMES[1:] if isinstance(cls, type) and issubclass(cls, _base(home))), None)
     if home is None:
-        raise InputError(f"{name} is no member of a family", "MODEL", "gonio explain alone lists the families")
+        hint = "gonio explain without a name lists the families"
+        raise InputError(f"{name} is not a member of a family", "MODEL", hint)
     return _page(cls, home)
 
 
 def _base(home: Home) -> type:
-    found: type = getattr(import_module(home.module), home.base)
-    return found
+    base: type = getattr(import_module(home.module), home.base)
+    return base
 
 
 def _page(member: Any, home: Home) -> MemberPage:
@@ -163,12 +163,12 @@ def _page(member: Any, home: Home) -> MemberPage:
 
 
 def _aliases(kind: str, family: Family[Any]) -> set[str]:
-    """What a family may be called: "masking terms", "masking", "maskings"."""
+    """The names of a family: "masking terms", "masking", "maskings"."""
     return {_key(word) for word in (kind, kind.split()[-1], family.group.partition(".")[2], family.where)}
 
 
 def _key(name: str) -> str:
-    """A name in singular, without what separates its words."""
+    """A name in singular, without the separators between its words."""
     return "".join(letter for letter in name.lower() if letter.isalnum()).removesuffix("s")
 
 

@@ -1,4 +1,4 @@
-"""What all our figures share: one look, one way to a file, and values typed on the command line."""
+"""Shared parts of all figures: style, files, and values typed on the command line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, encodable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".pdf", ".svg")
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
-CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of even weight on white
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a6761d", "#56b4e9", "#1d2530")  # for the colour-blind too
+CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of equal weight on white
+# distinguishable for color-blind readers too
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a6761d", "#56b4e9", "#1d2530")
 DASHES = (0, (4, 2))
 STYLE: Any = {  # Matplotlib types its keys one by one
     "font.family": "sans-serif",
@@ -35,16 +36,16 @@ STYLE: Any = {  # Matplotlib types its keys one by one
     "grid.color": FAINT,
     "grid.linewidth": 0.7,
     "legend.frameon": False,
-    "svg.fonttype": "none",  # text stays text
-    "svg.hashsalt": "gonio",  # and the same figure the same file
+    "svg.fonttype": "none",  # text is not converted to paths
+    "svg.hashsalt": "gonio",  # equal figures give equal files
 }
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of ours: a notebook shows it, `save` writes it.
+    """A figure: a notebook shows it, `save` writes it.
 
-    path  where it has been written, None where it has not
+    path  the file that it was written to, or None
     """
 
     figure: Figure
@@ -54,8 +55,8 @@ class Drawing:
 
     def save(self, path: str | Path) -> Drawing:
         """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
-        target = check_output(Path(path))
-        return replace(self, path=files.write_whole(target, lambda part: self._fill(part, target.suffix.lower()[1:])))
+        suffix = _suffix(Path(path))
+        return replace(self, path=files.write_whole(path, lambda part: self._fill(part, suffix[1:])))
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -64,23 +65,34 @@ class Drawing:
 
     def _fill(self, file: Path | BinaryIO, kind: str) -> None:
         import matplotlib
+        from matplotlib.text import Text
 
+        for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse
+            text.set_text(encodable(text.get_text()))
         name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
         with matplotlib.rc_context(STYLE):
-            self.figure.savefig(file, format=kind, dpi=self.dpi, metadata={name: self.about}, facecolor="white")
+            self.figure.savefig(
+                file, format=kind, dpi=self.dpi, metadata={name: encodable(self.about)}, facecolor="white"
+            )
 
 
 def check_output(path: Path) -> Path:
     """Raise InputError where no figure can be written to `path`: before anything is computed."""
-    if path.suffix.lower() not in SUFFIXES:
-        hint = did_you_mean(path.suffix.lower(), SUFFIXES) if path.suffix else "add " + " or ".join(SUFFIXES)
-        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    _suffix(path)
     files.check_file(path)
     return path
 
 
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    return suffix
+
+
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """A figure of so many inches with a heading and nothing else; no window, whatever the notebook uses."""
+    """An empty figure with a heading, its size in inches; no window, whatever backend the notebook uses."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -93,7 +105,7 @@ def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
 
 
 def legend_size(handles: Sequence[Artist], width: float) -> tuple[int, float]:
-    """The columns of a legend along the lower edge of so many inches, and the height that it takes, inches."""
+    """The number of columns of a legend along the lower edge, `width` inches wide, and its height in inches."""
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = min(len(handles), max(1, int(width / (0.75 + 0.075 * longest))))
     return columns, 0.3 + 0.2 * math.ceil(len(handles) / columns)
@@ -105,7 +117,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """A value as typed: JSON where it is, with ".3" for 0.3 allowed; else the text itself."""
+    """A typed value: JSON if possible, where the leading zero is optional; otherwise the text itself."""
     stripped = text.strip()
     with_zeros = re.sub(r"(?<![\w.])\.(?=\d)", "0.", stripped)
     try:
@@ -115,7 +127,7 @@ def parse_value(text: str) -> Any:
 
 
 def split_values(text: str) -> list[Any]:
-    """The values of "1,[2,3],gold": split at commas outside of brackets, braces and quotes."""
+    """The values of "1,[2,3],gold", split at commas outside of brackets, braces and quotes."""
     pieces, depth, quoted, start = [], 0, False, 0
     for at, letter in enumerate(text):
         if letter == '"' and text[at - 1 : at] != "\\":
@@ -134,15 +146,16 @@ def split_values(text: str) -> list[Any]:
 
 
 def show_value(value: object, longest: int = 28) -> str:
-    """A value as a label shows it."""
+    """A value as text for a label."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 64):  # others no float can hold
+    # integers beyond the range of floats are shown as text
+    if isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 64):
         return f"{value:g}"
     if isinstance(value, list | tuple):
         text = "(" + ", ".join(show_value(item) for item in value) + ")"
     elif isinstance(value, dict):
         text = str(value.get("type", json.dumps(value)))
     else:
-        text = str(value)
+        text = encodable(str(value))
     return text if len(text) <= longest else text[: longest - 1] + "…"

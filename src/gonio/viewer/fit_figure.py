@@ -1,4 +1,4 @@
-"""The figure of a fit: what was measured, what was fitted, and where they differ."""
+"""The figure of a fit: the measured values, the fitted ones, and their difference."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Values = Callable[[Floats, Floats], Floats]
 SIZE = 160  # pixels of a sphere, and of an image over theta_h and theta_d
-LIGHT = np.array([-0.5, 0.6, 0.62])  # toward the light, of the spheres
+LIGHT = np.array([-0.5, 0.6, 0.62])  # direction toward the light of the spheres
 SLICES = (20.0, 60.0)  # angles of view, degrees
 
 
 def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
     """Spheres under one light, slices in the plane of incidence, and images over theta_h and theta_d (Burley2012):
-    the data, the fit, and the difference relative to the larger, whose scale ends at 50 %."""
+    the data, the fit, and the difference relative to the larger one, on a scale that ends at 50 %."""
     from matplotlib.figure import Figure
 
     source = table if isinstance(table, Measurement) else read(table)
@@ -88,12 +88,12 @@ def _slices(axes: list[Axes], measured: Values, fitted: Values) -> None:
     for axis, view in zip(axes, SLICES, strict=False):
         wo = np.tile([-np.sin(np.radians(view)), 0.0, np.cos(np.radians(view))], (len(wi), 1))
         a, b = (np.maximum(values(wo, wi), 1e-8) for values in (measured, fitted))
-        for channel, colour in enumerate(figures.CHANNELS):
-            axis.semilogy(np.degrees(angles), a[:, channel], color=colour, linewidth=1.6, alpha=0.45)
-            axis.semilogy(np.degrees(angles), b[:, channel], color=colour, linewidth=1.0, linestyle=figures.DASHES)
+        for channel, color in enumerate(figures.CHANNELS):
+            axis.semilogy(np.degrees(angles), a[:, channel], color=color, linewidth=1.6, alpha=0.45)
+            axis.semilogy(np.degrees(angles), b[:, channel], color=color, linewidth=1.0, linestyle=figures.DASHES)
         top = float(max(a.max(), b.max()))
         axis.set_ylim(max(top * 1e-5, float(min(a.min(), b.min())) * 0.5), top * 2.0)
-        axis.set_title(f"seen from {view:g} degrees", fontsize=10)
+        axis.set_title(f"viewed at {view:g} degrees", fontsize=10)
         axis.set_xlabel("angle of the light, degrees")
         axis.grid(True)
     axes[0].set_ylabel("f cos, 1/sr")
@@ -109,20 +109,20 @@ def _slices(axes: list[Axes], measured: Values, fitted: Values) -> None:
 
 
 def _images(axes: list[Axes], measured: Values, fitted: Values) -> None:
-    """Over theta_h (to the right, by its square root) and theta_d (upward), at phi_d = 90 degrees."""
+    """Images over theta_h (to the right, by its square root) and theta_d (upward), at phi_d = 90 degrees."""
     x, y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
     theta_h, theta_d = x * x * (0.5 * np.pi), y * (0.5 * np.pi)
     wo, wi = pair_at(theta_h.ravel(), theta_d.ravel(), np.full(x.size, 0.5 * np.pi))
     above = (wo[:, 2] > 0.02) & (wi[:, 2] > 0.02)
     pictures = []
     for values in (measured, fitted):
-        found = np.full((x.size, 3), np.nan)
-        found[above] = values(_unit(wo[above]), _unit(wi[above])) / wi[above, 2:]
-        pictures.append(found.reshape(SIZE, SIZE, 3))
-    # values run over decades: the cube root is near to what eyes see
+        radiance = np.full((x.size, 3), np.nan)
+        radiance[above] = values(_unit(wo[above]), _unit(wi[above])) / wi[above, 2:]
+        pictures.append(radiance.reshape(SIZE, SIZE, 3))
+    # values span decades: the cube root approximates perceived lightness
     white = max(float(np.nanpercentile(np.cbrt(np.abs(pictures[0])), 97.0)), 1e-6)
-    for axis, picture, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
-        shown = np.where(np.isnan(picture), 1.0, np.clip(np.cbrt(np.maximum(picture, 0.0)) / white, 0.0, 1.0))
+    for axis, image, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
+        shown = np.where(np.isnan(image), 1.0, np.clip(np.cbrt(np.maximum(image, 0.0)) / white, 0.0, 1.0))
         axis.imshow(shown, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", interpolation="nearest")
         axis.set_title(f"{title}, f by its cube root", fontsize=10)
         _half_difference_axes(axis)
@@ -139,7 +139,7 @@ def _half_difference_axes(axis: Axes) -> None:
 
 
 def _difference(axis: Axes, a: Floats, b: Floats, over_angles: bool = False) -> None:
-    """(b - a) / max(a, b) of the mean of the colours, from -50 to 50 %."""
+    """(b - a) / max(a, b) of the mean over the channels, from -50 to 50 %."""
     one, other = a.mean(-1), b.mean(-1)
     largest = np.maximum(np.maximum(np.abs(one), np.abs(other)), 1e-3 * np.nanmax(np.abs(one)))
     image = axis.imshow(

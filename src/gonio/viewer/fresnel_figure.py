@@ -1,4 +1,4 @@
-"""`gonio plot fresnel`: reflectances over the angle, from both sides, and how far the approximations are off."""
+"""`gonio plot fresnel`: reflectances over the angle, from both sides, and the errors of the approximations."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ Reals: TypeAlias = NDArray[np.float64]
 APPROXIMATIONS = {"schlick": "Schlick", "f82": "F82"}
 ANGLES = np.concatenate([np.linspace(0.0, 80.0, 321), np.linspace(80.0, 90.0, 201)[1:]])  # degrees
 LINES = {"schlick": (0, (5, 2)), "f82": (0, (1, 1.4))}
-INDICES = (0.1, 4.0)  # of the map
-GLASS = (1.05, 3.0)  # at 1 there is no surface, and the curve still ends at 1
+INDICES = (0.1, 4.0)  # range of the map
+GLASS = (1.05, 3.0)  # range without absorption; at 1 there is no surface, but the curve still ends at 1
 
 
 class Index(NamedTuple):
-    """An index that is drawn: its label, its colour, eta and k."""
+    """An index to plot: its label, its color, eta and k."""
 
     label: str
-    colour: str
+    color: str
     eta: float
     k: float
 
@@ -40,7 +40,7 @@ class Index(NamedTuple):
 def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> Drawing:
     """The figure of one interface: of an index eta + i k, or of a metal by name at red, green and blue.
 
-    Raises InputError for an index that no medium has, and an unknown metal.
+    Raises InputError for an impossible index, and for an unknown metal.
     """
     import matplotlib
 
@@ -50,7 +50,7 @@ def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> 
         lines, title = _of_metal(metal)
     else:
         eta = 1.5 if eta is None else eta
-        fresnel.fresnel(0.0, eta, k)  # refuses what no medium has
+        fresnel.fresnel(0.0, eta, k)  # raises for an impossible index
         name = f"{eta:g}" + (f" + {k:g} i" if k else "")
         lines, title = [Index("", figures.PALETTE[0], eta, k)], f"Fresnel reflectance, n = {name}"
     with matplotlib.rc_context(figures.STYLE):
@@ -71,7 +71,7 @@ def _of_metal(name: str) -> tuple[list[Index], str]:
 
 def _figure(title: str, lines: Sequence[Index]) -> Figure:
     glass = all(line.k == 0.0 for line in lines)
-    subtitle = "unpolarized light R = (Rs + Rp) / 2, and each polarization; below, what the approximations add to R"
+    subtitle = "unpolarized light R = (Rs + Rp) / 2, and each polarization; below, the errors of approximations of R"
     figure = figures.blank(13.2, 7.2, title, subtitle)
     left, middle = (figure.add_axes((x, 0.47, 0.255, 0.37)) for x in (0.07, 0.39))
     below_left, below_middle = (figure.add_axes((x, 0.17, 0.255, 0.2)) for x in (0.07, 0.39))
@@ -89,18 +89,18 @@ def _figure(title: str, lines: Sequence[Index]) -> Figure:
 
 
 def _reflectances(axes: Axes, below: Axes, lines: Sequence[Index], side: str) -> None:
-    """Both polarizations, their mean and the approximations; below them the errors."""
+    """Both polarizations, their mean and the approximations; the errors below them."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         width = 1.0 if len(lines) > 1 else 1.4
-        colours = (line.colour,) * 2 if len(lines) > 1 else (figures.PALETTE[2], figures.PALETTE[1])
-        axes.plot(ANGLES, at.R_s, color=colours[0], linewidth=width, alpha=0.55 if len(lines) > 1 else 1.0)
-        axes.plot(ANGLES, at.R_p, color=colours[1], linewidth=width, alpha=0.55 if len(lines) > 1 else 1.0)
-        axes.plot(ANGLES, at.R, color=line.colour, linewidth=2.2)
+        colors = (line.color,) * 2 if len(lines) > 1 else (figures.PALETTE[2], figures.PALETTE[1])
+        axes.plot(ANGLES, at.R_s, color=colors[0], linewidth=width, alpha=0.55 if len(lines) > 1 else 1.0)
+        axes.plot(ANGLES, at.R_p, color=colors[1], linewidth=width, alpha=0.55 if len(lines) > 1 else 1.0)
+        axes.plot(ANGLES, at.R, color=line.color, linewidth=2.2)
         for name in APPROXIMATIONS:
-            found = approximation(name, ANGLES, line)
-            axes.plot(ANGLES, found, color=line.colour, linewidth=1.2, linestyle=LINES[name])
-            below.plot(ANGLES, found - at.R, color=line.colour, linewidth=1.4, linestyle=LINES[name])
+            reflectance = approximation(name, ANGLES, line)
+            axes.plot(ANGLES, reflectance, color=line.color, linewidth=1.2, linestyle=LINES[name])
+            below.plot(ANGLES, reflectance - at.R, color=line.color, linewidth=1.4, linestyle=LINES[name])
         least, critical = float(np.degrees(at.brewster[0])), float(np.degrees(at.critical[0]))
         _mark(axes, least, "Brewster" if line.k == 0.0 else "least Rp", line, len(lines))
         if np.isfinite(critical):
@@ -116,8 +116,8 @@ def _reflectances(axes: Axes, below: Axes, lines: Sequence[Index], side: str) ->
 
 
 def _mark(axes: Axes, angle: float, name: str, line: Index, count: int) -> None:
-    """A line at an angle that has a name; the name stands on the side where the curves are low."""
-    axes.axvline(angle, color=line.colour if count > 1 else figures.SOFT, linewidth=0.8, linestyle=":", zorder=0)
+    """A line at a named angle, labeled on the side where the curves are low."""
+    axes.axvline(angle, color=line.color if count > 1 else figures.SOFT, linewidth=0.8, linestyle=":", zorder=0)
     if count == 1:
         near_left = angle < 25.0
         axes.annotate(
@@ -134,20 +134,20 @@ def _mark(axes: Axes, angle: float, name: str, line: Index, count: int) -> None:
 def _phases(axes: Axes, lines: Sequence[Index]) -> None:
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
-        colours = (line.colour,) * 2 if len(lines) > 1 else (figures.PALETTE[2], figures.PALETTE[1])
-        for phase, colour in zip((at.phase_s, at.phase_p), colours, strict=True):
-            axes.plot(ANGLES, np.degrees(np.unwrap(phase)), color=colour, linewidth=1.4)
+        colors = (line.color,) * 2 if len(lines) > 1 else (figures.PALETTE[2], figures.PALETTE[1])
+        for phase, color in zip((at.phase_s, at.phase_p), colors, strict=True):
+            axes.plot(ANGLES, np.degrees(np.unwrap(phase)), color=color, linewidth=1.4)
     axes.set_title("phase in reflection: p above, s below", fontsize=11, fontweight="bold")
     axes.set_ylabel("degrees")
     _over_angle(axes)
 
 
 def _differences(axes: Axes, lines: Sequence[Index]) -> None:
-    """How far s and p come apart: linear light leaves as elliptic light, circular where it is 90 degrees."""
+    """The phase difference of s and p: linear light becomes elliptic, circular at 90 degrees."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         retardance = np.degrees(np.unwrap(np.angle(-at.r_p * np.conj(at.r_s))))
-        axes.plot(ANGLES, retardance, color=line.colour, linewidth=1.6)
+        axes.plot(ANGLES, retardance, color=line.color, linewidth=1.6)
     axes.set_ylabel("p behind s, degrees")
     axes.set_xlabel("angle of incidence")
     _over_angle(axes)
@@ -168,15 +168,15 @@ def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
     low, high = INDICES if k else GLASS
     etas, angles = np.linspace(low, max(high, *(line.eta * 1.1 for line in lines)), 160), np.linspace(0.0, 90.0, 181)
     errors = schlick_error(etas, angles, k)
-    top = float(np.quantile(np.abs(errors), 0.995))  # a few corners are worse, and would pale all others
+    top = float(np.quantile(np.abs(errors), 0.995))  # a few corners are larger and would dominate the scale
     shown = axes.pcolormesh(
         angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud", rasterized=True
     )
-    levels = np.linspace(-top, top, 16)  # none at 0, where rounding would draw its own
+    levels = np.linspace(-top, top, 16)  # none at 0, where rounding errors would draw extra lines
     contours = axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
     axes.clabel(contours, fontsize=7, fmt="%.3f")
     for line in lines:
-        axes.axhline(line.eta, color=line.colour, linewidth=1.2, linestyle=figures.DASHES)
+        axes.axhline(line.eta, color=line.color, linewidth=1.2, linestyle=figures.DASHES)
     axes.set_title("Schlick minus exact" + (f", k = {k:.3g}" if k else ""), fontsize=11, fontweight="bold")
     axes.set_xlabel("angle of incidence")
     axes.set_ylabel("index eta")
@@ -192,23 +192,23 @@ def _legend(lines: Sequence[Index]) -> list[Artist]:
 
     handles: list[Artist] = []
     if len(lines) > 1:
-        handles += [Line2D([], [], color=line.colour, linewidth=2.2, label=f"R, {line.label}") for line in lines]
+        handles += [Line2D([], [], color=line.color, linewidth=2.2, label=f"R, {line.label}") for line in lines]
         handles.append(Line2D([], [], color=figures.SOFT, linewidth=1.0, label="Rs above, Rp below"))
-        colour = figures.SOFT
+        color = figures.SOFT
     else:
-        colour = lines[0].colour
-        names = {"R": colour, "Rs": figures.PALETTE[2], "Rp": figures.PALETTE[1]}
+        color = lines[0].color
+        names = {"R": color, "Rs": figures.PALETTE[2], "Rp": figures.PALETTE[1]}
         handles += [Line2D([], [], color=c, linewidth=2.0, label=name) for name, c in names.items()]
     styles = APPROXIMATIONS.items()
-    handles += [Line2D([], [], color=colour, linewidth=1.4, linestyle=LINES[k], label=name) for k, name in styles]
+    handles += [Line2D([], [], color=color, linewidth=1.4, linestyle=LINES[k], label=name) for k, name in styles]
     return handles
 
 
-# ---------------------------------------------------------------------- figures as numbers
+# ---------------------------------------------------------------------- the plotted numbers
 
 
 def approximation(name: str, degrees: Reals, index: Index) -> Reals:
-    """R of a Fresnel kind over angles, from the side that eta says."""
+    """R of a Fresnel kind over angles, from the side given by eta."""
     types = backend.types("float64")
     kind = fresnel.kind(name)
     cos, eta = types.float(np.maximum(np.cos(np.radians(degrees)), 0.0)), types.float(index.eta)
@@ -219,7 +219,7 @@ def approximation(name: str, degrees: Reals, index: Index) -> Reals:
 
 
 def schlick_error(etas: Reals, degrees: Reals, k: float = 0.0) -> Reals:
-    """Schlick's curve less the exact reflectance, (index, angle)."""
+    """Schlick's approximation minus the exact reflectance, (index, angle)."""
     eta, angle = np.meshgrid(etas, np.radians(degrees), indexing="ij")
     c = np.maximum(1.0 - np.cos(angle), 0.0)
     at = fresnel.fresnel(angle, eta, k)

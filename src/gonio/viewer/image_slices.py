@@ -1,6 +1,8 @@
-"""Image slices of materials: f over half vector and difference angle at phi_d = 90 degrees, as measured ones are shown.
+"""Image slices of materials: f over half vector and difference angle at phi_d = 90 degrees, as usual for measured
+BRDFs.
 
-At the left edge the highlight, at the top grazing angles with Fresnel's rise, at the bottom retro-reflection.
+The highlight is at the left edge, grazing angles with the rise of Fresnel reflectance at the top, retro-reflection at
+the bottom.
 """
 
 from __future__ import annotations
@@ -20,12 +22,12 @@ if TYPE_CHECKING:
 
 STEPS = 180  # pixels along each axis
 ACROSS = 4  # panels in a row
-LONGEST = 32  # letters over a panel
+LONGEST = 32  # letters of a panel's title
 
 
 def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
-    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, where all pairs are above; nan
-    where it is not known."""
+    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, at which all pairs are above the
+    surface; nan if it is not known."""
     middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
     theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
     wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))
@@ -34,10 +36,10 @@ def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
 
 
 def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
-    """A panel for each material, on the same scale: colours are sRGB of pi f, cut at 1; below 0 they are magenta."""
-    subtitle = "π f at φd = 90°, as sRGB, cut at 1; magenta: below 0"
+    """One panel per material, on the same scale: sRGB of pi f, clamped to 1; values below 0 are magenta."""
+    subtitle = "π f at φd = 90°, as sRGB, clamped to 1; magenta: below 0"
     if not all(bsdf.angular_range.everything for bsdf in bsdfs):
-        subtitle += "; grey: not measured"
+        subtitle += "; gray: not measured"
     columns, rows = min(len(bsdfs), ACROSS), -(-len(bsdfs) // ACROSS)
     width, height = max(0.5 + 3.3 * columns, 5.2), 0.8 + 3.5 * rows
     figure = figures.blank(width, height, title, subtitle)
@@ -56,6 +58,6 @@ def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
         axes.set_xlabel("θh, half vector")
         axes.set_ylabel("θd, difference")
         if len(bsdfs) > 1:
-            short = label if len(label) <= LONGEST else "…" + label[1 - LONGEST :]  # a path is told by its end
+            short = label if len(label) <= LONGEST else "…" + label[1 - LONGEST :]  # the end of a path identifies it
             axes.set_title(short, fontsize=10, fontweight="bold")
     return figure

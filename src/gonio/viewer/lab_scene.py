@@ -1,4 +1,4 @@
-"""A lab scene's materials on balls, under its light: what `gonio view SCENE` shows."""
+"""A lab scene's materials on balls, under its light, for `gonio view SCENE`."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from .stage import CAMERA, SUN, Ball, Camera, Light, Material, Row, Stage, Value
 
 Vector: TypeAlias = "NDArray[np.float64]"
 
-LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
-BALLS = 5  # a row
+LARGEST_IMAGE = 1024  # largest width of an environment in a page; a wider one is downsampled
+BALLS = 5  # per row
 ENVIRONMENT: Light = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
 
 
@@ -31,12 +31,11 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
     """The materials of a lab scene on balls, under its light.
 
     Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
-    directional light: it shines from where the lamp stands, seen from the point that the camera looks at, as bright
-    as the lamp is there with nothing in between. An environment, and a lamp around that point, is light from all
-    around. A texture, which has no place on a page of sliders, is replaced by its parameter's default, and a note says
-    so.
+    directional light from the lamp's direction, as seen from the point that the camera looks at, with the lamp's
+    unoccluded irradiance there. An environment, and a lamp that surrounds that point, becomes an environment. A texture
+    cannot be shown by sliders: it is replaced by its parameter's default, with a note.
 
-    Raises InputError as the reader of scenes does: also where a file lies outside the scene's folder.
+    Raises InputError as the reader of scenes does, including for a file outside the scene's folder.
     """
     description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code, names_output=False)
     parts = _materials(description)
@@ -53,22 +52,22 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
 
 
 def _materials(description: schema.SceneDescription) -> list[MaterialPart]:
-    """The distinct materials, in the order of the shapes; a shape without one is matte."""
-    found: list[MaterialPart] = []
+    """The distinct materials, in the order of the shapes; the default material for a shape without one."""
+    distinct: list[MaterialPart] = []
     for shape in description.shapes:
         part = shape.material or BY_TYPE["matte"](type="matte")
-        if part not in found:
-            found.append(part)
-    return found
+        if part not in distinct:
+            distinct.append(part)
+    return distinct
 
 
 def _bsdf(part: MaterialPart, description: schema.SceneDescription) -> BSDF:
-    """The material with its numbers, those of named presets too; a textured one has its default."""
+    """The material with its numbers, including those of named presets; textures are replaced by defaults."""
     return replaced(part.instance(description.locate), dict(_indices(part)))
 
 
 def _indices(part: MaterialPart, path: str = "") -> Iterator[tuple[str, Value]]:
-    """The values that presets stand for, by path."""
+    """The values of presets, by path."""
     if part.preset is not None:
         for name, value in notation.settings(part.model.preset(part.preset)).items():
             yield tree.join(path, name), value
@@ -90,7 +89,7 @@ def _textured(part: MaterialPart) -> Iterator[str]:
 
 
 def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
-    """Materials of one code (model, choices, number of widths) share rows; each ball has its own numbers."""
+    """Materials with the same code (model, choices, number of alphas) share rows; each ball has its own values."""
     groups: dict[tuple[object, ...], list[BSDF]] = {}
     for bsdf in bsdfs:
         groups.setdefault(_code(bsdf), []).append(bsdf)
@@ -105,7 +104,7 @@ def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
 
 
 def _code(bsdf: BSDF) -> tuple[object, ...]:
-    """What shapes a material's shader."""
+    """Everything that determines a material's shader."""
     facts: list[object] = [(path, type(inner)) for path, inner in tree.walk(bsdf)]
     for path, parameter, value, _ in tree.leaves(bsdf):
         if not parameter.numeric:
@@ -118,7 +117,8 @@ def _code(bsdf: BSDF) -> tuple[object, ...]:
 
 
 def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
-    """A ball each, named by what tells it from the others; its numbers are those in which it differs from the first."""
+    """A ball per material, labeled by its distinguishing values; it stores those that differ from the first
+    material."""
     values = [
         {leaf.path: _listed(leaf.value) for leaf in tree.leaves(member) if leaf.parameter.numeric} for member in members
     ]
@@ -134,7 +134,7 @@ def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
 
 
 def _text(value: float | list[float]) -> str:
-    return " ".join(f"{v:.3g}".removeprefix("0") or "0" for v in (value if isinstance(value, list) else [value]))
+    return " ".join(f"{v:.3g}" for v in (value if isinstance(value, list) else [value]))
 
 
 def _listed(value: ArrayLike) -> float | list[float]:
@@ -146,18 +146,18 @@ def _listed(value: ArrayLike) -> float | list[float]:
 
 
 def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], list[str]]:
-    """The scene's lights as the page has them, and notes on what became of them."""
+    """The scene's lights in the page's format, and notes on those that are changed."""
     placed = description.camera.transform
     target = np.array(placed.look_at, float)
     axes, _ = _axes(placed)
-    found: list[Light] = []
+    lights: list[Light] = []
     notes: list[str] = []
     for light in description.lights:
-        if isinstance(light, schema.AreaLight) and _surrounds(light, target):  # nothing from beyond arrives
+        if isinstance(light, schema.AreaLight) and _surrounds(light, target):  # it blocks all other lights
             return ({**ENVIRONMENT, "constant": [float(x) for x in spectra.colour(light.energy)]},), []
     for light in description.lights:
         if isinstance(light, schema.EnvironmentLight):
-            found.append(_environment(description, light, axes))
+            lights.append(_environment(description, light, axes))
             continue
         if isinstance(light, schema.SpotLight):
             away = np.array(light.position, float) - target
@@ -169,28 +169,29 @@ def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], li
             away, irradiance = _area(light, target)
         distance = float(np.linalg.norm(away))
         if distance == 0.0:
-            notes.append("a lamp stands where the camera looks at; it is left out")
+            notes.append("a lamp at the camera's target is omitted")
             continue
         direction = [float(axis @ away) / distance for axis in axes]
-        found.append({"type": "directional", "direction": direction, "irradiance": [float(x) for x in irradiance]})
-    if not found:
-        notes.append("the scene has no light; the page's own is on")
+        lights.append({"type": "directional", "direction": direction, "irradiance": [float(x) for x in irradiance]})
+    if not lights:
+        notes.append("the scene has no light; the page uses its default light")
         return (SUN,), notes
-    return tuple(found), notes
+    return tuple(lights), notes
 
 
 def _surrounds(light: schema.AreaLight, target: Vector) -> bool:
     """Whether a lamp is a sphere around the point."""
     if not isinstance(light.shape, schema.Sphere):
         return False
-    centre = (light.shape.transform.matrix() @ [*light.shape.center, 1.0])[:3]
-    return float(np.linalg.norm(centre - target)) < light.shape.radius
+    center = (light.shape.transform.matrix() @ [*light.shape.center, 1.0])[:3]
+    return float(np.linalg.norm(center - target)) < light.shape.radius
 
 
 def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
-    """(the page's x, y, z in the scene, elevation of the camera): the scene turned so that its camera looks along -z.
+    """(the page's x, y, z axes in the scene, elevation of the camera): the scene rotated so that its camera looks along
+    -z.
 
-    Where up is the scene's +y, it stays so and the camera keeps its elevation; else the camera's own axes are taken.
+    If the scene's up is +y, it is preserved and the camera has its elevation; otherwise the camera's own axes are used.
     """
     back = np.array(placed.position, float) - np.array(placed.look_at, float)
     back /= np.linalg.norm(back)
@@ -204,44 +205,44 @@ def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
 
 
 def _area(light: schema.AreaLight, target: Vector) -> tuple[Vector, Vector]:
-    """(vector to the lamp's middle, irradiance on a surface that faces it): L A cos / r^2, as if it were far away."""
+    """(vector to the lamp's center, irradiance on a surface that faces it): L A cos / r^2, as for a distant lamp."""
     shape, radiance = light.shape, np.array(spectra.colour(light.energy))
     matrix = shape.transform.matrix()
     if isinstance(shape, schema.Parallelogram):
         edge0, edge1 = (matrix[:3, :3] @ np.array(edge, float) for edge in (shape.edge0, shape.edge1))
-        centre = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
+        center = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
         area_vector = np.cross(edge0, edge1)
-        away = centre - target
-        seen = abs(float(area_vector @ away)) / max(float(np.linalg.norm(away)), 1e-12)
+        away = center - target
+        projected = abs(float(area_vector @ away)) / max(float(np.linalg.norm(away)), 1e-12)
     elif isinstance(shape, schema.Sphere):
         away = (matrix @ [*shape.center, 1.0])[:3] - target
-        seen = math.pi * shape.radius**2
+        projected = math.pi * shape.radius**2
     else:
         away = matrix[:3, 3] - target
-        seen = float(abs(np.linalg.det(matrix[:3, :3]))) ** (2 / 3) * math.pi
-    return away, radiance * seen / max(float(away @ away), 1e-12)
+        projected = float(abs(np.linalg.det(matrix[:3, :3]))) ** (2 / 3) * math.pi
+    return away, radiance * projected / max(float(away @ away), 1e-12)
 
 
 def _environment(description: schema.SceneDescription, light: schema.EnvironmentLight, axes: Vector) -> Light:
     source = light.texture if light.texture is not None else light.radiance
-    found = {**ENVIRONMENT, "rotation": -math.atan2(axes[2][0], axes[2][2])}
+    data = {**ENVIRONMENT, "rotation": -math.atan2(axes[2][0], axes[2][2])}
     assert source is not None  # the reader has checked that one is given
     if not isinstance(source, ImageTexture):
-        return {**found, "constant": [float(x) for x in spectra.colour(source)]}
-    where = description.where("/scene/lights")
-    path, inside = description.locate(source.file, where), documents.inside(source.file)[1]
+        return {**data, "constant": [float(x) for x in spectra.colour(source)]}
+    location = description.where("/scene/lights")
+    path, inside = description.locate(source.file, location), documents.inside(source.file)[1]
     srgb = source.color_space == "srgb"
-    pixels = textures.load_image(path, where, srgb=srgb, channel=source.channel, inside=inside)
+    pixels = textures.load_image(path, location, srgb=srgb, channel=source.channel, inside=inside)
     pixels = pixels * np.asarray(source.factor, np.float32)
     pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     halves = np.ones((*pixels.shape[:2], 4), "<f2")
     halves[..., :3] = np.clip(pixels, 0.0, np.finfo(np.float16).max)
-    data = base64.b64encode(halves.tobytes()).decode()
-    return {**found, "image": {"width": pixels.shape[1], "height": pixels.shape[0], "data": data}}
+    encoded = base64.b64encode(halves.tobytes()).decode()
+    return {**data, "image": {"width": pixels.shape[1], "height": pixels.shape[0], "data": encoded}}
 
 
 def _smaller(pixels: np.ndarray) -> np.ndarray:
-    """Averaged over whole blocks until it is at most LARGEST_IMAGE wide."""
+    """The pixels averaged over blocks, at most LARGEST_IMAGE wide."""
     factor = -(-pixels.shape[1] // LARGEST_IMAGE)
     if factor == 1:
         return pixels

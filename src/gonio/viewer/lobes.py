@@ -1,4 +1,4 @@
-"""Lobes as polar diagrams: a panel for each direction of view, the materials over each other."""
+"""Lobes as polar diagrams: one panel per direction of view, with all materials in it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 _DELTA = "#b5651d"
 _HALO = {"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-_RADIUS = 1.45  # of a panel's disc, inches
+_RADIUS = 1.45  # radius of a panel's disk, inches
 
 
 def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
     """The figure. `panels` has a list for each view, with the curve of each material in the order of the labels.
-    `known` says at which angles values are known.
+    `known` states the angles at which values are known.
 
-    Each panel has a scale of its own: peaks differ by orders of magnitude.
+    Each panel has its own scale, since peaks differ by orders of magnitude.
     """
     columns = len(panels) if len(panels) <= 3 else math.ceil(len(panels) / 2)
     rows = math.ceil(len(panels) / columns)
@@ -38,7 +38,7 @@ def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], k
     height = top + rows * panel_height + bottom
     mean = " (mean of the channels)" if len(labels) > 1 else ""
     subtitle = f"value f |cos θi|{mean} and sampling density over wi, in 1/sr"
-    subtitle += "; reflection and transmission have a scale each" if full else "; each panel has its own scale"
+    subtitle += "; reflection and transmission have separate scales" if full else "; each panel has its own scale"
     figure = figures.blank(width, height, title, subtitle + known)
     indent = (width - columns * panel_width) / 2
     for index, curves in enumerate(panels):
@@ -61,26 +61,26 @@ def _handles(labels: Sequence[str], curves: Sequence[Curve]) -> list[Artist]:
 
     handles: list[Artist] = []
     if len(labels) > 1:
-        for label, colour in zip(labels, figures.PALETTE, strict=False):
-            face = to_rgba(colour, 0.12)
-            handles.append(Patch(facecolor=face, edgecolor=colour, linewidth=1.4, label=label))
-    elif all(curve.grey for curve in curves):
-        colour = figures.CHANNELS[2]
-        handles.append(Patch(facecolor=to_rgba(colour, 0.2), edgecolor=colour, linewidth=1.4, label="value"))
+        for label, color in zip(labels, figures.PALETTE, strict=False):
+            face = to_rgba(color, 0.12)
+            handles.append(Patch(facecolor=face, edgecolor=color, linewidth=1.4, label=label))
+    elif all(curve.gray for curve in curves):
+        color = figures.CHANNELS[2]
+        handles.append(Patch(facecolor=to_rgba(color, 0.2), edgecolor=color, linewidth=1.4, label="value"))
     else:
         names = zip(figures.CHANNELS, ("red", "green", "blue"), strict=True)
-        handles += [Line2D([], [], color=colour, label=f"value, {name}") for colour, name in names]
+        handles += [Line2D([], [], color=color, label=f"value, {name}") for color, name in names]
     ink = figures.INK if len(labels) == 1 else figures.SOFT
     handles.append(Line2D([], [], color=ink, linestyle=figures.DASHES, linewidth=1, label="sampling density"))
     if any(curve.deltas for curve in curves):
-        colour = _DELTA if len(labels) == 1 else figures.SOFT
-        label = "delta lobe, its share"
-        handles.append(Line2D([], [], color=colour, linewidth=2, marker="^", markersize=6, label=label))
+        color = _DELTA if len(labels) == 1 else figures.SOFT
+        label = "delta lobe, its albedo"
+        handles.append(Line2D([], [], color=color, linewidth=2, marker="^", markersize=6, label=label))
     return handles
 
 
 def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
-    """A polar diagram in plain axes: the disc has radius 1, the normal points up, wi is at (sin, cos)."""
+    """A polar diagram in plain axes: the disk has radius 1, the normal points up, wi is at (sin, cos)."""
     axes.set_axis_off()
     view = curves[0].view
     axes.text(0, 1.24, f"θo = {view:g}°", fontsize=12, fontweight="bold", ha="center", va="baseline")
@@ -92,19 +92,19 @@ def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
                 _lobe(axes, curve, side, 1 / (1.06 * peak), figures.PALETTE[index] if len(curves) > 1 else "")
     x, y = math.sin(-math.radians(view)), math.cos(math.radians(view))
     _arrow(axes, x, y, figures.SOFT, 1)
-    # Labels stand beside their arrows, on the upper side; where the arrow is steep, on the left.
+    # Labels are next to their arrows, on the upper side, or on the left of steep arrows.
     aside = (y, -x) if view > 20 else (-1, 0)
     x, y = 0.8 * x + 0.08 * aside[0], 0.8 * y + 0.08 * aside[1]
     axes.text(x, y, "wo", fontsize=9.5, color=figures.SOFT, ha="center", va="center")
     for index, curve in enumerate(curves):
-        colour = _DELTA if len(curves) == 1 else figures.PALETTE[index]
+        color = _DELTA if len(curves) == 1 else figures.PALETTE[index]
         for angle, strength in curve.deltas:
             x, y = math.sin(math.radians(angle)), math.cos(math.radians(angle))
-            _arrow(axes, x, y, colour, 2)
-            # Those of several materials may lie on each other: their shares stand one below the other.
+            _arrow(axes, x, y, color, 2)
+            # Labels of coincident arrows are placed below each other.
             along = 0.55 + 0.16 * index
             x, y = along * x - 0.12 * y, along * y + 0.12 * x
-            axes.text(x, y, f"{strength:.2f}", fontsize=9.5, color=colour, ha="center", va="center")
+            axes.text(x, y, f"{strength:.2f}", fontsize=9.5, color=color, ha="center", va="center")
 
 
 def _peak(curve: Curve, side: int) -> float:
@@ -112,35 +112,35 @@ def _peak(curve: Curve, side: int) -> float:
     return max(float(np.nan_to_num(values[inside]).max(initial=0)) for values in (curve.values, curve.pdf))
 
 
-def _lobe(axes: Axes, curve: Curve, side: int, radius: float, colour: str) -> None:
-    """Values and density on one side of the surface, times `radius`; `colour` is the material's, "" where alone."""
+def _lobe(axes: Axes, curve: Curve, side: int, radius: float, color: str) -> None:
+    """Values and density on one side of the surface, times `radius`; `color` is the material's, "" for a single one."""
     theta = np.radians(curve.angles)
 
     def place(values: Floats) -> tuple[Floats, Floats]:
-        # The other side is zero, which puts it at the origin: the outline closes there, and where nothing is known.
+        # The other side and unknown values are 0, that is at the origin, where the outline closes.
         r = np.nan_to_num(np.where(curve.side(side), values, 0)) * radius
         return r * np.sin(theta), r * np.cos(theta)
 
-    if colour or curve.grey:
-        channels, colours, fill = [curve.mean], [colour or figures.CHANNELS[2]], 0.12 if colour else 0.2
+    if color or curve.gray:
+        channels, colors, fill = [curve.mean], [color or figures.CHANNELS[2]], 0.12 if color else 0.2
     else:
-        channels, colours, fill = list(curve.values.T), list(figures.CHANNELS), 0.07
-    for channel, of_channel in zip(channels, colours, strict=False):
+        channels, colors, fill = list(curve.values.T), list(figures.CHANNELS), 0.07
+    for channel, of_channel in zip(channels, colors, strict=False):
         axes.fill(*place(channel), color=of_channel, alpha=fill, linewidth=0)
         axes.plot(*place(channel), color=of_channel, linewidth=1.6)
-    axes.plot(*place(curve.pdf), color=colour or figures.INK, linewidth=1, linestyle=figures.DASHES)
+    axes.plot(*place(curve.pdf), color=color or figures.INK, linewidth=1, linestyle=figures.DASHES)
 
 
-def _arrow(axes: Axes, x: float, y: float, colour: str, width: float) -> None:
-    arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "linewidth": width}
+def _arrow(axes: Axes, x: float, y: float, color: str, width: float) -> None:
+    arrow = {"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0, "linewidth": width}
     axes.annotate("", (x, y), (0, 0), arrowprops=arrow)
 
 
 def _grid(axes: Axes, side: int, peak: float, full: bool) -> None:
     """Half a polar grid; `side` 1 is above the surface, -1 below.
 
-    Rings carry their value: of a half disc below the surface line, where nothing is drawn; of a full disc in
-    their own half, on the left, where least is.
+    Rings are labeled with their value: in a half disk below the surface line, where the plot is empty; in a full disk
+    in the same half, on the left.
     """
     ticks = _round_ticks(peak)
     arc = np.linspace(-math.pi / 2, math.pi / 2, 181)

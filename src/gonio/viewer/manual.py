@@ -1,4 +1,4 @@
-"""A material's manual page, from its docstring and its declared facts: for `gonio explain` and for docs/models."""
+"""A material's manual page from its docstring and declared facts, for `gonio explain` and docs/models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _WIDTH = 100
 
 @dataclass(frozen=True)
 class Row:
-    """What is declared of one parameter; `default` is "required" where there is none."""
+    """The declaration of a parameter; `default` is "required" if there is none."""
 
     name: str
     doc: str
@@ -26,7 +26,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Page:
-    """All that the manual says of a material; `breaks` has the reason by the name of the law."""
+    """The manual page of a material; `breaks` has the reason by the name of the law."""
 
     name: str
     title: str
@@ -51,7 +51,7 @@ class Page:
         return "\n".join([*lines, "", f"Mitsuba plugin `{self.plugin}`. Source: `{self.source}`.", ""])
 
     def text(self, width: int = _WIDTH) -> str:
-        """For a terminal of so many columns."""
+        """The page for a terminal with `width` columns."""
         indent = max((len(row.name) for row in self.parameters), default=0) + 4
 
         def filled(text: str, at: int, first: str = "") -> str:

@@ -1,6 +1,6 @@
-"""What the page and the server say to each other: JSON in, JSON and frames out. docs/viewer.md describes it.
+"""The messages between page and server: JSON in, JSON and frames out. docs/viewer.md describes them.
 
-Everything that comes in is checked here, so that the rest may trust it: types, ranges, finite numbers, and sizes.
+All input is validated here (types, ranges, finite numbers, and sizes), so that the rest of the server can rely on it.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from .page import PageData
 
 TEXT_BYTES = 64 << 10  # a scene of 64 balls with all their parameters is a tenth of this
 UPLOAD_BYTES = 64 << 20  # an environment of 4096 x 2048 half floats in RGBA
-MOST_PIXELS = 1920 * 1080
-MOST_BALLS, MOST_LIGHTS = 64, 16
+MAX_PIXELS = 1920 * 1080
+MAX_BALLS, MAX_LIGHTS = 64, 16
 
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
 Positive = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e9)]
 Vector = tuple[Number, Number, Number]
-Colour = tuple[Positive, Positive, Positive]
+Color = tuple[Positive, Positive, Positive]
 Key = Annotated[str, Field(pattern=r"^[0-9A-Za-z_-]{1,80}$")]
 Path = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]{0,120}$")]
-Parameter = Annotated[float, Field(allow_inf_nan=False, ge=-3e38, le=3e38)]  # fits of He-Torrance have specular = 3e13
+Parameter = Annotated[float, Field(allow_inf_nan=False, ge=-3e38, le=3e38)]  # fits of He-Torrance reach specular = 3e13
 Value = Parameter | tuple[Parameter, Parameter] | tuple[Parameter, Parameter, Parameter]
 Choice = Annotated[str, Field(max_length=80)] | bool
 
@@ -41,7 +41,7 @@ def _direction(vector: Vector) -> Vector:
 
 
 class Part(BaseModel):
-    """Strict: no unknown keys, no text where a number is meant."""
+    """The base of messages: no unknown keys, no text for a number."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -49,13 +49,13 @@ class Part(BaseModel):
 class Directional(Part):
     type: Literal["directional"]
     direction: Annotated[Vector, AfterValidator(_direction)]
-    irradiance: Colour
+    irradiance: Color
 
 
 class Point(Part):
     type: Literal["point"]
     position: Vector
-    intensity: Colour
+    intensity: Color
 
 
 class Area(Part):
@@ -63,11 +63,11 @@ class Area(Part):
     center: Vector
     u: Annotated[Vector, AfterValidator(_direction)]
     v: Annotated[Vector, AfterValidator(_direction)]
-    radiance: Colour
+    radiance: Color
 
 
 class Image(Part):
-    """A picture that was uploaded, or came with the page."""
+    """A picture that was uploaded, or is part of the page."""
 
     key: Key
 
@@ -75,7 +75,7 @@ class Image(Part):
 class Environment(Part):
     type: Literal["environment"]
     image: Image | None = None
-    constant: Colour = (1.0, 1.0, 1.0)
+    constant: Color = (1.0, 1.0, 1.0)
     rotation: Number = 0.0
     scale: Positive = 1.0
 
@@ -94,18 +94,18 @@ class Camera(Part):
 class Row(Part):
     material: Key
     choices: dict[Path, Choice] = Field(default_factory=dict, max_length=32)
-    balls: list[dict[Path, Value]] = Field(min_length=1, max_length=MOST_BALLS)
+    balls: list[dict[Path, Value]] = Field(min_length=1, max_length=MAX_BALLS)
 
 
 class State(Part):
     rows: list[Row] = Field(min_length=1, max_length=8)
-    lights: list[Light] = Field(max_length=MOST_LIGHTS)
+    lights: list[Light] = Field(max_length=MAX_LIGHTS)
     camera: Camera
     spacing: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 2.4
 
 
 class Scene(Part):
-    """Show this from now on; a newer one ends it."""
+    """Show this scene; a newer one replaces it."""
 
     type: Literal["scene"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -119,14 +119,14 @@ class Scene(Part):
 
 
 class Ack(Part):
-    """Frame `frame` is on the screen: the next may come."""
+    """Frame `frame` is on the screen: the next one may be sent."""
 
     type: Literal["ack"]
     frame: Annotated[int, Field(ge=0, lt=2**53)]
 
 
 class Upload(Part):
-    """The next binary message is an environment, float16 RGBA, row 0 on top; lights name it by its key."""
+    """The next binary message is an environment, float16 RGBA, row 0 on top; lights refer to it by its key."""
 
     type: Literal["upload", "environment"]
     key: Key
@@ -139,8 +139,8 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Ask for a material's shader with other choices, with these weights (`on`) that are off by themselves, and with
-    tables that are found from these values (`fixed`)."""
+    """Request a material's shader with other choices, with these weights (`on`) although they are off, and with tables
+    for these values (`fixed`)."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -156,7 +156,7 @@ _message: TypeAdapter[Message] = TypeAdapter(Message)
 
 
 def parse(text: str) -> Scene | Ack | Upload | Wish:
-    """The message in a text; InputError says what is wrong with it and where."""
+    """The message in a text; InputError describes an invalid one."""
     if len(text) > TEXT_BYTES:
         raise InputError(f"a message of {len(text)} characters", "message", f"send at most {TEXT_BYTES}")
     try:
@@ -166,7 +166,7 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
         place = "/".join(str(part) for part in first["loc"])
         raise InputError(_short(first["msg"]), _short(place) or "message", "see docs/viewer.md") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"no message: {error}", "message", "see docs/viewer.md") from None
+        raise InputError(f"not a message: {error}", "message", "see docs/viewer.md") from None
     if isinstance(message, Scene):
         _check(message)
     if isinstance(message, Upload) and message.size > UPLOAD_BYTES:
@@ -176,48 +176,48 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
 
 
 def _short(text: str, most: int = 200) -> str:
-    """What was wrong may be as long as the message."""
+    """The text, shortened: an error may be as long as the message."""
     return text if len(text) <= most else text[: most - 4] + " ..."
 
 
 def _check(scene: Scene) -> None:
-    if scene.width * scene.height > MOST_PIXELS:
-        raise InputError(f"{scene.width} x {scene.height} pixels", "scene", f"ask for at most {MOST_PIXELS}")
+    if scene.width * scene.height > MAX_PIXELS:
+        raise InputError(f"{scene.width} x {scene.height} pixels", "scene", f"ask for at most {MAX_PIXELS}")
     balls = sum(len(row.balls) for row in scene.state.rows)
-    if balls > MOST_BALLS:
-        raise InputError(f"{balls} balls", "scene/state/rows", f"show at most {MOST_BALLS}")
+    if balls > MAX_BALLS:
+        raise InputError(f"{balls} balls", "scene/state/rows", f"show at most {MAX_BALLS}")
     if sum(isinstance(light, Environment) for light in scene.state.lights) > 1:
         raise InputError("more than one environment", "scene/state/lights", "keep one")
 
 
 def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
-    """The pixels of an upload: (height, width, 3) float32; InputError where they are not what was announced."""
+    """The pixels of an upload: (height, width, 3) float32; InputError if they do not match the announcement."""
     if len(content) != upload.size:
-        raise InputError(f"{len(content)} bytes came, {upload.size} were announced", "upload", "send float16 RGBA")
+        raise InputError(f"{len(content)} bytes received, {upload.size} were announced", "upload", "send float16 RGBA")
     pixels = np.frombuffer(content, "<f2").reshape(upload.height, upload.width, 4)[..., :3].astype(np.float32)
     if not np.isfinite(pixels).all() or pixels.min() < 0:
-        raise InputError("the picture holds values that are no radiance", "upload", "mend negative and infinite ones")
+        raise InputError("the picture has negative or infinite values", "upload", "remove them")
     return pixels
 
 
 def failure(error: GonioError, kind: str = "error", wish: int | None = None) -> str:
-    """An error as the page shows it.
+    """An error as a message to the page.
 
-    kind  "error", which goes by, or "fault": the user's file is broken, until the next "stage"
-    wish  the id of what was asked for and cannot be had
+    kind  "error", shown temporarily, or "fault": an error in the user's file, shown until the next "stage"
+    wish  the id of a request that failed
     """
     asked = {} if wish is None else {"id": wish}
     return json.dumps({"type": kind, **asked, "what": error.what, "where": error.where, "hint": error.hint})
 
 
 def stage(data: PageData) -> str:
-    """Other materials and rows in the place of those that the page has."""
+    """Materials and rows that replace those of the page."""
     parts = {key: data[key] for key in ("revision", "materials", "scene", "dfg")}  # type: ignore[literal-required]
     return json.dumps({"type": "stage", **parts}, allow_nan=False)
 
 
 def frame(header: Mapping[str, object], pixels: NDArray[np.float32]) -> bytes:
-    """A frame: length of the header (uint32), header (JSON, padded so that the pixels lie on 4 bytes), float16 RGBA.
+    """A frame: length of the header (uint32), header (JSON, padded to align the pixels to 4 bytes), float16 RGBA.
 
     pixels  (height, width, 4), row 0 on top
     """

@@ -1,7 +1,7 @@
-"""The page of `gonio view`: its data, and the one HTML file that holds everything it needs.
+"""The page of `gonio view`: its data, and the self-contained HTML file.
 
 The data format is described in docs/viewer.md. Shader code and tables come from `emit`; script and style are the
-prebuilt ones in `static/`, made from `web/`.
+prebuilt files in `static/`, made from `web/`.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from ..energy.tables import bake
 from ..errors import InputError, MachineError, did_you_mean
 from ..material import BSDF, tree
 from ..material.recording import switched_off
-from ..owner import alone
+from ..owner import exclusive
 from ..shaders import bundle as written_for
 from . import panels, stage
 from .stage import PresetData, Stage, Value
 
-Json: TypeAlias = "dict[str, object]"  # what becomes JSON, as docs/viewer.md describes it
+Json: TypeAlias = "dict[str, object]"  # data for JSON, described in docs/viewer.md
 
 
 class VariantData(TypedDict):
-    """A material with some choices made, as shader code.
+    """A material with some choices, as shader code.
 
-    off     paths of weights at whose value of nothing it was written: it does for balls that have them so
-    fixed   values that its tables were found from (`BSDF.fixed`), by path: it does for balls that have them so
-    facets  [distribution, masking] of what reflects in it, where that are facets: which of the page's `dfg` is its own
+    off     paths of weights that were off when it was written: it applies to balls with the same weights off
+    fixed   values that its tables were computed for (`BSDF.fixed`), by path: it applies to balls with the same values
+    facets  [distribution, masking] of the facets that reflect, if any: selects the page's `dfg` table
     """
 
     key: str
@@ -60,7 +60,7 @@ class MaterialData(TypedDict):
 
 
 class SplitSumData(TypedDict):
-    """A and B of the split sum of some facets, over mu (x) and roughness (y), at texel centres."""
+    """A and B of the split sum of some facets, over mu (x) and roughness (y), at texel centers."""
 
     facets: list[str]
     size: list[int]
@@ -69,7 +69,7 @@ class SplitSumData(TypedDict):
 
 
 class PageData(TypedDict):
-    """All that the page is made from."""
+    """All data of the page."""
 
     version: int
     generator: str
@@ -86,25 +86,25 @@ class PageData(TypedDict):
 
 VERSION = 1
 STATIC = Path(__file__).parent / "static"
-# Bilinear lookups are off by 1e-3 (RMS); at low roughness, where B rises within mu < .05, by up to 6e-2.
+# Bilinear lookups have an error of 1e-3 (RMS); at low roughness, where B rises within mu < 0.05, up to 6e-2.
 DFG_SIZE = 64
-# What `energy.curves` lays along x, y, z of its tables, and what a texel holds, by the start of their names.
+# Axes x, y, z of the tables of `energy.curves`, and the content of a texel, by the beginning of their names.
 TABLES = {
     "missing_turned_": (["sqrt(alpha_min / alpha_max)", "sqrt(alpha_max)"], "coefficients of 1 - E(mu, phi)"),
     "missing_glass_": (["roughness", "F0^(1/4)"], "coefficients of 1 - E(mu)"),
     "missing_": (["roughness", "group of four"], "coefficients of 1 - E(mu), F = 1"),
-    "lobe_glass_": (["u", "roughness", "F0^(1/4)"], "mu^2 below which the share u of the missing light lies"),
-    "lobe_": (["u", "roughness"], "mu^2 below which the share u of the missing light lies"),
+    "lobe_glass_": (["u", "roughness", "F0^(1/4)"], "mu^2 below which the fraction u of the missing light lies"),
+    "lobe_": (["u", "roughness"], "mu^2 below which the fraction u of the missing light lies"),
 }
 
 
-@alone
+@exclusive
 def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> PageData:
-    """The page's data, as JSON holds it.
+    """The page's data for JSON.
 
-    socket    where the live reference is reached, such as "/ws?token=..."; None for a page without a server
-    revision  how often the stage was made anew before
-    Raises InputError where a model cannot be written as shader code.
+    socket    address of the live reference, such as "/ws?token=..."; None for a page without a server
+    revision  how many times the stage was rebuilt before
+    Raises InputError if a model cannot be written as shader code.
     """
     used = {row.material for row in what.rows}
     materials = [
@@ -142,7 +142,7 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
 
 
 def _switched_on(what: Stage, key: str) -> set[str]:
-    """Paths of the weights that are not off on some ball of a material."""
+    """Paths of the weights that are on for at least one ball of a material."""
     return {
         leaf.path
         for leaf in tree.leaves(what.materials[key].bsdf)
@@ -152,14 +152,14 @@ def _switched_on(what: Stage, key: str) -> set[str]:
 
 
 def _fixed(what: Stage, key: str) -> list[dict[str, Value]]:
-    """The distinct values on the balls of a material of what its tables are found from."""
+    """The distinct values on the balls of a material that its tables depend on."""
     fixed = what.materials[key].bsdf.fixed
-    found: list[dict[str, Value]] = []
+    distinct: list[dict[str, Value]] = []
     for values in _balls(what, key):
         own = {path: value for path, value in values.items() if path in fixed}
-        if own not in found:
-            found.append(own)
-    return found
+        if own not in distinct:
+            distinct.append(own)
+    return distinct
 
 
 def _balls(what: Stage, key: str) -> list[Mapping[str, Value]]:
@@ -170,26 +170,26 @@ def material_data(
     key: str,
     material: stage.Material,
     on: Collection[str] = (),
-    whole: bool = True,
+    complete: bool = True,
     fixed: Sequence[Mapping[str, Value]] = ({},),
 ) -> MaterialData:
     """A material with its presets and one variant for every combination of its choices, the model's own first.
 
-    on     paths of weights that its balls switch on
-    whole  add variants with every layer, and with what presets choose, for a page that nobody writes another for
-    fixed  values by path, of what its tables are found from: a variant each
+    on        paths of weights that its balls switch on
+    complete  add variants with every layer, and with the choices of presets, for a page that cannot request variants
+    fixed     values by path that its tables depend on: one variant each
     """
     presets = stage.presets(material.bsdf)
     names = list(material.choices)
     combinations: list[dict[str, Value]] = [
         dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())
     ]
-    if whole:
+    if complete:
         chosen = [_choices_of(preset) for preset in presets]
         combinations += [made for i, made in enumerate(chosen) if made and made not in chosen[:i]]
     wanted = [(choices, values) for choices in combinations for values in fixed]
     variants = [variant_data(material.bsdf, choices, on, values) for choices, values in wanted]
-    if whole and any(variant["off"] for variant in variants):
+    if complete and any(variant["off"] for variant in variants):
         every = switched_off(material.bsdf)
         variants += [variant_data(material.bsdf, choices, every, values) for choices, values in wanted]
     return {"id": key, "title": material.title, "presets": presets, "variants": variants}
@@ -199,18 +199,18 @@ def _choices_of(preset: PresetData) -> dict[str, Value]:
     return {path: value for path, value in preset["set"].items() if isinstance(value, str | bool)}
 
 
-@alone
+@exclusive
 def variant_data(
     bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] = (), fixed: Mapping[str, Value] | None = None
 ) -> VariantData:
-    """Shader, manifest and tables of a model with some choices made otherwise, without the layers that are off.
+    """Shader, manifest and tables of a model with other choices, without the layers that are off.
 
-    on     paths of weights that are written all the same
-    fixed  other values of what the tables are found from; InputError for what they do not depend on
+    on     paths of weights that are written although they are off
+    fixed  other values that the tables depend on; InputError for paths on which they do not depend
     """
     own = {leaf.path: leaf.value for leaf in tree.leaves(bsdf) if leaf.path in bsdf.fixed}
     if wrong := next((path for path in fixed or {} if path not in own), None):
-        raise InputError(f"no table is found from '{wrong}'", "fixed", did_you_mean(wrong, sorted(own)))
+        raise InputError(f"no table depends on '{wrong}'", "fixed", did_you_mean(wrong, sorted(own)))
     made = stage.replaced(bsdf, {**choices, **(fixed or {})}, "choices")
     bundle = written_for(made, "glsl", lean=True, on=on)
     tables = {name: encode(values) for name, values in bundle.tables.items()}
@@ -224,7 +224,7 @@ def variant_data(
     fields = {field["path"] for field in manifest["fields"]}
     off = [p["path"] for p in manifest["parameters"] if p["off"] is not None and p["path"] not in fields]
     held = {p["path"]: p["value"] for p in manifest["parameters"] if p["fixed"] and p["value"] is not None}
-    for parameter in manifest["parameters"]:  # a variant's own values are no declaration
+    for parameter in manifest["parameters"]:  # the values of a variant are not the declared ones
         if parameter["path"] in held:
             parameter["value"] = np.asarray(own[parameter["path"]], float).tolist()
     return {
@@ -245,13 +245,13 @@ def _facets(bsdf: BSDF) -> list[str] | None:
 
 
 def encode(values: NDArray[np.floating]) -> str:
-    """Little-endian float32 in base64."""
+    """Values as little-endian float32 in base64."""
     return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
 
 
 @lru_cache
 def split_sum_data(ndf: str, masking: str) -> SplitSumData | None:
-    """A and B of the split sum (Karis2013) for a distribution and a masking term; None where they have no table."""
+    """A and B of the split sum (Karis2013) for a distribution and a masking term; None if they have no table."""
     try:
         values = bake.bake(ndf, lut=["dfg"], size=DFG_SIZE, masking=masking).arrays["dfg"]
     except InputError:
@@ -263,15 +263,15 @@ def split_sum_data(ndf: str, masking: str) -> SplitSumData | None:
 
 
 def html(data: PageData, policy: bool = True) -> str:
-    """One file: style, data and scripts inline, no address in it that a browser would fetch.
+    """One file with style, data and scripts inline, and without addresses that a browser would fetch.
 
-    policy  put the Content-Security-Policy into the file itself; a server sends it as a header instead
+    policy  include the Content-Security-Policy in the file; a server sends it as a header instead
     """
     script, style = _script(), _style()
     more = "".join(f'<script type="module">{panel}</script>\n' for panel in _panels())
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     text = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-    # a file on disk has no secret and no network; programs that drive a browser wait by evaluating text in it
+    # a file on disk has no secret and no network; programs that drive a browser need to evaluate text in it
     own = content_policy().replace("script-src", "script-src 'unsafe-eval'")
     meta = f'<meta http-equiv="Content-Security-Policy" content="{own}">\n' if policy else ""
     return (
@@ -289,7 +289,7 @@ def html(data: PageData, policy: bool = True) -> str:
 
 
 def content_policy(socket: str = "") -> str:
-    """What the page may do: run the scripts that came with it, read what the user drops, reach its own socket."""
+    """The page's permissions: run its own scripts, read files that the user drops, connect to its own socket."""
     connect = " ".join(["blob:", "data:", *([socket] if socket else [])])
     parts = {
         "default-src": "'none'",
@@ -318,7 +318,7 @@ def _panels() -> list[str]:
 
 
 def _inline(script: str) -> str:
-    """Without what would end the element early; in a string or regular expression the backslash changes nothing."""
+    """The script without sequences that would end its element; in a string or regular expression `\\` has no effect."""
     return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
@@ -336,11 +336,11 @@ def _static(name: str) -> str:
 
 
 def export(what: Stage, path: Path) -> Path:
-    """Write the page as one file that needs no server and no network; whole or not at all."""
+    """Write the page as one file that needs no server and no network, completely or not at all."""
     from .. import files
 
     if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"unknown page format '{path.suffix}'", "--export", "give a name that ends in .html")
+        raise InputError(f"unknown page format '{path.suffix}'", "--output", "give a name that ends in .html")
     target = files.check_file(path)
     files.write_whole(target, html(page_data(what)).encode())
     return target

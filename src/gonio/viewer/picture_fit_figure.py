@@ -1,4 +1,4 @@
-"""The figure of a fit to a picture: what was given, what was found, where they differ, and how it went."""
+"""The figure of a fit to a picture: the picture, the fit, their difference, and the loss over the steps."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from ..pictures import exposures, images
 from . import figures
 from .figures import Drawing
 
-LARGEST = 50.0  # % at which the scale of differences ends at most
+MAX_PERCENT = 50.0  # upper limit of the scale of differences
 
 
-def draw(found: PictureFit) -> Drawing:
+def draw(fit: PictureFit) -> Drawing:
     """The picture | the fit | the difference, and the loss after each step."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    height, width = found.wanted.shape[:2]
+    height, width = fit.wanted.shape[:2]
     with matplotlib.rc_context(figures.STYLE):
         figure = Figure(figsize=(12.0, 1.2 + 3.0 * min(max(height / width, 0.5), 1.5)), layout="constrained")
         axes = figure.subplots(1, 4)
-        stops = exposures.stops("auto", found.wanted)
-        for axis, picture, title in zip(axes, (found.wanted, found.fitted), ("picture", "fit"), strict=False):
+        stops = exposures.stops("auto", fit.wanted)
+        for axis, picture, title in zip(axes, (fit.wanted, fit.fitted), ("picture", "fit"), strict=False):
             axis.imshow(images.to_screen(picture, stops), interpolation="nearest")
             axis.set_title(title, fontsize=10)
             axis.set_axis_off()
-        level = np.maximum(found.wanted.mean(axis=2), 0.05 * float(np.median(found.wanted)) + 1e-12)
-        off = 100.0 * (found.fitted - found.wanted).mean(axis=2) / level
-        end = min(max(float(np.percentile(np.abs(off), 98.0)), 1.0), LARGEST)
+        level = np.maximum(fit.wanted.mean(axis=2), 0.05 * float(np.median(fit.wanted)) + 1e-12)
+        off = 100.0 * (fit.fitted - fit.wanted).mean(axis=2) / level
+        end = min(max(float(np.percentile(np.abs(off), 98.0)), 1.0), MAX_PERCENT)
         image = axes[2].imshow(off, cmap="RdBu_r", vmin=-end, vmax=end, interpolation="nearest")
         axes[2].set_title("difference", fontsize=10)
         axes[2].set_axis_off()
         figure.colorbar(image, ax=axes[2], shrink=0.7).set_label("%, red: the fit is brighter", fontsize=8)
-        axes[3].semilogy(range(len(found.losses)), found.losses, color=figures.PALETTE[0], marker="o", markersize=3)
+        axes[3].semilogy(range(len(fit.losses)), fit.losses, color=figures.PALETTE[0], marker="o", markersize=3)
         axes[3].set_title("loss", fontsize=10)
         axes[3].set_xlabel("step")
         axes[3].grid(True)
         axes[3].set_box_aspect(1.0)
-        values = zip(found.names, found.values, found.errors, strict=True)
+        values = zip(fit.names, fit.values, fit.errors, strict=True)
         text = ",  ".join(f"{n} = {v:.4g} +- {1.96 * e:.2g}" for n, v, e in values)
         figure.supxlabel(text if len(text) < 200 else text[:197] + "...", fontsize=8)
-    return Drawing(figure, str(found))
+    return Drawing(figure, str(fit))

@@ -1,4 +1,4 @@
-"""`gonio plot` and `go.plot`: what materials do with light, drawn from their own `eval`, `pdf` and `sample`."""
+"""`gonio plot` and `go.plot`: scattering by materials, plotted from their own `eval`, `pdf` and `sample`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KINDS = ("lobe", "slice", "albedo", "image")
-Colour = str | tuple[float, float, float, float]
+Color = str | tuple[float, float, float, float]
 VIEWS = (0.0, 30.0, 60.0, 80.0)
 _LONGEST = 70  # letters of a title or a label
 
@@ -39,28 +39,28 @@ def plot(
     metal: str | None = None,
     output: str | Path | None = None,
 ) -> Drawing:
-    """Draw materials over each other: their lobes, a slice over angle, their albedo, or image slices side by side.
+    """Plot materials over each other: their lobes, a slice over angle, their albedo, or image slices side by side.
 
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
         go.plot("fresnel", eta=1.5)
 
-    materials  materials, or their text as the command line takes it; or one folder that `go.bake` wrote; or "fresnel",
-               the reflectance of an interface over angle, from both sides, beside its approximations and their errors
+    materials  materials, or their text as on the command line; or one folder written by `go.bake`; or "fresnel",
+               the reflectance of an interface over angle, from both sides, with its approximations and their errors
     kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
                vector and difference angle)
     angles     of wo from the normal, degrees, 0 to below 90; up to 8; not for "albedo" and "image"
-    eta, k     of "fresnel": the index inside over that outside, 1.5 where None; and its imaginary part
-    metal      of "fresnel", in place of an index: "Au", at red, green and blue
+    eta, k     for "fresnel": the index inside over that outside, 1.5 if None; and its imaginary part
+    metal      for "fresnel", instead of an index: "Au", at red, green and blue
     output     file to write, .png, .pdf or .svg; None writes nothing
     Returns a Drawing, which a notebook shows; `.figure` is Matplotlib's.
-    Raises InputError for a material, kind, angle or file that cannot be.
+    Raises InputError for an invalid material, kind, angle or file.
     """
     if output is not None:
         figures.check_output(Path(output))
     if materials == ("fresnel",):
         drawing = fresnel_figure.draw(eta, k, metal)
     elif eta is not None or k or metal is not None:
-        raise InputError("an index is given, and no fresnel to draw", "plot", "name fresnel, or use -p eta=1.5")
+        raise InputError("an index is given without fresnel", "plot", "plot fresnel, or use -p eta=1.5")
     elif len(materials) == 1 and not isinstance(materials[0], BSDF) and is_tables(materials[0]):
         drawing = energy_figures.draw_tables(materials[0])
     else:
@@ -70,31 +70,31 @@ def plot(
 
 
 def is_tables(text: str | Path) -> bool:
-    """Whether this names baked tables. InputError where it is no material either."""
+    """Whether this is a folder of baked tables. InputError if it is not a material either."""
     return operands.kind_of(text, {Kind.TABLES, *operands.MATERIALS}, "MODEL") is Kind.TABLES
 
 
 def _named(material: BSDF | str | Path) -> tuple[str, BSDF]:
-    """A material, and what to call it."""
+    """A material and its label."""
     if isinstance(material, BSDF):
         return notation.written(material), material
     return str(material), notation.named(str(material))[0]
 
 
 def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) -> tuple[float, ...]:
-    """Directions of view that are drawn, degrees: those that somebody knows values of."""
+    """The plotted directions of view, degrees: those at which values are known."""
     known = [bsdf.angular_range.view for _, bsdf in named]
     low, high = min((ends[0] for ends in known), default=0.0), max((ends[1] for ends in known), default=90.0)
     if angles is None:
         return tuple(dict.fromkeys(min(max(view, low), high) for view in VIEWS))
     for angle in angles:
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 <= angle < 90:
-            raise InputError(f"'{angle}' is no angle of view", "--angles", "give degrees from 0 to below 90")
+            raise InputError(f"'{angle}' is not an angle of view", "--angles", "give degrees from 0 to below 90")
         if not low <= angle <= high:
-            what = f"{angle:g} degrees of view asked for, and {named[0][0]} is known from {low:.3g} to {high:.3g}"
+            what = f"{angle:g} degrees of view requested, but {named[0][0]} is known from {low:.3g} to {high:.3g}"
             raise InputError(what, "--angles", f"such as {low:.3g},{high:.3g}")
     if not 1 <= len(angles) <= 8:
-        raise InputError(f"{len(angles)} angles, 1 to 8 can be told apart", "--angles", "such as 0,45")
+        raise InputError(f"{len(angles)} angles given, 1 to 8 expected", "--angles", "such as 0,45")
     return tuple(map(float, angles))
 
 
@@ -104,7 +104,7 @@ def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[flo
     if kind not in KINDS:
         raise InputError(f"unknown kind of plot '{kind}'", "--kind", did_you_mean(kind, KINDS))
     if not 1 <= len(materials) <= len(figures.PALETTE):
-        what = f"{len(materials)} materials, 1 to {len(figures.PALETTE)} can be told apart"
+        what = f"{len(materials)} materials given, 1 to {len(figures.PALETTE)} expected"
         raise InputError(what, "plot", "draw several plots")
     labels = [_shortened(label) for label, _ in materials]
     bsdfs = [bsdf for _, bsdf in materials]
@@ -121,7 +121,7 @@ def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[flo
 
 
 def _known(labels: Sequence[str], bsdfs: Sequence[BSDF]) -> str:
-    """At which angles values are known, to end a subtitle with; "" where they are everywhere."""
+    """The angles at which values are known, as the end of a subtitle; "" if there is no restriction."""
     parts = [
         f"{label} is known at {bsdf.angular_range}" if len(bsdfs) > 1 else f"known at {bsdf.angular_range}"
         for label, bsdf in zip(labels, bsdfs, strict=True)
@@ -135,21 +135,21 @@ def _shortened(text: str) -> str:
 
 
 def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """One material: all views in one frame. Several: a frame for each view, on the same axes.
+    """One material: all views in one frame. Several: one frame per view, on the same axes.
 
-    Logarithmic where the peaks differ by more than 30.
+    Logarithmic if the peaks differ by a factor of more than 30.
     """
     from matplotlib.lines import Line2D
 
     subtitle = f"value f |cos θi|, mean of the channels, over wi in the plane of incidence{known}"
     views = [panel[0].view for panel in panels]
     if len(labels) == 1:
-        colours: list[Colour] = [_colour_of_view(index, len(views)) for index in range(len(views))]
+        colors: list[Color] = [_color_of_view(index, len(views)) for index in range(len(views))]
         names = [f"θo = {view:g}°" for view in views]
     else:
-        colours, names = list(figures.PALETTE), list(labels)
+        colors, names = list(figures.PALETTE), list(labels)
     handles = [
-        *(Line2D([], [], color=c, linewidth=1.8, label=name) for c, name in zip(colours, names, strict=False)),
+        *(Line2D([], [], color=c, linewidth=1.8, label=name) for c, name in zip(colors, names, strict=False)),
         Line2D([], [], color=figures.SOFT, linewidth=1.8, label="value"),
         Line2D([], [], color=figures.SOFT, linewidth=1, linestyle=figures.DASHES, label="sampling density"),
         Line2D([], [], color=figures.SOFT, linewidth=0.8, linestyle=":", label="mirror direction"),
@@ -165,8 +165,8 @@ def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]],
     reach = 180 if any(curve.full for curve in everything) else 90
     top, logarithmic = _scale(everything)
     for axes, panel in zip(frames, panels, strict=True):
-        for index, (curve, colour) in enumerate(zip(panel, colours, strict=False)):
-            _line(axes, curve, colour, index)
+        for index, (curve, color) in enumerate(zip(panel, colors, strict=False)):
+            _line(axes, curve, color, index)
         _frame(axes, reach, 30 if reach == 90 else 45 if len(frames) == 1 else 90)
         axes.set_xlabel("angle θi of wi from the normal (positive: the mirror's side)")
         axes.set_ylabel("1/sr" + (", logarithmic" if logarithmic else ""))
@@ -177,7 +177,7 @@ def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]],
 
 
 def _frames(views: Sequence[float], title: str, subtitle: str, handles: Sequence[Artist]) -> tuple[Figure, list[Axes]]:
-    """A figure with a frame for each view, two in a row, above a legend."""
+    """A figure with one frame per view, two per row, above a legend."""
     columns, rows = min(len(views), 2), math.ceil(len(views) / 2)
     width = max(0.3 + 4.9 * columns, 7.4)
     bottom = figures.legend_size(handles, width)[1]
@@ -195,24 +195,24 @@ def _frames(views: Sequence[float], title: str, subtitle: str, handles: Sequence
 
 
 def _scale(shown: Sequence[Curve]) -> tuple[float, bool]:
-    """The highest value, and whether the axis has to be logarithmic."""
+    """The highest value, and whether the axis must be logarithmic."""
     positive = [curve.peak for curve in shown if curve.peak > 0] or [1.0]
     return max(positive), max(positive) > 30 * min(1.0, *positive)
 
 
-def _line(axes: Axes, curve: Curve, colour: Colour, index: int) -> None:
-    axes.plot(curve.angles, curve.mean, color=colour, linewidth=1.8)
-    axes.plot(curve.angles, curve.pdf, color=colour, linewidth=1, linestyle=figures.DASHES)
-    axes.axvline(curve.view, color=colour, linewidth=0.8, linestyle=":", zorder=0)
+def _line(axes: Axes, curve: Curve, color: Color, index: int) -> None:
+    axes.plot(curve.angles, curve.mean, color=color, linewidth=1.8)
+    axes.plot(curve.angles, curve.pdf, color=color, linewidth=1, linestyle=figures.DASHES)
+    axes.axvline(curve.view, color=color, linewidth=0.8, linestyle=":", zorder=0)
     for angle, strength in curve.deltas:
-        axes.axvline(angle, color=colour, linewidth=2)
-        left = not 90 < angle < 145  # reflection and transmission beside each other, none over the frame's edge
+        axes.axvline(angle, color=color, linewidth=2)
+        left = not 90 < angle < 145  # reflection and transmission on different sides, both within the frame
         axes.annotate(
             f"δ {strength:.2f}",
             (angle, 0.97 - 0.06 * index),
             xycoords=("data", "axes fraction"),
             fontsize=8.5,
-            color=colour,
+            color=color,
             xytext=(-4 if left else 4, 0),
             textcoords="offset points",
             ha="right" if left else "left",
@@ -221,7 +221,7 @@ def _line(axes: Axes, curve: Curve, colour: Colour, index: int) -> None:
 
 
 def _frame(axes: Axes, reach: int, step: int, first: int | None = None) -> None:
-    """Angles along x, from -reach or `first`; no frame above and on the right."""
+    """Angles along x, from -reach or `first`; no frame at the top and on the right."""
     start = -reach if first is None else first
     axes.set_xlim(start, reach)
     axes.set_xticks(range(start, reach + 1, step))
@@ -231,7 +231,7 @@ def _frame(axes: Axes, reach: int, step: int, first: int | None = None) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _colour_of_view(index: int, count: int) -> Colour:
+def _color_of_view(index: int, count: int) -> Color:
     from matplotlib import colormaps
 
     # Viridis without its yellow end, which is too pale on white.
@@ -239,22 +239,22 @@ def _colour_of_view(index: int, count: int) -> Colour:
 
 
 def _albedo(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
-    """Directional albedo over the angle of wo, and the line of energy conservation."""
+    """Directional albedo over the angle of wo, and the limit of energy conservation."""
     known = _known(labels, bsdfs)
-    subtitle = "share of the power that leaves, over wo"
-    subtitle += known or f"; each point {curves.SAMPLES**2} stratified samples"
+    subtitle = "fraction of the power that leaves, over wo"
+    subtitle += known or f"; {curves.SAMPLES**2} stratified samples per point"
     subtitle += "; mean of the channels" if len(bsdfs) > 1 else ""
     figure = figures.blank(7.4, 4.6 if len(bsdfs) == 1 else 5.0, title, subtitle)
     axes = figure.add_axes((0.1, 0.125, 0.86, 0.7) if len(bsdfs) == 1 else (0.1, 0.215, 0.86, 0.625))
     angles = np.concatenate([np.linspace(0, 80, 33), np.linspace(81, 89.5, 18)])
     highest = 0.0
-    for label, bsdf, colour in zip(labels, bsdfs, figures.PALETTE, strict=False):
+    for label, bsdf, color in zip(labels, bsdfs, figures.PALETTE, strict=False):
         low, high = bsdf.angular_range.view
         outside = (angles < low) | (angles > high)
         values = np.where(outside[:, None], np.nan, curves.albedo(bsdf, angles))
         highest = max(highest, float(np.nan_to_num(values).max()))
         if len(bsdfs) > 1:
-            axes.plot(angles, values.mean(axis=1), color=colour, linewidth=2, label=label)
+            axes.plot(angles, values.mean(axis=1), color=color, linewidth=2, label=label)
         elif np.ptp(np.nan_to_num(values), axis=1).max() <= 1e-3:
             axes.plot(angles, values.mean(axis=1), color=figures.CHANNELS[2], linewidth=2)
         else:

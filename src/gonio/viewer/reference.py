@@ -1,21 +1,21 @@
-"""The path-traced truth beside the page's picture: the same balls, lights and camera, by Gonio's own renderer.
+"""The path-traced reference for the page's picture: the same balls, lights and camera, rendered by Gonio.
 
     >>> reference = Reference(stage)
     >>> reference.show(scene)           # a messages.Scene
     >>> while not reference.done:
-    ...     reference.advance()         # some more samples of every pixel, about a twentieth of a second
+    ...     reference.advance()         # more samples of every pixel, about a twentieth of a second
     >>> reference.image()               # (height, width, 4): radiance and coverage
 
 Two kinds of light transport:
 
-"local"  Direct light, one bounce (depth 2). The balls stand in one scene and the lights in another, so that each
-         point sees every light with nothing in between and no ball lights or shadows another: what a shader
-         computes that knows one point. Lights and BSDF are sampled both and weighed (multiple importance sampling).
-"path"   Balls and lights in one scene, with shadows, the light between the balls, and refraction through them.
+"local"  Direct light, one bounce (depth 2). The balls are in one scene and the lights in another, so that each
+         point is lit by every light without occlusion, and no ball illuminates or shadows another: the result of a
+         fragment shader. Light and BSDF sampling are combined (multiple importance sampling).
+"path"   Balls and lights in one scene, with shadows, interreflection, and refraction.
 
-Pixels are averaged over a box one pixel wide. A changed value compiles nothing: parameters, lights and camera are data
-of the kernel and are written into the scene that is there. Another model, choice, number of balls or kind of light
-makes a new scene.
+Pixels are averaged over a box one pixel wide. A changed value compiles nothing: parameters, lights and camera are
+kernel data and are written into the existing scene. Another model, choice, number of balls or kind of light creates a
+new scene.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ from . import messages, stage
 from .stage import Stage
 
 Pixels: TypeAlias = "NDArray[np.float32]"  # (height, width, channels), row 0 on top
-Structure: TypeAlias = tuple[object, ...]  # equal for what one kernel serves
+Structure: TypeAlias = tuple[object, ...]  # equal for scenes that share a kernel
 
-PASS_SECONDS = 0.05  # of work before someone may interrupt: half of what a slider's change may take to be seen
-MOST_PER_PASS = 64
-QUICKEST = PASS_SECONDS / MOST_PER_PASS  # seconds a sample, where none was measured yet
+PASS_SECONDS = 0.05  # per pass, after which it can be interrupted: half of the allowed latency of a slider
+MAX_PER_PASS = 64
+MIN_SECONDS = PASS_SECONDS / MAX_PER_PASS  # per sample, before the first measurement
 
 # Mitsuba's sphere has its axis along z and u from x toward y; the page's has it along y and u from z toward x.
 SPHERE_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 
 
 class Reference:
-    """A picture in the making of what the page shows.
+    """A progressive picture of the page's scene.
 
-    what    materials by key, from which a scene's rows take theirs
+    what    materials by key, from which the rows of a scene are built
     device  "cpu", "cuda" or "auto"
     """
 
@@ -68,9 +68,9 @@ class Reference:
         self._render: foreground.Foreground | None = None
         self._balls = _Balls(self.mi)
         self._lamps = _Lamps(self.mi)
-        self._whole: tuple[tuple[dict[str, Plugin], dict[str, Plugin]], Scene] = (({}, {}), None)
+        self._combined: tuple[tuple[dict[str, Plugin], dict[str, Plugin]], Scene] = (({}, {}), None)
         self._first_pass = 0.0  # seconds
-        self._per_sample = QUICKEST
+        self._per_sample = MIN_SECONDS
 
     @property
     def device(self) -> str:
@@ -86,18 +86,18 @@ class Reference:
         return self._render is None or self.scene is None or self.samples >= self.scene.spp
 
     def show(self, scene: messages.Scene) -> None:
-        """Begin a picture anew; InputError for a material, parameter or picture that is not known."""
+        """Start a picture; InputError for an unknown material, parameter or picture."""
         bsdfs = [self._materials(row, f"rows/{index}") for index, row in enumerate(scene.state.rows)]
         balls = self._balls.place(bsdfs, scene.state.spacing)
         lamps = self._lamps.place(scene.state.lights, self.pictures)
         sensor = self._sensor(scene)
         if scene.transport == "path":
             settings = integrators.Settings("path", max_depth=scene.max_depth)
-            whole = self._together()
-            self._lamps.write(whole, scene.state.lights)
-            render = foreground.Foreground(whole, settings, sensor)
+            combined = self._together()
+            self._lamps.write(combined, scene.state.lights)
+            render = foreground.Foreground(combined, settings, sensor)
         else:
-            # a light without extent is never met by a sampled direction: sampling the BSDF would be for nothing
+            # a sampled direction never hits a light without extent, so the BSDF need not be sampled
             integrator = "direct" if self._lamps.extended else "directSampleLight"
             render = foreground.Foreground(balls, integrators.Settings(integrator), sensor, lamps)
         self.scene, self._render = scene, render
@@ -112,9 +112,9 @@ class Reference:
     def _together(self) -> Scene:
         """Balls and lights in one scene."""
         parts = (self._balls.parts, self._lamps.parts)
-        if any(a is not b for a, b in zip(self._whole[0], parts, strict=True)):
-            self._whole = parts, self.mi.load_dict({"type": "scene", **parts[0], **parts[1]})
-        return self._whole[1]
+        if any(a is not b for a, b in zip(self._combined[0], parts, strict=True)):
+            self._combined = parts, self.mi.load_dict({"type": "scene", **parts[0], **parts[1]})
+        return self._combined[1]
 
     def _sensor(self, scene: messages.Scene) -> Sensor:
         camera, mi = scene.state.camera, self.mi
@@ -129,7 +129,7 @@ class Reference:
                 "type": "perspective",
                 "fov": camera.fov,
                 "fov_axis": "y",
-                "near_clip": 1e-3,  # the clips are literals of the kernel: values that moved would compile one
+                "near_clip": 1e-3,  # the clips are literals of the kernel: other values would compile a new one
                 "far_clip": 1e8,
                 "to_world": mi.ScalarTransform4f().look_at(list(eye), list(target), up),
                 "film": {"type": "hdrfilm", "width": scene.width, "height": scene.height, "rfilter": {"type": "box"}},
@@ -137,27 +137,27 @@ class Reference:
         )
 
     def advance(self) -> None:
-        """Some more samples: one at first, so that there is a picture soon; then as many again as there are, while that
-        takes no more than PASS_SECONDS.
+        """Add samples: one at first, so that there is a picture soon; then as many as there are already, within
+        PASS_SECONDS.
 
-        A pass costs something by itself, in Python, besides its samples. The first pass, of one sample, tells how much;
-        without it a busy machine would seem to need all its time for one sample, and never try two.
+        A pass has an overhead in Python besides its samples, which the first pass, of one sample, measures. Otherwise a
+        busy machine would appear to need all its time for one sample, and would never try two.
         """
         if self.done:
             return
         render, scene = self._render, self.scene
         assert render is not None and scene is not None
-        most = min(render.done, MOST_PER_PASS, scene.spp - render.done, int(PASS_SECONDS / self._per_sample))
+        most = min(render.done, MAX_PER_PASS, scene.spp - render.done, int(PASS_SECONDS / self._per_sample))
         count = max(1, most)
         started = time.perf_counter()
         render.advance(count)
         took = time.perf_counter() - started
         if render.done == count:
-            self._first_pass, self._per_sample = took, QUICKEST
+            self._first_pass, self._per_sample = took, MIN_SECONDS
         elif count > 1:
-            self._per_sample = max((took - self._first_pass) / (count - 1), QUICKEST)
-        else:  # whatever held it up may be over: soon two are tried again
-            self._per_sample = max(self._per_sample / 2, QUICKEST)
+            self._per_sample = max((took - self._first_pass) / (count - 1), MIN_SECONDS)
+        else:  # the delay may be over: soon two are tried again
+            self._per_sample = max(self._per_sample / 2, MIN_SECONDS)
 
     def image(self) -> Pixels:
         """(height, width, 4) float32: linear radiance of the balls alone, averaged over the pixel, and coverage."""
@@ -170,7 +170,7 @@ class Reference:
 
 
 class _Balls:
-    """The balls' scene, kept as long as only values change."""
+    """The balls' scene, reused as long as only values change."""
 
     def __init__(self, mi: ModuleType):
         self.mi = mi
@@ -205,7 +205,7 @@ class _Balls:
         return self.mi.load_dict({"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world), "bsdf": bsdf})
 
     def _plugin(self, bsdf: BSDF) -> PluginDict:
-        """A material as a plugin; numbers as their slots name them."""
+        """A material as a plugin, with numbers named by their slots."""
         plugin: PluginDict = {"type": adapter.register_model(self.mi, type(bsdf))}
         for name, inner in tree.children(bsdf).items():
             plugin[name] = self._plugin(inner)
@@ -219,12 +219,13 @@ class _Balls:
 
 
 def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
-    """The numbers of a material by the adapter's names: two widths are alpha_x and alpha_y, no turn is no slot."""
+    """The numbers of a material by the adapter's names: a pair of alphas is alpha_x and alpha_y, rotation 0 has no
+    slot."""
     slots: dict[str, float | tuple[float, ...]] = {}
     for path, parameter, value, _ in tree.leaves(bsdf):
         if parameter.kind == "spectrum":
-            colour = np.broadcast_to(np.asarray(value, float), 3)
-            slots[path] = tuple(float(x) for x in colour)
+            color = np.broadcast_to(np.asarray(value, float), 3)
+            slots[path] = tuple(float(x) for x in color)
         elif parameter.kind == "alpha" and isinstance(value, tuple | list):
             slots[f"{path}_x"], slots[f"{path}_y"] = float(value[0]), float(value[1])
         elif parameter.numeric and not (parameter.kind == "angle" and value == 0):
@@ -233,7 +234,7 @@ def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
 
 
 def _structure(bsdf: BSDF) -> Structure:
-    """What shapes a material's code: classes, choices, and which numbers there are."""
+    """Everything that determines a material's code: classes, choices, and which numbers there are."""
     shape = [(path, type(inner), inner.delta) for path, inner in tree.walk(bsdf)]
     choices = [leaf.value for leaf in tree.leaves(bsdf) if not leaf.parameter.numeric]
     return shape, choices, sorted(_slots(bsdf))
@@ -243,7 +244,7 @@ def _structure(bsdf: BSDF) -> Structure:
 
 
 class _Lamps:
-    """The lights' scene, kept as long as only values change."""
+    """The lights' scene, reused as long as only values change."""
 
     def __init__(self, mi: ModuleType):
         self.mi = mi
@@ -256,11 +257,11 @@ class _Lamps:
     def place(self, given: Sequence[messages.Light], pictures: Mapping[str, Pixels]) -> Scene:
         for light in given:
             if isinstance(light, messages.Environment) and light.image and light.image.key not in pictures:
-                hint = "upload it before the scene that names it"
+                hint = "upload it before the scene that refers to it"
                 raise InputError(f"unknown picture '{light.image.key}'", "lights", hint)
         shown = [pictures[x.image.key] if isinstance(x, messages.Environment) and x.image else None for x in given]
         structure = tuple(light.type for light in given)
-        # a key may be given to another picture: the arrays themselves are compared
+        # a key may be reused for another picture, so the arrays themselves are compared
         if structure != self._structure or any(a is not b for a, b in zip(shown, self._shown, strict=True)):
             self.parts = {f"light{n}": self.mi.load_dict(self._plugin(x, pictures)) for n, x in enumerate(given)}
             self._scene = self.mi.load_dict({"type": "scene", **self.parts})
@@ -270,7 +271,8 @@ class _Lamps:
         return self._scene
 
     def write(self, scene: Scene, given: Sequence[messages.Light]) -> None:
-        """Put the lights' values into a scene that holds them; by way of the scene, which then moves its geometry."""
+        """Write the lights' values into a scene that contains them; through the scene, which then updates its
+        geometry."""
         parameters = self.mi.traverse(scene)
         for n, light in enumerate(given):
             for name, value in self._values(light).items():
@@ -278,7 +280,7 @@ class _Lamps:
         parameters.update()
 
     def _plugin(self, light: messages.Light, pictures: Mapping[str, Pixels]) -> PluginDict:
-        """The kind of light; values follow by `write`."""
+        """A light of the right kind; `write` sets its values."""
         white = {"type": "rgb", "value": [1.0, 1.0, 1.0]}
         match light:
             case messages.Directional():
@@ -289,7 +291,7 @@ class _Lamps:
                 return {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": white}}
             case messages.Environment(image=messages.Image(key=key)):
                 picture = pictures[key]
-                if not picture.any():  # nothing to choose directions by; too dark for any picture will do
+                if not picture.any():  # no density can be normalized; this value is too dark to be visible
                     picture = np.full_like(picture, 1e-20)
                 return textures.environment(self.mi, picture)
         return {"type": "constant", "radiance": white}
@@ -315,14 +317,13 @@ class _Lamps:
                 return {"to_world": mi.Transform4f(to_world), "emitter.radiance.value": radiance}
             case messages.Environment(image=None):
                 return {"radiance.value": mi.Color3f(*light.constant) * light.scale}
-        # half a turn: see textures.environment
-        # (modulo a turn: float32 keeps no angle of many turns)
+        # Half a turn: see textures.environment. Modulo a full turn, since float32 loses precision for large angles.
         turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation % math.tau) + 180.0)
         return {"to_world": turn, "scale": float(light.scale)}
 
 
 def _looking(toward: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A rotation that takes +z to a direction."""
+    """A rotation from +z to a direction."""
     side = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
     side /= np.linalg.norm(side)
     matrix = np.eye(4)

@@ -1,14 +1,14 @@
 """`gonio view`: the page on this machine's loopback, and the live reference behind it.
 
-Two routes and no files: `/` gives the page, `/ws` is the socket of docs/viewer.md. Who may speak to it:
+There are two routes and no files: `/` returns the page, `/ws` is the socket of docs/viewer.md. Access is restricted:
 
-- The address holds a random token; without it nothing is answered.
-- `Host` must be an address or a name of this machine: a name that an attacker points here (DNS rebinding) is refused.
-- `Origin` must be this server itself, so a page elsewhere can neither read nor drive it.
-- The page's Content-Security-Policy lets it run its own script only, and reach nothing but its socket.
-- Sizes are bounded: requests, messages, uploads, connections, sessions, and what waits to be sent (one frame).
+- The address contains a random token, without which no request is answered.
+- `Host` must be an address or a name of this machine: a name that an attacker maps here (DNS rebinding) is refused.
+- `Origin` must be this server itself, so that a page elsewhere can neither read nor control it.
+- The page's Content-Security-Policy allows only its own script, and connections to its socket only.
+- Sizes are bounded: requests, messages, uploads, connections, sessions, and pending frames (one).
 
-One thread renders. Sessions take turns of one short pass, so that a newer scene never waits long for an older one.
+One thread renders. Sessions alternate in short passes, so that a new scene does not wait long for an older one.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import contextlib
 import errno
 import html
 import ipaddress
+import json
 import re
-import secrets
 import signal
 import socket
 import sys
@@ -28,46 +28,34 @@ import threading
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
-from urllib.parse import parse_qs
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
-from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-from websockets.frames import Frame
 
 from ..bridge import engine
 from ..errors import GonioError, InputError, MachineError
-from . import messages, page
+from . import guards, messages, page
+from .guards import AccessControl
 from .session import Renderer, Session
 from .stage import Stage
 from .watch import Watch
 
 LOOPBACK = "127.0.0.1"
-MOST_SESSIONS = 8  # each holds a scene and a picture in memory
-MOST_CONNECTIONS = 200  # that have not asked for anything yet
-REQUEST_SECONDS = 10.0  # for a request's headers to arrive
-MOST_ANSWERS, ANSWER_SECONDS = 32, 120.0  # pages that are on their way at once, and how long: 9 kB/s
-# For a frame to be taken: a page in a hidden tab draws nothing, and need not come back for it. And for a first wish: a
-# page that shows what the reference cannot, one term alone, wants nothing of it.
+MAX_SESSIONS = 8  # each holds a scene and a picture in memory
+# Limit for a frame to be acknowledged: a page in a hidden tab draws nothing, and may not return. Also for a first
+# request: a page that shows what the reference cannot, one term alone, requests nothing.
 STALL_SECONDS = 600.0
-FULL_SECONDS = 1.0  # after which a newcomer is told that all places are taken
-MOST_WAITING = 200  # newcomers that wait so long
-PATIENCE_SECONDS = 5.0  # the same where another page wants the place
-CLOSE_SECONDS = 2.0  # for the last words to go out
-READ_BYTES = 16 << 10  # of a socket at once
-MOST_FRAGMENTS = 1 << 14  # of one message: 4 KiB each in the largest upload; browsers send far longer ones
-MOST_CONTROLS = 10_000  # pings and pongs of a connection: one in 20 s for two days
-FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
+FULL_SECONDS = 1.0  # delay before a new page is told that all places are taken
+MAX_WAITING = 200  # new pages in that delay
+PATIENCE_SECONDS = 5.0  # limit for acknowledging a frame while another page needs the place
 
 HEADERS = {
     "Cache-Control": "no-store",
-    "Connection": "close",  # one page is one request; a connection that lingered would have to be watched
+    "Connection": "close",  # one page is one request; a persistent connection would need a limit
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -77,58 +65,20 @@ HEADERS = {
 }
 
 
-class Door:
-    """Who may come in: the token, and the names under which this server is spoken to."""
-
-    def __init__(self, host: str, token: str | None = None):
-        self.token = token or secrets.token_urlsafe(24)
-        self.names = {"localhost", host.lower()}
-        if host in ("0.0.0.0", "::"):  # open to the network by the user's own wish: its name counts too
-            self.names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
-
-    def refusal(self, headers: Headers, query: bytes, needs_origin: bool) -> str:
-        """Why a request is refused; "" where it is not."""
-        hosts = headers.getlist("host")
-        if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return "wrong Host"
-        origins = headers.getlist("origin")
-        # The port may differ from ours (a tunnel), but the browser must have spoken to the page under the same name.
-        if origins != [f"http://{hosts[0]}"] and (needs_origin or origins):
-            return "wrong Origin"
-        given = parse_qs(query.decode("latin-1")).get("token", [""])
-        if len(given) != 1 or not secrets.compare_digest(given[0].encode(), self.token.encode()):
-            return "wrong token"
-        return ""
-
-    def _is_ours(self, host: str) -> bool:
-        """Whether a Host header names this machine. An address is never the work of a rebound name."""
-        parts = re.fullmatch(r"(\[[0-9a-f:.]+\]|[\w.-]+)(?::\d{1,5})?", host.lower(), re.ASCII)
-        if parts is None:
-            return False
-        name = parts[1].strip("[]")
-        if name in self.names:
-            return True
-        try:
-            ipaddress.ip_address(name)
-        except ValueError:
-            return False
-        return True
-
-
 class Application:
     """The page and its socket, for one stage.
 
-    what    what is shown
-    door    who may come in
+    what    the stage that is shown
+    access  conditions of access
     device  of the reference: "cpu", "cuda" or "auto"
     """
 
-    def __init__(self, what: Stage, door: Door, device: str = "cpu"):
-        self.door = door
+    def __init__(self, what: Stage, access: AccessControl, device: str = "cpu"):
+        self.access = access
         self.renderer = Renderer(what, device)
         self.sessions: list[Session] = []
         self._waiting = 0
-        self.fault: GonioError | None = None  # of the user's files, since the stage that is shown
+        self.fault: GonioError | None = None  # of the user's files, since the current stage
         self.watch = Watch(what.code, self.renew, self.complain) if what.code else None
         self._data = self._written(what, 0)
         self._html = page.html(self._data, policy=False)
@@ -138,10 +88,10 @@ class Application:
         )
 
     def _written(self, what: Stage, revision: int) -> page.PageData:
-        return page.page_data(what, f"/ws?token={self.door.token}", revision)
+        return page.page_data(what, f"/ws?token={self.access.token}", revision)
 
     def renew(self, what: Stage) -> None:
-        """Show another stage on every page; raises what its materials raise while they are written as shaders."""
+        """Show another stage on every page; raises the errors of its materials when they are written as shaders."""
         data = self._written(what, self.renderer.revision + 1)
         self.renderer.renew(what)
         self._data, self.fault = data, None
@@ -149,7 +99,7 @@ class Application:
         self._html = page.html(data, policy=False)
 
     def complain(self, fault: GonioError) -> None:
-        """Say on every page, over the last good picture, what is wrong with the user's file."""
+        """Show an error in the user's file on every page, over the last valid picture."""
         self.fault = fault
         self._tell(messages.failure(fault, "fault"))
 
@@ -159,29 +109,29 @@ class Application:
 
     async def show(self, request: Request) -> Response:
         """The page."""
-        refusal = self.door.refusal(request.headers, request.scope["query_string"], needs_origin=False)
+        refusal = self.access.refusal(request.headers, request.scope["query_string"], needs_origin=False)
         if refusal:
             return PlainTextResponse(f"{refusal}: open the address that gonio view printed\n", 403, HEADERS)
         host = request.headers["host"]
-        # A policy knows no IPv6 addresses; 'self' is the socket there, for browsers of CSP 3.
+        # Policies do not support IPv6 addresses; 'self' includes the socket there, in browsers with CSP 3.
         socket_address = "'self'" if host.startswith("[") else f"ws://{host}"
         policy = page.content_policy(socket_address) + "; frame-ancestors 'none'"
         return HTMLResponse(self._html, headers={**HEADERS, "Content-Security-Policy": policy})
 
     async def talk(self, websocket: WebSocket) -> None:
         """A session: from its first message to its end."""
-        if self.door.refusal(websocket.headers, websocket.scope["query_string"], needs_origin=True):
-            await websocket.close(REFUSED)  # before it is accepted: the handshake is answered with 403
+        if self.access.refusal(websocket.headers, websocket.scope["query_string"], needs_origin=True):
+            await websocket.close(guards.REFUSED)  # before it is accepted: the handshake is answered with 403
             return
         if not self._make_room():
-            if self._waiting < MOST_WAITING:  # who comes again and again comes seldom
+            if self._waiting < MAX_WAITING:  # slows down pages that reconnect repeatedly
                 self._waiting += 1
                 try:
                     await asyncio.sleep(FULL_SECONDS)
                 finally:
                     self._waiting -= 1
             await websocket.accept()
-            await websocket.close(FULL, "too many pages are open; close one")
+            await websocket.close(guards.FULL, "too many pages are open; close one")
             return
         await websocket.accept()
         session = Session(websocket, self.renderer)
@@ -198,14 +148,14 @@ class Application:
             self.renderer.forget(session)
 
     def _make_room(self) -> bool:
-        """Whether one more session fits; those that asked for nothing or take nothing give way, the oldest first."""
-        if len(self.sessions) < MOST_SESSIONS:
+        """Whether one more session fits; sessions that request or receive nothing are ended, the oldest first."""
+        if len(self.sessions) < MAX_SESSIONS:
             return True
         idle = next((session for session in self.sessions if session.idle_for() > PATIENCE_SECONDS), None)
         if idle is None:
             return False
         self.sessions.remove(idle)
-        idle.end(LATE, "made room for another page")
+        idle.end(guards.LATE, "made room for another page")
         return True
 
 
@@ -213,123 +163,24 @@ async def _nothing_here(request: Request, error: Exception) -> Response:
     return PlainTextResponse("nothing here\n", 404, HEADERS)
 
 
-class _Guarded(H11Protocol):
-    """HTTP that ends a connection whose request does not come, or whose answer is not taken.
-
-    Where there are too many of one kind, the oldest of it is ended.
-    """
-
-    waiting: dict[_Guarded, asyncio.TimerHandle]  # for requests; these two are set by `Server`, one pair a server
-    answering: dict[_Guarded, asyncio.TimerHandle]
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(transport)
-        self._watch(self.waiting, MOST_CONNECTIONS, REQUEST_SECONDS)
-
-    def handle_events(self) -> None:
-        super().handle_events()
-        if self.transport.get_protocol() is not self:  # a WebSocket now
-            self._rest()
-        elif self.cycle is not None and self not in self.answering:
-            self._rest()
-            self._watch(self.answering, MOST_ANSWERS, ANSWER_SECONDS)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._rest()
-        super().connection_lost(exc)
-
-    def _watch(self, kind: dict[_Guarded, asyncio.TimerHandle], most: int, seconds: float) -> None:
-        kind[self] = self.loop.call_later(seconds, self._give_up)
-        if len(kind) > most:
-            next(iter(kind))._give_up()
-
-    def _rest(self) -> None:
-        for kind in (self.waiting, self.answering):
-            timer = kind.pop(self, None)
-            if timer is not None:
-                timer.cancel()
-
-    def _give_up(self) -> None:
-        self._rest()
-        self.transport.abort()
-
-
-class _Socket(WebSocketsSansIOProtocol):
-    """A WebSocket that bounds what uvicorn does not.
-
-    Its connection ends with its session, though the other side takes nothing any more, and with a handshake that
-    makes no sense. Frames that are no message cost time and memory too: empty fragments, pings, pongs.
-    """
-
-    controls = 0
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(transport)
-        # asyncio's own is 256 KiB: a third of a second of empty frames
-        transport.max_size = READ_BYTES  # type: ignore[attr-defined]
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        while not self.queue.empty():  # what a page had asked for that is gone
-            self.queue.get_nowait()
-        super().connection_lost(exc)
-
-    def data_received(self, data: bytes) -> None:
-        super().data_received(data)
-        if not self.handshake_initiated:  # uvicorn hands the whole request over: nothing more would come of it
-            self.transport.abort()
-
-    def handle_cont(self, event: Frame) -> None:
-        if len(self.frames) < MOST_FRAGMENTS:
-            super().handle_cont(event)
-        else:
-            self._refuse(TOO_LARGE, "too many fragments")
-
-    def handle_ping(self) -> None:
-        super().handle_ping()
-        self._count_control()
-
-    def handle_pong(self, event: Frame) -> None:
-        super().handle_pong(event)
-        self._count_control()
-
-    def _count_control(self) -> None:
-        """A script on a page can send no pings; a program that watches its connection sends one in some seconds."""
-        self.controls += 1
-        if self.controls > MOST_CONTROLS:
-            self._refuse(REFUSED, "too many pings")
-
-    def _refuse(self, code: int, reason: str) -> None:
-        if self.close_sent or self.transport.is_closing():
-            return
-        self.frames = []
-        self.conn.fail(code, reason)
-        self.handle_parser_exception()
-
-    async def run_asgi(self) -> None:
-        try:
-            await super().run_asgi()
-        finally:
-            self.loop.call_later(CLOSE_SECONDS, self.transport.abort)
-
-
 class Server(uvicorn.Server):
-    """uvicorn with the guards above, which says where it is reached and opens the browser once it is."""
+    """uvicorn with the limits of `guards`, which prints its address and opens the browser once it is running."""
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
-        self.application, self.browser, self.quiet = application, browser, quiet
+        self.application, self.browser, self.quiet, self.as_json = application, browser, quiet, False
         self._redirect: Path | None = None
-        guarded = type("Guarded", (_Guarded,), {"waiting": {}, "answering": {}})
+        guarded = type("Guarded", (guards.GuardedHTTP,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
         config = uvicorn.Config(
             application.asgi,
             http=guarded,
-            ws=_Socket,
+            ws=guards.GuardedSocket,
             ws_max_size=messages.UPLOAD_BYTES,
             ws_per_message_deflate=False,
             ws_ping_interval=20.0,
             ws_ping_timeout=20.0,
             h11_max_incomplete_event_size=16 << 10,
-            limit_concurrency=MOST_CONNECTIONS + 64,  # what has asked for something; refused with 503 beyond
+            limit_concurrency=guards.MAX_CONNECTIONS + 64,  # with a request; beyond, 503
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             lifespan="off",
@@ -342,7 +193,7 @@ class Server(uvicorn.Server):
 
     @property
     def address(self) -> str:
-        """Where it listens: what the host, which may be a name, came to."""
+        """The address on which it listens, resolved if the host is a name."""
         return str(self.listener.getsockname()[0])
 
     @property
@@ -353,16 +204,16 @@ class Server(uvicorn.Server):
     def url(self) -> str:
         host = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.address, self.address)
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{self.port}/?token={self.application.door.token}"
+        return f"http://{host}:{self.port}/?token={self.application.access.token}"
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if self.application.watch:
             self.application.watch.start()
         if not self.quiet:
-            print(f"{self.url}\nCtrl-C ends it", flush=True)
+            print(json.dumps({"url": self.url}) if self.as_json else f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
-            # some browsers hold up whoever opens them until they are closed
+            # some browsers block the caller until they are closed
             self._redirect = _redirect_file(self.url)
             threading.Thread(target=_open, args=(self._redirect.as_uri(),), daemon=True).start()
 
@@ -374,22 +225,22 @@ class Server(uvicorn.Server):
         await super().shutdown(sockets)
 
     def serve_until_interrupted(self) -> None:
-        """Serve until Ctrl-C or SIGTERM; returns then, with everything closed."""
+        """Serve until Ctrl-C or SIGTERM, then close everything and return."""
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 self.run(sockets=[self.listener])
         finally:
             self.listener.close()
-            # The thread is waited for: to end amid a kernel is a crash. A second Ctrl-C makes that no faster.
-            with _deaf():
+            # Wait for the thread, since ending it during a kernel crashes; a second Ctrl-C must not interrupt this.
+            with _ignoring_interrupts():
                 if self.application.watch:
                     self.application.watch.stop()
                 self.application.renderer.stop()
 
 
 @contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """No Ctrl-C meanwhile; only the main thread hears one."""
+def _ignoring_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C in the block; only the main thread receives it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -401,28 +252,28 @@ def _deaf() -> Iterator[None]:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """A socket that listens; MachineError where it cannot."""
-    if not re.fullmatch(r"[\w.:-]+", host, re.ASCII):  # "" would be every address
-        raise InputError(f"'{host}' is no address", "--host", "give one of this machine, such as 127.0.0.1 or ::1")
+    """A listening socket; MachineError if that fails."""
+    if not re.fullmatch(r"[\w.:-]+", host, re.ASCII):  # "" would mean every address
+        raise InputError(f"'{host}' is not an address", "--host", "give one of this machine, such as 127.0.0.1 or ::1")
     listener = None
     try:
         listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
-        listener.listen(MOST_CONNECTIONS)
+        listener.listen(guards.MAX_CONNECTIONS)
     except (OSError, UnicodeError) as error:  # UnicodeError: a part of the name is too long
         if listener is not None:
             listener.close()
-        taken = getattr(error, "errno", None) == errno.EADDRINUSE
-        hint = "--port 0 finds a free one" if taken else "give an address of this machine, and a port that is yours"
+        in_use = getattr(error, "errno", None) == errno.EADDRINUSE
+        hint = "--port 0 chooses a free one" if in_use else "give an address of this machine, and a port that is yours"
         text = getattr(error, "strerror", None) or str(error)
         raise MachineError(f"cannot listen: {text}", f"--host {host} --port {port}", hint) from None
     return listener
 
 
 def _redirect_file(url: str) -> Path:
-    """A file that only this user may read, and that sends a browser on to the page: every user of a machine may read
-    what stands in a command line, and the token would."""
+    """A file that only this user can read, and that redirects a browser to the page. The token must not appear in a
+    command line, which every user of the machine can read."""
     handle, name = tempfile.mkstemp(prefix="gonio-", suffix=".html")  # with mode 0600
     with open(handle, "w", encoding="utf-8") as file:
         way = f'<meta http-equiv="refresh" content="0; url={html.escape(url)}">'
@@ -435,20 +286,29 @@ def _open(url: str) -> None:
         webbrowser.open(url)
 
 
-def serve(what: Stage, host: str = LOOPBACK, port: int = 0, browser: bool = True, device: str = "cpu") -> None:
+def serve(
+    what: Stage,
+    host: str = LOOPBACK,
+    port: int = 0,
+    browser: bool = True,
+    device: str = "cpu",
+    as_json: bool = False,
+) -> None:
     """Show a stage until Ctrl-C.
 
     host     where to listen; anything but a loopback address opens it to the network, and a line says so
     port     0 takes any that is free
     browser  open the page there
+    as_json  print the address as {"url": ...}
     Raises MachineError where the port is taken or the device missing, InputError where a model cannot be shown.
     """
     if not 0 <= port < 65536:
         raise InputError(f"port {port}", "--port", "give 0 to 65535")
-    engine.variant_for(device)  # complains about a missing GPU now, not when the first page asks
-    application = Application(what, Door(host), device)
+    engine.variant_for(device)  # raises for a missing GPU now, not when the first page connects
+    application = Application(what, AccessControl(host), device)
     server = Server(application, host, port, browser)
+    server.as_json = as_json
     if not ipaddress.ip_address(server.address).is_loopback:
-        warning = "whoever knows the address below can use it, and it is not encrypted"
+        warning = "anyone who knows the address below has access, and the connection is not encrypted"
         print(f"listening on {server.address}: {warning}", file=sys.stderr)
     server.serve_until_interrupted()

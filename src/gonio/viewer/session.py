@@ -1,4 +1,4 @@
-"""One page that is connected, and the thread that renders for all of them."""
+"""A connected page, and the thread that renders for all pages."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from . import messages, page
 from .reference import Pixels, Reference
 from .stage import Stage
 
-PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
-HIDDEN_SECONDS = 1.0  # after which a page that has not taken a frame is one in a hidden tab: it waits until it does
-MOST_SPARE = 4  # references kept for pages to come
-MOST_WISHES = 16  # shaders that a session waits for
-RATE = 250.0  # messages a second that are read of one page: it sends one a picture that it draws, one a frame it got
+PICTURES = 2  # environments stored per session: the one that is shown, and the next one
+HIDDEN_SECONDS = 1.0  # after which a page that has not taken a frame is considered hidden: rendering waits for it
+MAX_SPARE = 4  # references stored for later pages
+MAX_WISHES = 16  # pending shaders per session
+RATE = 250.0  # messages read per second and page: a page sends one per drawn picture and one per received frame
 SHARE = 0.1  # of the server's thread, for reading one page's messages
-NONSENSE_SECONDS = 0.005  # that a message without sense counts as, of the server's thread: pages send none
-BURST_SECONDS = 0.5  # saved up by a page that was silent: 125 messages at once
-GIVE_WAY_SECONDS = 5e-4  # after each pass, so that who waits to compute has a turn: a lock by itself is not fair
-MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
+NONSENSE_SECONDS = 0.005  # of the server's thread, charged for an invalid message, which pages never send
+BURST_SECONDS = 0.5  # credit of a page that was silent: 125 messages at once
+GIVE_WAY_SECONDS = 5e-4  # pause after each pass, so that other threads get the lock, which is not fair by itself
+MAX_WAITING = 64  # messages to a page that does not read them: answers to its messages, and one frame
 
 
 class Session:
-    """A connected page: what it asked for last, and the frame that is on its way to it."""
+    """A connected page: its latest request, and the frame in transit."""
 
     def __init__(self, websocket: WebSocket, renderer: Renderer):
         self.websocket, self.renderer = websocket, renderer
         self.loop = asyncio.get_running_loop()
-        self.asked = False  # whether it ever wanted something that made sense
+        self.asked = False  # whether it has sent a valid request
         self.sent = self.acknowledged = 0  # numbers of frames
         self.stalled_since: float | None = None
         self._outbox: asyncio.Queue[str | bytes] = asyncio.Queue()
@@ -47,7 +47,7 @@ class Session:
         self._upload: messages.Upload | None = None
         self._reason = (1000, "")
         self._due = 0.0  # when the next message may be read
-        # the renderer's, under its lock
+        # owned by the renderer, under its lock
         self.scene: messages.Scene | None = None
         self.pictures: dict[str, Pixels] = {}
         self.reference: Reference | None = None
@@ -58,9 +58,9 @@ class Session:
     # ------------------------------------------------------------------ in the server's thread
 
     async def run(self, stall_seconds: float) -> None:
-        """Talk until one side ends it.
+        """Exchange messages until one side ends the session.
 
-        stall_seconds  for a first wish to come, and for a frame to be acknowledged
+        stall_seconds  limit for the first request, and for the acknowledgment of a frame
         """
         work = (self._read(), self._write(), self._watch(stall_seconds), self._ended.wait())
         tasks = [asyncio.create_task(coroutine) for coroutine in work]
@@ -74,12 +74,12 @@ class Session:
                 await asyncio.wait_for(self.websocket.close(*self._reason), 1.0)
 
     def end(self, code: int, reason: str) -> None:
-        """Close the connection, from the server's side."""
+        """Close the connection from the server's side."""
         self._reason = (code, reason)
         self._ended.set()
 
     def idle_for(self) -> float:
-        """Seconds for which a frame has waited to be taken; without end where nothing was ever asked for."""
+        """Seconds for which a frame has been unacknowledged; infinite if the page has requested nothing."""
         since = self.stalled_since
         return math.inf if not self.asked else 0.0 if since is None else time.monotonic() - since
 
@@ -103,7 +103,7 @@ class Session:
             await self._pace(time.thread_time() - began + more)
 
     async def _pace(self, took: float) -> None:
-        """Wait where messages come faster than RATE, or want more than SHARE of this thread: others are to be served.
+        """Delay messages that arrive faster than RATE, or use more than SHARE of this thread.
 
         took  CPU seconds of the last message
         """
@@ -129,13 +129,13 @@ class Session:
     async def _take_upload(self, content: bytes) -> None:
         upload, self._upload = self._upload, None
         if upload is None:
-            raise InputError(f"{len(content)} bytes that nothing announced", "message", "send an upload message first")
+            raise InputError(f"{len(content)} bytes without an announcement", "message", "send an upload message first")
         pixels = await asyncio.to_thread(messages.environment, upload, content)
         self.renderer.keep_picture(self, upload.key, pixels)
 
     def send(self, message: str | bytes) -> None:
-        """Queue a message; where too many wait, the page takes none and is let go."""
-        if self._outbox.qsize() >= MOST_WAITING:
+        """Queue a message; if too many are waiting, end the session of a page that reads none."""
+        if self._outbox.qsize() >= MAX_WAITING:
             self.end(1008, "answers are not taken")
         else:
             self._outbox.put_nowait(message)
@@ -154,19 +154,19 @@ class Session:
             await asyncio.sleep(min(1.0, stall_seconds))
             since = self.stalled_since if self.asked else began
             if since is not None and time.monotonic() - since > stall_seconds:
-                self._reason = (1008, "frames are not taken" if self.asked else "nothing was asked for")
+                self._reason = (1008, "frames are not taken" if self.asked else "nothing was requested")
                 return
 
     # ------------------------------------------------------------------ from the renderer's thread
 
     def send_from_thread(self, message: str | bytes) -> None:
-        """As `send`; the loop may have ended by now."""
+        """As `send`, from another thread; the event loop may have ended."""
         with contextlib.suppress(RuntimeError):
             self.loop.call_soon_threadsafe(self.send, message)
 
 
 class Renderer:
-    """The thread that renders: short passes for sessions, and shaders, each having as much of its time as any other.
+    """The rendering thread: short passes for sessions, and shaders, with equal shares of time for all sessions.
 
     what    materials by key
     device  "cpu", "cuda" or "auto"
@@ -177,14 +177,14 @@ class Renderer:
         self.revision = 0  # of the stage
         self._sessions: list[Session] = []
         self._jobs: list[_Variant] = []
-        self._spare: list[Reference] = []  # of sessions that have ended: pages that come and go cost little
+        self._spare: list[Reference] = []  # of ended sessions, for reuse by new pages
         self._lock = threading.Condition()
         self._running = False
-        self._clock = 0.0  # the least time that a session with work has had
+        self._clock = 0.0  # least time spent on a session that has work
         self._thread: threading.Thread | None = None
 
     def renew(self, what: Stage) -> None:
-        """Render another stage from now on: what was asked of the old one is dropped."""
+        """Render another stage from now on; pending requests to the old one are dropped."""
         with self._lock:
             self.stage = what
             self.revision += 1
@@ -195,7 +195,7 @@ class Renderer:
     # ------------------------------------------------------------------ asked by sessions
 
     def show(self, session: Session, scene: messages.Scene) -> None:
-        """Render a scene for a session from now on: the newest wins; one of an older stage comes too late."""
+        """Render a scene for a session: the newest replaces others; one of an older stage is ignored."""
         with self._lock:
             if scene.revision != self.revision:
                 return
@@ -215,34 +215,34 @@ class Renderer:
     def request_variant(self, session: Session, wish: messages.Wish) -> None:
         """Write a shader with other choices and send it."""
         if wish.revision != self.revision:
-            return  # the page will ask anew
+            return  # the page will request it again
         if wish.material not in self.stage.materials:
             known = ", ".join(self.stage.materials)
             raise InputError(f"unknown material '{wish.material}'", "material", f"known: {known}")
         with self._lock:
-            if sum(job.session is session for job in self._jobs) >= MOST_WISHES:
-                raise InputError(f"more than {MOST_WISHES} choices wait for their shaders", "choice", "wait for some")
+            if sum(job.session is session for job in self._jobs) >= MAX_WISHES:
+                raise InputError(f"more than {MAX_WISHES} shaders are pending", "choice", "wait for some")
             self._jobs.append(_Variant(self.stage, session, wish))
             self._start()
             self._lock.notify()
 
     def wake(self) -> None:
-        """A frame was taken: the next may be made."""
+        """A frame was acknowledged: the next one may be made."""
         with self._lock:
             self._lock.notify()
 
     def forget(self, session: Session) -> None:
-        """Work no more for a session that has ended."""
+        """Stop working for a session that has ended."""
         with self._lock:
             if session in self._sessions:
                 self._sessions.remove(session)
             self._jobs = [job for job in self._jobs if job.session is not session]
-            if session.reference is not None and len(self._spare) < MOST_SPARE:
+            if session.reference is not None and len(self._spare) < MAX_SPARE:
                 self._spare.append(session.reference)
             session.scene = session.reference = None
 
     def stop(self) -> None:
-        """End the thread, after the pass that it is in."""
+        """End the thread after its current pass."""
         with self._lock:
             self._running = False
             self._lock.notify()
@@ -282,28 +282,28 @@ class Renderer:
             except Exception as error:
                 first = str(error).strip().partition("\n")[0]
                 what = f"the reference failed: {type(error).__name__}: {first}"
-                self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself goes on"))
+                self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself continues"))
             session.spent += time.perf_counter() - began
             time.sleep(GIVE_WAY_SECONDS)
 
     def _next(self, ready: list[Session]) -> Session:
-        """Whose turn it is: who has had least of the thread's time. So a large picture does not hold up small ones.
+        """The session that has had the least of the thread's time, so that a large picture does not delay small ones.
 
-        Time without work is not saved up: who comes back begins where the others are (start-time fair queueing).
+        Idle time gives no credit: a returning session starts at the level of the others (start-time fair queueing).
         """
         chosen = min(ready, key=lambda session: max(session.spent, self._clock))
         self._clock = chosen.spent = max(chosen.spent, self._clock)
         return chosen
 
     def _give_up(self, session: Session, scene: messages.Scene | None, error: GonioError) -> None:
-        """Drop a scene that cannot be rendered, but none that has come in its place."""
+        """Drop a scene that cannot be rendered, unless it has already been replaced."""
         with self._lock:
             if session.scene is scene:
                 session.scene = None
         session.send_from_thread(messages.failure(error))
 
     def _turn(self, session: Session, scene: messages.Scene) -> None:
-        """One pass of a scene for a session, and a frame where the page waits for one."""
+        """One pass of a scene for a session, and a frame if the page is ready for one."""
         with self._lock:
             reference = session.reference
             pictures = dict(session.pictures)
@@ -312,11 +312,11 @@ class Renderer:
         if reference is None:
             reference = spare or Reference(stage, self.device)
             session.reference = reference
-            limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MOST_PIXELS}
+            limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MAX_PIXELS}
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
             session.send_from_thread(json.dumps(ready))
             _give_way()
-        with engine.using(reference.variant):  # a program that shows the page may have set another meanwhile
+        with engine.using(reference.variant):  # a program that shows the page may have set another one
             if reference.scene is not scene:
                 reference.stage, reference.pictures = stage, pictures
                 reference.show(scene)
@@ -342,7 +342,7 @@ class Renderer:
 
 
 def _give_way() -> None:
-    """Let the browser's own drawing come first: lower priority for this thread and Dr.Jit's workers (Linux only)."""
+    """Lower the priority of this thread and Dr.Jit's workers in favor of the browser (Linux only)."""
     with contextlib.suppress(OSError):
         lower = os.getpriority(os.PRIO_PROCESS, os.getpid()) + 10  # than the main thread's; 19 is the most
         for task in Path("/proc/self/task").iterdir():
@@ -351,13 +351,13 @@ def _give_way() -> None:
 
 
 def _worth_showing(reference: Reference, shown: int) -> bool:
-    """A first picture at once; then when a quarter more samples are in, or it is finished."""
+    """Whether to send a picture: the first at once, then after a quarter more samples, and the finished one."""
     samples = reference.samples
     return samples > shown and (reference.done or samples >= 1.25 * shown)
 
 
 def _has_work(session: Session) -> bool:
-    """Whether samples are missing, or a finished picture waits to be shown, to a page that takes what it gets."""
+    """Whether samples are missing, or a finished picture has not been sent, for a page that acknowledges frames."""
     reference = session.reference
     if session.scene is None or session.idle_for() > HIDDEN_SECONDS:
         return False
@@ -367,7 +367,7 @@ def _has_work(session: Session) -> bool:
 
 
 class _Variant:
-    """The job of writing one shader."""
+    """The task of writing one shader."""
 
     def __init__(self, what: Stage, session: Session, wish: messages.Wish):
         self.stage, self.session, self.wish = what, session, wish

@@ -1,9 +1,9 @@
-"""What a page shows: materials on balls, the lights on them, the camera.
+"""The content of a page: materials on balls, the lights on them, the camera.
 
-A `Stage` is made of models (`of_models`), of a lab scene (`lab_scene.stage`), or it is the two rows of the homework
-(`homework`). `page.py` turns it into the data of the page, `reference.py` renders it.
+A `Stage` is built from models (`of_models`) or from a lab scene (`lab_scene.stage`), or it is the homework's two rows
+(`homework`). `page.py` converts it to the page's data, `reference.py` renders it.
 
-Values of nested materials are named by a path: "base.alpha" is the alpha of the material `base`.
+Values of nested materials have paths: "base.alpha" is the alpha of the material `base`.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .targets import Named, named
 from .watch import Code
 
 Leaf: TypeAlias = "tree.Leaf[BSDF]"
-Value: TypeAlias = "float | bool | str | Sequence[float]"  # of a parameter, as JSON has it
-Light: TypeAlias = "dict[str, object]"  # as docs/viewer.md writes it
+Value: TypeAlias = "float | bool | str | Sequence[float]"  # a parameter's value in JSON
+Light: TypeAlias = "dict[str, object]"  # described in docs/viewer.md
 
 
 class Camera(TypedDict):
-    """As docs/viewer.md writes it; where the distance is left out, all balls are in sight."""
+    """A camera as described in docs/viewer.md; without a distance, all balls are in view."""
 
     target: list[float]
     azimuth: float
@@ -40,11 +40,11 @@ class Camera(TypedDict):
 
 
 ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # of the homework's balls; alpha is its square
-# the homework's masking and the correct one; the page toggles between them
+# the homework's masking and the exact one; the page toggles between them
 HOMEWORK_MASKINGS = ("smith-correlated", "schlick-direct")
 LARGEST_ROW = 5
 
-# From the upper left, over the camera's shoulder; pi, so that a white Lambert ball reads 1 where it faces the light.
+# From the upper left; pi, so that a white Lambert ball has value 1 where it faces the light.
 SUN: Light = {"type": "directional", "direction": [-0.4364358, 0.4364358, 0.7867958], "irradiance": [math.pi] * 3}
 CAMERA: Camera = {"target": [0.0, 0.0, 0.0], "azimuth": 0.0, "elevation": 0.0, "fov": 30.0}
 SPACING = 2.4
@@ -60,7 +60,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Row:
-    """Balls of one material, `material` being its key in the stage."""
+    """Balls of one material; `material` is its key in the stage."""
 
     label: str
     material: str
@@ -69,9 +69,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Material:
-    """A model with the values that its balls start from.
+    """A model with the initial values of its balls.
 
-    choices  alternatives worth a toggle: path of a choice -> its names, the model's own first
+    choices  options offered as a toggle: path of a choice -> its names, the model's own first
     """
 
     title: str
@@ -81,9 +81,9 @@ class Material:
 
 @dataclass(frozen=True)
 class Stage:
-    """Materials by key, rows from top to bottom, lights and camera as docs/viewer.md writes them.
+    """Materials by key, rows from top to bottom, lights and camera as described in docs/viewer.md.
 
-    code  the user's files that it was made of, to make it anew when one of them is saved
+    code  the user's files that it was built from, to rebuild it when one of them is saved
     """
 
     title: str
@@ -95,9 +95,9 @@ class Stage:
     code: Code[Stage] | None = None
 
     def framed(self) -> Camera:
-        """The camera, far enough away that all balls stand in a picture of 16 : 9 or wider, with some air.
+        """The camera, at a distance from which all balls fit into a picture of 16 : 9 or wider, with a margin.
 
-        The page keeps the horizontal field of view in narrower pictures, so they hold all balls too.
+        The page preserves the horizontal field of view in narrower pictures, so all balls fit into these too.
         """
         across = (max(len(row.balls) for row in self.rows) - 1) * SPACING / 2 + 1.25
         up = (len(self.rows) - 1) * SPACING / 2 + 1.25
@@ -109,17 +109,17 @@ class Stage:
 # --------------------------------------------------------------------------- parameters by path
 
 
-def replaced(bsdf: BSDF, values: Mapping[str, Value], where: str = "values") -> BSDF:
-    """The material with other values at some paths; InputError for a path or value that cannot be."""
+def replaced(bsdf: BSDF, values: Mapping[str, Value], location: str = "values") -> BSDF:
+    """The material with other values at some paths; InputError for an invalid path or value."""
     known = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
     for path in values:
         if path not in known:
-            raise InputError(f"unknown parameter '{path}'", where, did_you_mean(path, list(known)))
-    return tree.replace(bsdf, {path: _plain(known[path], value) for path, value in values.items()}, where)
+            raise InputError(f"unknown parameter '{path}'", location, did_you_mean(path, list(known)))
+    return tree.replace(bsdf, {path: _plain(known[path], value) for path, value in values.items()}, location)
 
 
 def _plain(parameter: Parameter, value: Value) -> Value:
-    """A value from JSON as a constructor takes it: two equal widths are one, a list is a tuple."""
+    """A value from JSON for a constructor: two equal alphas become one, a list becomes a tuple."""
     if isinstance(value, list | tuple):
         if parameter.kind == "alpha" and len(value) == 2 and value[0] == value[1]:
             return value[0]
@@ -131,7 +131,7 @@ def _plain(parameter: Parameter, value: Value) -> Value:
 
 
 class PresetData(TypedDict):
-    """A preset as the page has it: values by path, linear reflectance at normal incidence."""
+    """A preset in the page's format: values by path, linear reflectance at normal incidence."""
 
     name: str
     set: dict[str, Value]
@@ -139,10 +139,10 @@ class PresetData(TypedDict):
 
 
 def presets(bsdf: BSDF) -> list[PresetData]:
-    """The presets of the first material inside that has some, each with its linear F0 at normal incidence.
+    """The presets of the first nested material that has some, each with its linear F0 at normal incidence.
 
-    F0 is exact, in linear values: what people type from sRGB pictures is too dark. Indices of no surface, whose F0 is
-    0, are left out; defaults that reflect everything, at every angle, come last.
+    F0 is exact, in linear values; values picked from sRGB pictures are too dark. Presets without a surface, whose F0 is
+    0, are omitted; defaults that reflect everything, at every angle, are last.
     """
     path, owner = next(((path, inner) for path, inner in tree.walk(bsdf) if inner.presets()), ("", bsdf))
     listed: list[PresetData] = []
@@ -177,7 +177,7 @@ def _f0(owner: BSDF, values: Mapping[str, Value]) -> list[float] | None:
 
 
 def homework(metal: str = "Ag") -> Stage:
-    """Two rows of five balls under one light, roughness rising to the right: Kulla-Conty above, plain below."""
+    """Two rows of five balls under one light, roughness increasing to the right: Kulla-Conty above, plain below."""
     base = model("conductor").preset(metal, alpha=ROUGHNESS[0] ** 2)
     compensated = model("kulla-conty")(base=base)  # type: ignore[call-arg]
     materials = {
@@ -197,17 +197,16 @@ def _rough(path: str, roughness: float) -> Ball:
 
 
 def _short(x: float) -> str:
-    text = f"{x:.4g}"
-    return text[1:] if text.startswith("0.") else text
+    return f"{x:.4g}"
 
 
 # --------------------------------------------------------------------------- any models
 
 
 def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
-    """A stage of models as the command line names them: "conductor", "conductor(alpha=0.2)", "glass.py:Glass".
+    """A stage of models by their names on the command line: "conductor", "conductor(alpha=0.2)", "glass.py:Glass".
 
-    parameters  "name=value" each, for every model that has it; InputError where none has
+    parameters  "name=value" each, for every model that has it; InputError if none has
     """
     files = [file for target in (*targets, *parameters) for file in outside.files_in(target)]
     if not files:
@@ -217,23 +216,23 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
 
 def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
-    found, notes = shown(targets, parameters)
-    return replace(of_models([one.bsdf for one in found], [one.given for one in found]), notes=tuple(notes))
+    named_, notes = shown(targets, parameters)
+    return replace(of_models([one.bsdf for one in named_], [one.given for one in named_]), notes=tuple(notes))
 
 
 def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
-    """`targets.named`, of what a page can show; InputError for anything else."""
+    """`targets.named` for materials that a page can show; InputError for anything else."""
     for target in targets:
         if operands.MATERIALS.isdisjoint(operands.readings(target)):
-            hint = "the page's shader code is written from Gonio's models only"
-            raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
+            hint = "the page needs shader code, which only Gonio's models have"
+            raise InputError(f"'{target}' is not a model of Gonio", "MODEL", hint)
     return named(targets, parameters)
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[Collection[str]] | None = None) -> Stage:
-    """One row a model. Where no width is given, five balls from smooth to rough; else five over its first number.
+    """One row per model: five balls from smooth to rough if no alpha is given, otherwise five over its first number.
 
-    given  per model, the paths of parameters that the user has fixed
+    given  per model, the paths of parameters that the user has set
     """
     if not bsdfs:
         return homework()
@@ -264,7 +263,7 @@ def _title(bsdf: BSDF) -> str:
 
 
 def _masking(bsdf: BSDF) -> tuple[str, tuple[str, ...]]:
-    """The first masking inside, and the choices worth a toggle: the model's own, then the homework's two."""
+    """The first masking term, and the options of its toggle: the model's own, then the homework's two."""
     for path, parameter, own, _ in tree.leaves(bsdf):
         if parameter.name == "masking" and parameter.choices:
             others = (name for name in HOMEWORK_MASKINGS if name != own and _accepts(bsdf, {path: name}))
@@ -281,10 +280,10 @@ def _accepts(bsdf: BSDF, values: Mapping[str, Value]) -> bool:
 
 
 def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
-    """Of each row what its balls run over, None where that is nothing.
+    """For each row the parameter that varies over its balls, or None.
 
-    Rows that hold the same material, one of them inside another, run over the same: a width, else what another row runs
-    over.
+    Rows with the same material, one of them nested in another, vary the same parameter: an alpha, otherwise the
+    parameter of another row.
     """
     mains = [_main(leaves) for leaves in free]
     names = {main.path for main in mains if main is not None}
@@ -297,7 +296,7 @@ def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
 
 
 def _main(leaves: Sequence[Leaf]) -> Leaf | None:
-    """The first width, else the first number, else the first colour that is none of several in a preset."""
+    """The first alpha, else the first number, else the first color that is not one of several in a preset."""
     for leaf in leaves:
         if leaf.parameter.kind == "alpha" and not isinstance(leaf.value, tuple):
             return leaf
@@ -312,7 +311,7 @@ def _main(leaves: Sequence[Leaf]) -> Leaf | None:
 
 
 def _series(main: Leaf) -> tuple[Ball, ...]:
-    """Balls over a parameter."""
+    """Balls over the range of a parameter."""
     path, parameter, value, _ = main
     if parameter.kind == "alpha":
         return tuple(_rough(path, r) for r in ROUGHNESS)
@@ -324,8 +323,8 @@ def _series(main: Leaf) -> tuple[Ball, ...]:
 def _steps(parameter: Parameter, value: float) -> list[float]:
     if math.isfinite(parameter.low) and math.isfinite(parameter.high):
         return [round(float(v), 6) for v in np.linspace(parameter.low, parameter.high, LARGEST_ROW)]
-    centre = float(value) or 1.0
-    return [round(centre * factor, 6) for factor in (0.25, 0.5, 1.0, 2.0, 4.0)]
+    center = float(value) or 1.0
+    return [round(center * factor, 6) for factor in (0.25, 0.5, 1.0, 2.0, 4.0)]
 
 
 __all__ = ["Ball", "Material", "Row", "Stage", "homework", "of_models", "of_targets", "presets", "replaced"]

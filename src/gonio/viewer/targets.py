@@ -1,8 +1,8 @@
-"""Materials as the command line names them, with options that all share: -p masking=schlick-direct.
+"""Materials named on the command line, with options shared by all: -p masking=schlick-direct.
 
-A shared option reaches every material that has it, also through the materials inside: what one row had and another
-silently had not would be compared as if nothing else differed. Where it is not clear which parameter is meant, the
-option changes nothing there and a note says so.
+A shared option is applied to every material that has it, including nested materials: otherwise a comparison would be
+misleading if one row had it and another silently did not. If the parameter is ambiguous, the option is not applied
+there, and a note says so.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ class Named(NamedTuple):
 def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
     """The materials, and notes on where an option was not applied.
 
-    options  "name=value" each, shared by all. A material's own parameter comes first, then those of that name inside
-             it: a choice, such as masking, goes to all of them, a number or a preset to the only one there is
-    Raises InputError for an option that reaches none.
+    options  "name=value" each, shared by all. A material's own parameter comes first, then nested ones of that name: a
+             choice, such as masking, is applied to all of them, a number or a preset only if there is exactly one
+    Raises InputError for an option that applies to no material.
     """
     shared = dict(map(notation.assignment, options))
     classes = [notation.taken_apart(target)[0] for target in targets]
     reached = {name for name in shared if any(_has(cls, name) for cls in classes)}
-    found = notation.several(targets, [f"{name}={value}" for name, value in shared.items() if name in reached])
+    resolved = notation.several(targets, [f"{name}={value}" for name, value in shared.items() if name in reached])
     made, notes, unclear = [], [], {}
-    for target, (cls, settings) in zip(targets, found, strict=True):
+    for target, (cls, settings) in zip(targets, resolved, strict=True):
         one = Named(outside.probe(notation.made(cls, settings)[0]), frozenset(_paths(cls, settings)))
         own = frozenset(_paths(*notation.taken_apart(target)))
         for name, value in shared.items():
             places = _places(one.bsdf, name)
             free = [place for place in places if place not in own]
             if _has(cls, name):
-                notes += [_kept(one.bsdf, name, free)] if free else []
+                notes += [_unaffected(one.bsdf, name, free)] if free else []
             elif _clear(one.bsdf, free):
                 one = _with(one, free, value)
             else:
@@ -65,13 +65,13 @@ def _has(cls: type[BSDF], name: str) -> bool:
 
 
 def _names(bsdf: BSDF) -> set[str]:
-    """What an option may be called for a material: its parameters, and the paths and names of those inside."""
+    """The valid names of options for a material: its parameters, and the paths and names of nested ones."""
     paths = {leaf.path for leaf in tree.leaves(bsdf)}
     return {*bsdf.parameters(), *paths, *(path.rpartition(".")[2] for path in paths)}
 
 
 def _places(bsdf: BSDF, name: str) -> list[str]:
-    """Paths inside a material of the parameters, or presets, that an option may be meant for."""
+    """Paths of nested parameters, or presets, that an option may refer to."""
     if "." in name:
         return [leaf.path for leaf in tree.leaves(bsdf) if leaf.path == name]
     return [tree.join(path, name) for path, inner in tree.walk(bsdf) if path and _has(type(inner), name)]
@@ -83,13 +83,13 @@ def _clear(bsdf: BSDF, places: Sequence[str]) -> bool:
     return len(places) < 2 or all(place in leaves and not leaves[place].numeric for place in places)
 
 
-def _kept(bsdf: BSDF, name: str, places: Sequence[str]) -> str:
-    return f"{name} is set of {type(bsdf).__name__} itself; {' and '.join(places)} stays as it is"
+def _unaffected(bsdf: BSDF, name: str, places: Sequence[str]) -> str:
+    return f"{name} is set on {type(bsdf).__name__} itself; {' and '.join(places)} is unchanged"
 
 
 def _unclear(bsdf: BSDF, places: Sequence[str], value: str) -> InputError:
     name = places[0].rpartition(".")[2]
-    what = f"{name} sets nothing of {type(bsdf).__name__}, which has {' and '.join(places)}"
+    what = f"{name} is ambiguous for {type(bsdf).__name__}, which has {' and '.join(places)}"
     return InputError(what, f"--param {name}", f"give one of them, such as --param {places[0]}={value}")
 
 
@@ -103,7 +103,7 @@ def _with(one: Named, places: Sequence[str], value: str) -> Named:
 
 
 def _values(inner: BSDF, name: str, value: str) -> dict[str, object]:
-    """What an option sets of a material, by name."""
+    """The values that an option sets for a material, by name."""
     if name in inner.parameters():
         return {name: notation.typed(inner.parameters()[name], value)}
     chosen = type(inner).preset(value)
@@ -111,19 +111,19 @@ def _values(inner: BSDF, name: str, value: str) -> dict[str, object]:
 
 
 def _paths(cls: type[BSDF], settings: Mapping[str, object]) -> set[str]:
-    """The paths that settings set, those of materials inside among them."""
-    found = set()
+    """The paths that settings set, including those of nested materials."""
+    paths = set()
     for name, value in settings.items():
         parameter = cls.parameters().get(name)
         if parameter is not None and parameter.inner:
-            found |= {tree.join(name, path) for path in _paths(*_inside(value))}
+            paths |= {tree.join(name, path) for path in _paths(*_inside(value))}
         else:
-            found.add(name)
-    return found
+            paths.add(name)
+    return paths
 
 
 def _inside(value: object) -> tuple[type[BSDF], dict[str, object]]:
-    """Class and settings of a material in a material, which `notation.made` has taken before."""
+    """Class and settings of a nested material, which `notation.made` has accepted before."""
     if isinstance(value, str) and not value.lstrip().startswith("{"):
         return notation.taken_apart(value.strip().strip('"'))
     if isinstance(value, str):

@@ -1,24 +1,27 @@
-"""What a study varies: paths with their values, typed or given, and the request of each picture."""
+"""The variations of a study: paths with their values, typed or given, and the request of each picture."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..catalog import notation
+from ..catalog import notation, texts
 from ..errors import InputError
 from ..render.request import Request
 from ..scene.schema import SceneDescription
 from . import figures
 
+_RANGE = re.compile(r"[-+\d.eE]*\d\.\.[-+\d.eE]+")  # of numbers; a path of files may have two dots too
+
 
 @dataclass(frozen=True)
 class Variation:
-    """One --vary: a path into the scene or of a material, or a $parameter of a Mitsuba XML, and its values.
+    """One --vary: a path into the scene or a material, or a $parameter of a Mitsuba XML, and its values.
 
-    path    one, or several that vary together with commas between: "kd,ks"
-    values  one for each picture along it: of several paths a tuple with a value for each
+    path    one path, or several that vary together, separated by commas: "kd,ks"
+    values  one per picture; for several paths, a tuple with a value for each
     """
 
     path: str
@@ -30,11 +33,11 @@ class Variation:
 
     @property
     def name(self) -> str:
-        """The last step of each path that is a word: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
+        """The last non-numeric step of each path: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
         return ", ".join(map(_last_word, self.paths))
 
     def settings(self, value: Any) -> dict[str, object]:
-        """What one of the values sets, by path."""
+        """The settings of one of the values, by path."""
         return dict(zip(self.paths, value if len(self.paths) > 1 else (value,), strict=True))
 
 
@@ -47,27 +50,30 @@ def _last_word(path: str) -> str:
 
 
 def parse_variation(text: str) -> Variation:
-    """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(.2,.8),(.5,.5)".
+    """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(0.2,0.8),(0.5,0.5)".
 
-    Values are JSON; commas in brackets do not separate.
+    Values are JSON; commas in brackets do not separate. "0.1..1" is a range of five values.
     """
     paths, values = notation.assignment(text, "--vary")
+    if _RANGE.fullmatch(values):
+        return variation(paths, [figures.parse_value(value) for value in texts.range_of(values)])
     return variation(paths, figures.split_values(values))
 
 
 def variation(paths: str | Sequence[str], values: Sequence[object]) -> Variation:
-    """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value has then one for
-    each of them, (.2, .8) or "(.2,.8)". InputError where it has more or fewer."""
+    """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value then has one
+    part per path, (0.2, 0.8) or "(0.2,0.8)". InputError if it has more or fewer."""
     names = tuple(path.strip() for path in (paths.split(",") if isinstance(paths, str) else paths))
     if not all(names) or len(set(names)) < len(names):
-        raise InputError(f"'{','.join(names)}' varies no path, or one twice", "--vary", "such as kd,ks=(.2,.8),(.5,.5)")
+        what, hint = f"'{','.join(names)}' varies no path, or one twice", "such as kd,ks=(0.2,0.8),(0.5,0.5)"
+        raise InputError(what, "--vary", hint)
     if len(names) == 1:
         return Variation(names[0], tuple(values))
     return Variation(",".join(names), tuple(_together(value, names) for value in values))
 
 
 def _together(value: object, names: Sequence[str]) -> tuple[object, ...]:
-    """The values that several paths have together."""
+    """The values of several paths that vary together."""
     parts: Sequence[object] | None = None
     if isinstance(value, str) and value.startswith("(") and value.endswith(")"):
         parts = figures.split_values(value[1:-1])
@@ -76,23 +82,23 @@ def _together(value: object, names: Sequence[str]) -> tuple[object, ...]:
     if parts is None or len(parts) != len(names):
         count = "one value" if parts is None else f"{len(parts)} value{'s' if len(parts) != 1 else ''}"
         what = f"'{value}' is {count}, {len(names)} expected"
-        hint = f"in round brackets, one for each: {','.join(names)}=({','.join('.5' for _ in names)}),..."
+        hint = f"in parentheses, one for each: {','.join(names)}=({','.join('0.5' for _ in names)}),..."
         raise InputError(f"{what} for {', '.join(names)}", "--vary", hint)
     return tuple(parts)
 
 
 def with_cell(request: Request, cell: Mapping[str, object], named: notation.Settings | None) -> Request:
-    """The request with one cell's values: of the scene, or of a material and of the scene that it is shown in."""
+    """The request with one cell's values, which belong to the scene, or to a material and the scene that shows it."""
     if named is None:
         return replace(request, overrides={**request.overrides, **cell})
     cls, given = named
     own: dict[str, object] = {}
-    around: dict[str, object] = {}
+    of_scene: dict[str, object] = {}
     for path, value in cell.items():
         inside = path.removeprefix("scene.").removeprefix("shapes.0.material.")
         first = path.lstrip("/").replace("/", ".").partition(".")[0]
         if inside == path and first in _OF_A_SCENE and first not in cls.parameters():
-            around[path] = value
+            of_scene[path] = value
         else:
             own[inside] = value
     try:
@@ -102,8 +108,8 @@ def with_cell(request: Request, cell: Mapping[str, object], named: notation.Sett
         raise InputError(
             error.what, f"--vary {path}" if option == "--param" and path in own else error.where, error.hint
         ) from None
-    return replace(request, material=material, overrides={**request.overrides, **around})
+    return replace(request, material=material, overrides={**request.overrides, **of_scene})
 
 
-# what a path into the scene around a material begins with
+# first steps of paths into the scene around a material
 _OF_A_SCENE = {field.alias or name for name, field in SceneDescription.model_fields.items()} | {"shapes", "lights"}

@@ -1,11 +1,11 @@
-"""A user's own files, loaded anew whenever they are saved.
+"""A user's own files, reloaded whenever they are saved.
 
     >>> code = Code([Path("ward.py")], make)
-    >>> stage = code.run()                   # `make()`, which loads the files and what they import from their folder
+    >>> stage = code.run()                   # `make()`, which loads the files and their imports from their folder
     >>> Watch(code, show, complain).start()  # and again after each change
 
-Each run starts without the modules of the last one, so that a saved change in any of them counts, and an old module
-goes with the materials that were made of it.
+Each run starts without the modules of the previous one, so that a saved change in any of them takes effect, and an old
+module is freed with the materials made from it.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from ..errors import GonioError
 
 POLL_SECONDS = 0.03
 STOP_SECONDS = 5.0
-MISSING_POLLS = 10  # some editors delete a file and write it again: that long is no error
+MISSING_POLLS = 10  # some editors delete a file and write it again, so a file may be missing that long
 
 Made = TypeVar("Made")
-Stamp = tuple[int, int, int] | None  # when it was written, its size, which file it is; None where there is none
+Stamp = tuple[int, int, int] | None  # modification time, size, inode; None for a missing file
 
 
 class Code(Generic[Made]):
-    """Python files that the user named, those that they import from their own folders, and what is made of them.
+    """Python files that the user named, those that they import from their own folders, and the object made from them.
 
     make   loads the files
-    files  all of them, as of the last run
+    files  all of these files, as of the last run
     """
 
     def __init__(self, named: Iterable[Path], make: Callable[[], Made]):
@@ -47,7 +47,7 @@ class Code(Generic[Made]):
         self.stamps: dict[Path, Stamp] = {}
 
     def run(self) -> Made:
-        """What `make` makes of the files as they are now."""
+        """The result of `make` for the current files."""
         self.stamps = self.look()
         for name in self._modules:
             sys.modules.pop(name, None)
@@ -59,20 +59,20 @@ class Code(Generic[Made]):
             with self._importable():
                 made = self._make()
         except BaseException:
-            # what a file imports, or would if it were there, is unknown now: any file beside it may mend it
+            # The imports of a failed file are unknown: any file in its folder may fix it.
             self._follow(others, {path for folder in self._folders for path in folder.glob("*.py")} | self.files)
             raise
         self._follow(others, set())
         return made
 
     def look(self) -> dict[Path, Stamp]:
-        """What tells whether a file was saved since."""
+        """The stamps that show whether a file was saved."""
         return {path: _stamp(path) for path in self.files}
 
     @contextlib.contextmanager
     def _importable(self) -> Iterator[None]:
-        """The folders on Python's path. And no byte code is kept: it would pass for that of a file of the same size
-        that was saved within the same second."""
+        """Add the folders to Python's path, and write no byte code: it would be used for a file of the same size that
+        was saved within the same second."""
         path, keeps = list(sys.path), sys.dont_write_bytecode
         sys.path[:0] = sorted(map(str, self._folders))
         sys.dont_write_bytecode = True
@@ -82,7 +82,7 @@ class Code(Generic[Made]):
             sys.path[:], sys.dont_write_bytecode = path, keeps
 
     def _follow(self, others: set[str], more: set[Path]) -> None:
-        """Note which modules came with the files: those of their folders that nothing else had loaded."""
+        """Record the modules that came with the files: those of their folders that nothing else had loaded."""
         packages = {name.partition(".")[0] for name in others}
         new = {name: module for name, module in sys.modules.items() if name.partition(".")[0] not in packages}
         files = {name: getattr(module, "__file__", None) for name, module in new.items()}
@@ -93,7 +93,7 @@ class Code(Generic[Made]):
         self.stamps = {path: self.stamps[path] if path in self.stamps else _stamp(path) for path in self.files}
 
     def _is_own(self, place: Path) -> bool:
-        """Whether a file stands in a folder of the user's, and not in an environment that happens to lie there."""
+        """Whether a file is in one of the user's folders, but not in an environment inside it."""
         return not {"site-packages", "dist-packages"} & {*place.parts} and not self._folders.isdisjoint(place.parents)
 
     def located(self, error: BaseException) -> GonioError:
@@ -102,7 +102,9 @@ class Code(Generic[Made]):
         first = causes[-1]
         if isinstance(first, SyntaxError) and first.filename:
             text = f": {first.text.strip()}" if first.text else ""
-            return GonioError(f"{first.msg}{text}", f"{Path(first.filename).name}:{first.lineno}", "mend it and save")
+            return GonioError(
+                f"{first.msg}{text}", f"{Path(first.filename).name}:{first.lineno}", "fix it and save the file"
+            )
         line = next((line for cause in reversed(causes) if (line := self._line(cause.__traceback__))), "")
         place = line or min(self._named).name
         if isinstance(error, GonioError):
@@ -113,21 +115,21 @@ class Code(Generic[Made]):
                 place = f"{place}: {error.where}"
             return GonioError(error.what, place, error.hint)
         text = str(error).strip().partition("\n")[0]
-        return GonioError(f"{type(error).__name__}: {text}", place, "mend it and save")
+        return GonioError(f"{type(error).__name__}: {text}", place, "fix it and save the file")
 
     def _line(self, traceback: TracebackType | None) -> str:
-        """file:line of the innermost call in these files, "" where there is none."""
-        found = ""
+        """file:line of the innermost call in these files, "" if there is none."""
+        line = ""
         while traceback is not None:
             place = Path(traceback.tb_frame.f_code.co_filename)
             if place.resolve() in self.files:
-                found = f"{place.name}:{traceback.tb_lineno}"
+                line = f"{place.name}:{traceback.tb_lineno}"
             traceback = traceback.tb_next
-        return found
+        return line
 
 
 def _causes(error: BaseException) -> Iterator[BaseException]:
-    """The error, what it was raised from, and so on to the first."""
+    """The error, its cause, and so on to the first cause."""
     next_one: BaseException | None = error
     while next_one is not None:
         yield next_one
@@ -143,10 +145,10 @@ def _stamp(path: Path) -> Stamp:
 
 
 class Watch(Generic[Made]):
-    """A thread that runs the code anew whenever one of its files was saved.
+    """A thread that runs the code again whenever one of its files was saved.
 
-    show      gets what was made
-    complain  gets the error of either, with its place
+    show      called with the result
+    complain  called with an error of either, with its location
     """
 
     def __init__(self, code: Code[Made], show: Callable[[Made], None], complain: Callable[[GonioError], None]):
@@ -158,7 +160,7 @@ class Watch(Generic[Made]):
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread, after the run that it is in; a file that runs on and on is left behind."""
+        """End the thread after its current run; a run that does not end is abandoned."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(STOP_SECONDS)
@@ -169,7 +171,7 @@ class Watch(Generic[Made]):
             now = self._code.look()
             quiet = quiet + 1 if now == before else 0
             before = now
-            # twice the same: it is not being written
+            # two equal stamps in a row: the file is not being written
             if now != self._code.stamps and quiet >= (MISSING_POLLS if None in now.values() else 1):
                 self._run()
                 before = self._code.stamps

@@ -1,4 +1,4 @@
-"""`go.view(model)`: the page as a widget in JupyterLab, marimo and whatever else shows anywidgets."""
+"""`go.view(model)`: the page as a widget for JupyterLab, marimo and other hosts of anywidgets."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from ..catalog import notation
 from ..errors import InputError, MachineError
 from ..material import BSDF, tree
-from ..owner import alone
+from ..owner import exclusive
 from . import page, stage
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
 
-# The page is a document of its own in a frame: its style cannot touch the notebook's, nor its script the notebook.
+# The page is a separate document in a frame: it cannot affect the notebook's style or script.
 _SCRIPT = """
 function render({ model, el }) {
   const frame = document.createElement("iframe");
@@ -40,14 +40,14 @@ export default { render };
 """
 
 
-@alone
+@exclusive
 def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 
-    models  materials or their names; none shows the two rows of Kulla-Conty and plain balls
+    models  materials or their names; without any, the two rows of Kulla-Conty and plain balls
     height  of the cell, CSS pixels
-    Returns a widget, which the notebook shows. The page lives in the notebook's browser and needs no server: there is
-    no live reference. Raises InputError where a model cannot be shown, MachineError where anywidget is missing.
+    Returns a widget, which the notebook shows. The page runs in the notebook's browser without a server, so there is no
+    live reference. Raises InputError if a model cannot be shown, MachineError if anywidget is missing.
 
         go.view(go.Conductor.preset("Au"), "lambert")
     """
@@ -84,7 +84,7 @@ def _stage(models: tuple[object, ...]) -> stage.Stage:
             name = model.__name__ if isinstance(model, type) else type(model).__name__
             hint = ""
             if isinstance(model, type) and issubclass(model, BSDF):
-                hint = f"make one of the class: go.view({name}())"
+                hint = f"create an instance: go.view({name}())"
             elif isinstance(model, list | tuple):
                 hint = "give them one by one: go.view(a, b)"
             raise InputError(f"{name} given, a material or its name expected", "go.view", hint)
@@ -92,7 +92,7 @@ def _stage(models: tuple[object, ...]) -> stage.Stage:
 
 
 def _own(model: BSDF) -> set[str]:
-    """The parameters that are not what they are by default: whoever made the material has fixed those."""
+    """The parameters that differ from their defaults, which the creator of the material has set."""
     return {
         tree.join(path, name)
         for path, inner in tree.walk(model)

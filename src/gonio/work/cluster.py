@@ -1,11 +1,11 @@
-"""A crew of many processes, here or on many machines, by Dask. Dask is asked for only when a cluster is.
+"""Many processes, here or on many machines, by Dask. Dask is asked for only when a cluster is.
 
     with Cluster(workers=4):                          # processes of this machine
     with Cluster("tcp://10.0.0.7:8786"):              # whatever has joined that scheduler
 
-Whoever dies, freezes or cannot be reached: the part is done again by another, and the first answer counts, since all
-answers have the same bits. A part that fails by its input fails the job, and is not tried again. A worker with another
-version of Gonio, or another processor, would not give the same bits, and is refused by name.
+The part of a worker that fails, freezes or cannot be reached is done again by another one, and the first answer counts,
+since all answers have the same bits. A part that fails by its input fails the job, and is not tried again. A worker of
+another version of Gonio, or with another processor, would not give the same bits, and is refused by name.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import contextlib
 import gc
 import importlib.util
 import json
+import logging
 import os
 import queue
 import statistics
@@ -22,12 +23,12 @@ import sys
 import time
 import warnings
 from collections import deque
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import GonioError, InputError, MachineError
-from . import crew, garbage
+from ..errors import GonioError, GonioWarning, InputError, MachineError
+from . import crew, garbage, reachable
 from .kept import Arrays
 
 if TYPE_CHECKING:
@@ -57,24 +58,38 @@ class Cluster:
     workers  so many processes of this machine instead; as many as it has cores at once, the others one by one while
              the job goes on, since they take from those at work
     security what Dask wants for a scheduler with TLS; Dask's own configuration where None
-    Raises InputError for both or neither, MachineError where Dask is missing or nobody answers.
+    wait     seconds to wait for the first worker of a scheduler, which is told; then MachineError
+    Raises InputError for both or neither, and for what is no address, MachineError where Dask is missing or nobody
+    answers.
     """
 
+    remote = True
+
     def __init__(
-        self, address: str | None = None, *, workers: int | None = None, security: Security | None = None
+        self,
+        address: str | None = None,
+        *,
+        workers: int | None = None,
+        security: Security | None = None,
+        wait: float = NOBODY,
     ) -> None:
         if (address is None) == (workers is None):
             raise InputError("a cluster is an address or a number of workers", "cluster", "give one of the two")
         if workers is not None and workers < 1:
             raise InputError(f"{workers} workers asked for", "--workers", "give 1 or more")
+        if not wait >= 0.0:
+            raise InputError(f"{wait} seconds to wait for a worker", "wait", "give 0 or more")
+        if address is not None:
+            reachable.check(address)
         if importlib.util.find_spec("distributed") is None:
             raise MachineError("Dask is not installed", "cluster", INSTALL)
-        self._address, self._wanted, self._security = address, workers, security
+        self._address, self._wanted, self._security, self._wait = address, workers, security, wait
         self._local: LocalCluster | None = None
         self._client: Client | None = None
         self._processes: list[subprocess.Popen[bytes]] = []
         self._begun = 0.0
         self._sent: set[str] = set()
+        self._told = False  # that it waits for a worker
         self._stack = contextlib.ExitStack()
         self.silent: dict[str, float] = {}  # seconds since each worker gave a sign of life, when it was last looked at
         self.restarts = self.copies = 0
@@ -83,7 +98,7 @@ class Cluster:
 
     def __enter__(self) -> Cluster:
         import dask
-        from distributed import Client, LocalCluster
+        from distributed import LocalCluster
         from distributed.security import Security
 
         quiet: dict[str, object] = {"distributed.scheduler.allowed-failures": 1000}
@@ -106,8 +121,9 @@ class Cluster:
                 self._address = self._local.scheduler_address
                 self._processes = [self._start() for _ in range(min(self._wanted, _cores()))]
                 self._begun = time.monotonic()
-            self._client = Client(self._address, security=self._security, timeout=ANSWER, set_as_default=False)
-        except (OSError, TimeoutError, ValueError, RuntimeError, ImportError) as error:
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the errors are told here, in one line
+            self._client = _client(self._address, security=self._security, timeout=ANSWER, set_as_default=False)
+        except Exception as error:  # whatever a library makes of what answers
             self.close()
             text = " ".join(str(error).split())[:200]
             what = f"no scheduler answers: {text}"
@@ -164,16 +180,23 @@ class Cluster:
         self.silent = {name: time.time() - one["last_seen"] for name, one in self._workers().items()}
         return [name for name, seconds in self.silent.items() if seconds < SILENT]
 
-    def _check(self) -> None:
-        """Raise MachineError that names a worker with another version, before it is given anything."""
+    def _check(self) -> Iterator[None]:
+        """Wait for the first worker, and look around while there is none. Raise MachineError where none comes, and one
+        that names a worker with another version, before it is given anything."""
         if self._wanted is not None:
             return
         assert self._client is not None
-        until = time.monotonic() + NOBODY
+        started = time.monotonic()
         while not self._alive():
-            if time.monotonic() > until:
-                raise MachineError("no worker has joined the scheduler", str(self._address), "start `dask worker`")
+            if not self._told:
+                self._told = True
+                text = f"no worker has joined {self._address} yet: waiting for one, {self._wait:g} s at most"
+                warnings.warn(text, GonioWarning, stacklevel=2)
+            if time.monotonic() - started > self._wait:
+                what = f"no worker has joined the scheduler within {self._wait:g} s"
+                raise MachineError(what, str(self._address), f"start `dask worker {self._address}`")
             time.sleep(LOOK)
+            yield
         from . import worker
 
         own = worker.about()
@@ -188,7 +211,8 @@ class Cluster:
         """As `Crew.run`; (-1, {}) where nothing was done for a while."""
         if not arguments:
             return
-        self._check()
+        for _ in self._check():
+            yield -1, {}
         self._send(files)
         job = _Job(self, function, arguments)
         try:
@@ -225,6 +249,19 @@ class Cluster:
         more = len(self._processes) - _cores() + 1
         if len(self._processes) < (self._wanted or 0) and time.monotonic() - self._begun > more * PACE:
             self._processes.append(self._start())
+
+
+def _client(address: str | None, **options: object) -> Client:
+    """A client of the scheduler; where it cannot connect, it is kept from waiting 20 seconds for a farewell."""
+    from distributed import Client
+
+    client = Client.__new__(Client)
+    try:
+        client.__init__(address, **options)  # type: ignore[misc]
+    except BaseException:
+        client.status = "closed"
+        raise
+    return client
 
 
 def _cores() -> int:
@@ -306,12 +343,12 @@ class _Job:
             return
         try:
             fetch = self.client._gather
-            found = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
+            results = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
         except Exception:  # one of the workers died, or froze, with what it had: ask for each again, elsewhere
             for index in done:
                 self._failed(index, TimeoutError())
             return
-        for index, (seconds, arrays) in zip(done, found, strict=True):
+        for index, (seconds, arrays) in zip(done, results, strict=True):
             self.took.append(seconds)
             self.missing.discard(index)
             for future in self.out.pop(index, []):

@@ -25,6 +25,9 @@ Argument: TypeAlias = Any  # what can be pickled
 class Crew(Protocol):
     """Who does parts."""
 
+    remote: bool
+    """Whether other processes do them, if only one: arguments and files travel then."""
+
     @property
     def size(self) -> int:
         """How many at a time."""
@@ -43,7 +46,7 @@ class Crew(Protocol):
 class Here:
     """This process."""
 
-    size = 1
+    size, remote = 1, False
 
     def run(
         self, function: Function, arguments: Sequence[tuple[Argument, ...]], files: Mapping[str, Path]

@@ -73,7 +73,7 @@ def write(
     if not previous:
         files.write_whole(path, fill, rescue=False, durable=durable)
         return
-    newest = path.with_name(path.name + ".next")
+    newest = files.with_ending(path, ".next")
     files.write_whole(newest, fill, rescue=False, durable=durable)
     if path.exists():
         os.replace(path, _previous(path))
@@ -86,20 +86,20 @@ def _bytes(array: NDArray[Any]) -> memoryview:
 
 
 def _previous(path: Path) -> Path:
-    return path.with_name(path.name + ".previous")
+    return files.with_ending(path, ".previous")
 
 
 def remove(path: Path) -> None:
     """Remove the file, and what is kept beside it."""
-    newest = path.with_name(path.name + ".next")
-    left = path.parent.glob(f".{glob.escape(path.name)}.*.part.next")  # of a process that was killed while it wrote
+    newest = files.with_ending(path, ".next")
+    left = path.parent.glob(f".{glob.escape(newest.name)}.*.part.next")  # of a process that was killed while it wrote
     for name in (path, _previous(path), newest, *left):
         name.unlink(missing_ok=True)
 
 
 def exists(path: Path) -> bool:
     """Whether there is such a file, or the one before it."""
-    return path.is_file() or _previous(path).is_file()
+    return os.path.isfile(path) or os.path.isfile(_previous(path))
 
 
 def read(path: Path) -> Kept:

@@ -1,4 +1,4 @@
-/** The albedo curve E(mu): the share of power that comes back, from the mean weight of the emitted sample(). */
+/** The albedo curve E(mu): the fraction of power scattered, from the mean weight of the emitted sample(). */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
 import { channelOf, element, latest, legend, type Model, overlaid, range, select, short, CHANNELS, type Channel } from "../plots/base";
@@ -8,7 +8,7 @@ import type { AlbedoEstimate } from "../evaluator";
 import { channelIn } from "../plots/viewing";
 
 const DEFAULTS = { phi: 0 };
-/** Where E is estimated: even in mu, closer at grazing angles, where the curves bend. */
+/** Nodes of E: uniform in mu, denser at grazing angles, where the curves bend. */
 export const MUS = [0.01, 0.02, 0.035, ...Array.from({ length: 39 }, (_, i) => 0.05 + (0.95 * i) / 38)];
 const TARGET = 5e-4;
 
@@ -16,7 +16,7 @@ class AlbedoPanel implements Panel {
   readonly id = "albedo";
   readonly title = "Albedo";
   readonly order = 4;
-  readonly doc = "E(μ): the share of power given back, with the white furnace's line at 1";
+  readonly doc = "E(μ): the fraction of power scattered, with the white furnace's line at 1";
   private app!: App;
   private curves!: Curves;
   private key!: HTMLElement;
@@ -30,8 +30,8 @@ class AlbedoPanel implements Panel {
     this.app = app;
     host.classList.add("p-panel");
     const bar = element("div", "p-bar");
-    this.channel = select(bar, "channel", "Which number of the RGB value is drawn", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
-    this.phi = range(bar, "φo", "Azimuth of ωo from the tangent: matters for anisotropic materials", [0, 180, 1], "°", (phi) => app.store.setPanel(this.id, { phi }));
+    this.channel = select(bar, "channel", "Channel of the RGB value to draw", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
+    this.phi = range(bar, "φo", "Azimuth of ωo from the tangent: relevant for anisotropic materials", [0, 180, 1], "°", (phi) => app.store.setPanel(this.id, { phi }));
     const body = element("div", "p-body");
     const cell = element("div", "p-cell p-wide");
     body.append(cell);
@@ -68,7 +68,7 @@ class AlbedoPanel implements Panel {
     const wo = MUS.flatMap((mu) => polar(Math.acos(mu), phi * RADIANS));
     const estimates = new Map<Model, AlbedoEstimate>();
     let shown = 0;
-    // Side by side: every curve is there at once, and all grow sharper together.
+    // Interleaved: every curve appears at once, and all of them converge together.
     const estimated = models.filter((model) => model.shader.manifest.functions.sample).map(async (model) => {
       const progress = (estimate: AlbedoEstimate): boolean => {
         estimates.set(model, estimate);
@@ -91,7 +91,7 @@ class AlbedoPanel implements Panel {
     const bands: [number, number, string][] = [];
     let highest = 1;
     for (const model of models) {
-      // Without an estimate yet, a curve of no points: the plot need not be made anew when it comes.
+      // A model without an estimate has an empty curve, so that the plot is not rebuilt when the estimate arrives.
       const estimate = estimates.get(model);
       const mean = MUS.map((_, i) => (estimate ? channelOf(estimate.value, i, channel) : null));
       // All channels come from the same samples: the error of their weighted sum is at most the sum of their errors.
@@ -114,10 +114,10 @@ class AlbedoPanel implements Panel {
     });
     legend(this.key, models, (model) => {
       const estimate = estimates.get(model);
-      if (!estimate) return model.shader.manifest.functions.sample ? ": waiting" : ": the page holds no sample() of it";
+      if (!estimate) return model.shader.manifest.functions.sample ? ": waiting" : ": the page has no sample() of it";
       const worst = estimate.error.reduce((a, b) => Math.max(a, b), 0);
       const loss = Math.max(...MUS.map((_, i) => 1 - channelOf(estimate.value, i, channel)));
-      return `: standard error ≤ ${short(worst)} (${estimate.samples.toLocaleString("en")} samples a direction), largest loss ${short(Number(loss.toFixed(4)))}`;
+      return `: standard error ≤ ${short(worst)} (${estimate.samples.toLocaleString("en")} samples per direction), largest loss ${short(Number(loss.toFixed(4)))}`;
     });
     this.note.textContent = `Mean weight of the emitted sample(), reflected and transmitted power, ${channel}; band: ± 2 standard errors. On the line, nothing is lost.`;
   }

@@ -1,4 +1,4 @@
-/** Compare with the path-traced reference: how it is shown, and by how much the two differ. */
+/** Comparison with the path-traced reference: how it is shown, and how large the difference is. */
 import type { App, Panel } from "../panel";
 import type { Change, CompareMode } from "../state";
 import { type Control, element, select } from "../plots/base";
@@ -12,7 +12,7 @@ class ComparePanel implements Panel {
   readonly id = COMPARISON;
   readonly title = "Compare";
   readonly order = 6;
-  readonly doc = "The raster picture beside the path-traced reference";
+  readonly doc = "The raster picture and the path-traced reference";
   private app!: App;
   private comparison!: Comparison;
   private mode!: Control<CompareMode>;
@@ -22,7 +22,7 @@ class ComparePanel implements Panel {
   private table!: HTMLTableElement;
   private note!: HTMLElement;
 
-  /** At once: a link may open a page that already compares. */
+  /** Started at once: a link may open a page in which the comparison is on. */
   install(app: App): void {
     comparisonOf(app);
   }
@@ -34,9 +34,9 @@ class ComparePanel implements Panel {
     const set = (values: Record<string, unknown>) => app.store.setPanel(COMPARISON, values);
     const bar = element("div", "p-bar");
     this.mode = select(bar, "show", "How the two pictures are laid out", MODES, (mode) => app.store.set("compare.mode", mode));
-    this.kind = select(bar, "difference", "What the false colours mean", KINDS, (kind) => set({ kind }));
-    this.range = select<string>(bar, "colours", "Range of the colour scale", RANGES, (range) => set({ range }));
-    this.pixels = select(bar, "pixels", "Which pixels count in the figures and the difference", PIXELS, (pixels) => set({ pixels }));
+    this.kind = select(bar, "difference", "Quantity in false color", KINDS, (kind) => set({ kind }));
+    this.range = select<string>(bar, "colors", "Range of the color scale", RANGES, (range) => set({ range }));
+    this.pixels = select(bar, "pixels", "Pixels that the figures and the difference include", PIXELS, (pixels) => set({ pixels }));
     this.table = element("table", "p-numbers");
     const body = element("div", "p-fit");
     body.append(this.table);
@@ -65,11 +65,11 @@ class ComparePanel implements Panel {
       ? [
           ["RMSE", figures.rmse.toExponential(3), "root of the mean squared difference of linear radiance"],
           ["relMSE", figures.relmse.toExponential(3), "mean of (x − r)² / (r² + 0.01), linear radiance"],
-          ["mean x / mean r", figures.meanRatio.toFixed(5), "1 where no energy is lost or made"],
-          ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "0 same, 1 far: what is seen when flipping between the two as shown on this screen"],
+          ["mean x / mean r", figures.meanRatio.toFixed(5), "1 if no energy is lost or gained"],
+          ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "0 equal, 1 farthest: the difference perceived when alternating between the two as shown on this screen"],
           ["pixels", figures.pixels.toLocaleString("en"), PIXELS[this.comparison.settings().pixels]],
-          ...(figures.broken ? [["no number", figures.broken.toLocaleString("en"), "pixels without a finite number, checkered: they count in FLIP alone, as they look"] as [string, string, string]] : []),
-          ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "a pixel of the raster picture (x) and of the reference (r)"],
+          ...(figures.broken ? [["not finite",  figures.broken.toLocaleString("en"), "pixels without a finite value, shown as a checkerboard: only FLIP includes them, as they are displayed"] as [string, string, string]] : []),
+          ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "per pixel of the raster picture (x) and of the reference (r)"],
         ]
       : [];
     this.table.replaceChildren(
@@ -81,7 +81,7 @@ class ComparePanel implements Panel {
         return row;
       }),
     );
-    this.note.textContent = figures ? "Without silhouettes: every pixel that is only partly covered, and its neighbours, is left out, since pixel filters differ there." : lack || "Waiting for the first pictures.";
+    this.note.textContent = figures ? "Without silhouettes: partly covered pixels and their neighbors are excluded, since the pixel filters differ there." : lack || "Waiting for the first pictures.";
   }
 }
 

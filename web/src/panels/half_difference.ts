@@ -1,6 +1,6 @@
 /**
  * The BSDF in half and difference angles: curves over theta_h or theta_d, and the image slice theta_h x theta_d at one
- * phi_d, as measured BRDFs are looked at: highlight along the left edge, Fresnel's rise along the top, retro-reflection
+ * phi_d, the usual view of measured BRDFs: highlight along the left edge, Fresnel's rise along the top, retro-reflection
  * along the bottom.
  */
 import type { App, Panel } from "../panel";
@@ -16,7 +16,7 @@ const DEFAULTS = { show: "image" as Show, thetaH: 0, thetaD: 0, phiD: 90, log: f
 type Show = "image" | "half" | "difference";
 const SHOW: Record<Show, string> = { image: "image slice", half: "curve over θh", difference: "curve over θd" };
 const SIDE = 180;
-/** The scale's span at most. */
+/** The largest range of the scale. */
 const DECADES = 5;
 
 interface Image {
@@ -49,16 +49,16 @@ class HalfDifferencePanel implements Panel {
     host.classList.add("p-panel");
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
-    this.show = select(bar, "show", "A picture over both angles, or a curve over one", SHOW, (show) => set({ show }));
+    this.show = select(bar, "show", "An image over both angles, or a curve over one", SHOW, (show) => set({ show }));
     this.controls = {
       thetaH: range(bar, "θh", "Angle between half vector and normal", [0, 89, 0.5], "°", (thetaH) => set({ thetaH })),
-      thetaD: range(bar, "θd", "Angle between half vector and ωi: the angle at which Fresnel is asked", [0, 89, 0.5], "°", (thetaD) => set({ thetaD })),
+      thetaD: range(bar, "θd", "Angle between half vector and ωi: the angle of Fresnel's term", [0, 89, 0.5], "°", (thetaD) => set({ thetaD })),
       phiD: range(bar, "φd", "Azimuth of ωi about the half vector", [0, 180, 1], "°", (phiD) => set({ phiD })),
       exposure: range(bar, "exposure", "Brightness of the image slice, in stops", [-10, 10, 0.1], "", (exposure) => set({ exposure })),
     };
     this.log = check(bar, "log", "Logarithmic values of the curves", (log) => set({ log }));
-    this.falseColor = check(bar, "false colour", `The chosen channel in viridis, logarithmic`, (falseColor) => set({ falseColor }));
-    this.channel = select(bar, "channel", "Which number of the RGB value is drawn", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
+    this.falseColor = check(bar, "false color", `The selected channel in viridis, logarithmic`, (falseColor) => set({ falseColor }));
+    this.channel = select(bar, "channel", "Channel of the RGB value to draw", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
     const body = element("div", "p-body");
     this.curvesHost = element("div", "p-cell p-wide");
     this.imagesHost = element("div", "p-images");
@@ -106,7 +106,7 @@ class HalfDifferencePanel implements Panel {
     const { app } = this;
     const models = overlaid(app);
     const overHalf = settings.show === "half";
-    // Even, and crowded at 0, where lobes are narrow.
+    // Uniform, and denser at 0, where lobes are narrow.
     const angles = [...Array.from({ length: 360 }, (_, i) => 0.25 * i), ...Array.from({ length: 240 }, (_, i) => 0.005 * 2000 ** (i / 239))].sort((a, b) => a - b);
     const pairs = angles.map((a) => ({ a, ...fromHalf((overHalf ? a : settings.thetaH) * RADIANS, (overHalf ? settings.thetaD : a) * RADIANS, settings.phiD * RADIANS) }));
     const above = pairs.filter(({ wo, wi }) => wo[2] > 0 && wi[2] > 0);
@@ -128,7 +128,7 @@ class HalfDifferencePanel implements Panel {
     });
     legend(this.key, models);
     const fixed = overHalf ? `θd ${short(settings.thetaD)}°` : `θh ${short(settings.thetaH)}°`;
-    this.note.textContent = `f at ${fixed}, φd ${settings.phiD}°; ${channel}. The curve ends where ωo or ωi goes below the surface.`;
+    this.note.textContent = `f at ${fixed}, φd ${settings.phiD}°; ${channel}. The curve ends where ωo or ωi is below the surface.`;
   }
 
   private async images(settings: typeof DEFAULTS): Promise<void> {
@@ -154,7 +154,7 @@ class HalfDifferencePanel implements Panel {
       images.push({ model, rgb: value });
     }
     const channel = channelIn(app);
-    // At grazing angles f grows without bound: the scale ends where one pixel in a hundred is brighter.
+    // At grazing angles f is unbounded: the scale ends at the 99th percentile.
     const all = Float32Array.from(images.flatMap(({ rgb }) => Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)))).filter((v) => v > 0);
     const high = quantile(all, 0.99) || 1;
     this.span = [Math.min(Math.max(quantile(all, 0.01), high / 10 ** DECADES), high / 10), high];
@@ -168,12 +168,12 @@ class HalfDifferencePanel implements Panel {
     legend(this.key, models);
     const scale = settings.falseColor
       ? `${channel}, viridis from ${short(this.span[0])} or less to ${short(this.span[1])} 1/sr or more (log)`
-      : `f · 2^${short(settings.exposure)} shown as sRGB; 1 and more is white`;
+      : `f · 2^${short(settings.exposure)} shown as sRGB; values of 1 and above are white`;
     this.note.textContent = `f(θh, θd) at φd ${settings.phiD}°; ${scale}. Hatched: ωo or ωi below the surface.`;
   }
 }
 
-/** One model's image slice, with its axes and the numbers under the pointer. */
+/** One model's image slice, with its axes and the values under the pointer. */
 class Figure {
   readonly host = element("figure", "p-figure");
   private readonly read = element("figcaption", "p-read");
@@ -221,7 +221,7 @@ class Figure {
   }
 }
 
-/** Centre of a pixel: 0 to 90 degrees in SIDE steps. */
+/** Center of a pixel: 0 to 90 degrees in SIDE steps. */
 const angleAt = (pixel: number) => ((pixel + 0.5) / SIDE) * (Math.PI / 2);
 
 interface Box {

@@ -1,4 +1,4 @@
-/** The panels of the dock, a file each: the default export of whatever stands in this folder. */
+/** The panels of the dock, one per file: the default export of every file in this folder. */
 import "./panels.css";
 import type { Panel } from "../panel";
 

@@ -1,4 +1,4 @@
-/** The lobe in 3-D at the clicked point: distance from the centre = f(wo, wi) |cos theta_i| in the direction wi. */
+/** The lobe in 3-D at the clicked point: distance from the center = f(wo, wi) |cos theta_i| in the direction wi. */
 import type { Vec3 } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
@@ -32,8 +32,8 @@ class LobePanel implements Panel {
     host.classList.add("p-panel");
     const bar = element("div", "p-bar");
     this.viewing = new ViewingControls(bar, app);
-    this.log = check(bar, "log", `Length by the logarithm, ${DECADES} decades from the largest value down`, (log) => app.store.setPanel(this.id, { log }));
-    this.color = select(bar, "colour", "By model, or by value (viridis, the same scale as the length)", { auto: "auto", model: "by model", value: "by value" }, (color) =>
+    this.log = check(bar, "log", `Logarithmic length over ${DECADES} decades below the largest value`, (log) => app.store.setPanel(this.id, { log }));
+    this.color = select(bar, "color", "By model, or by value (viridis, the same scale as the length)", { auto: "auto", model: "by model", value: "by value" }, (color) =>
       app.store.setPanel(this.id, { color }),
     );
     const body = element("div", "p-body p-lobe");
@@ -85,7 +85,7 @@ class LobePanel implements Panel {
       return { vertices, glass: false, size };
     });
     const ink = rgb(app.cssColor("--text"));
-    // The smallest is solid, those round it are glass: colours that blend evenly would be no model's colour.
+    // The smallest is opaque, those outside it are transparent: colors blended evenly would match no model's color.
     const smallest = Math.min(...surfaces.map((s) => s.size));
     for (const surface of surfaces) if (surface.size > smallest) surface.glass = true;
     const arrows: Arrow[] = [
@@ -95,7 +95,7 @@ class LobePanel implements Panel {
     ];
     this.view.show(surfaces, arrows, ink.map((v) => 0.5 * v + 0.25) as Vec3);
     legend(this.key, models, (m) => `: largest ${short(lobes.find((l) => l.model === m)?.peak ?? 0)} 1/sr`);
-    const length = log ? `outer ring ${short(peak)} 1/sr, centre ${short(peak / 10 ** DECADES)} 1/sr and less (log)` : `outer ring ${short(peak)} 1/sr, centre 0`;
+    const length = log ? `outer ring ${short(peak)} 1/sr, center ${short(peak / 10 ** DECADES)} 1/sr or less (log)` : `outer ring ${short(peak)} 1/sr, center 0`;
     this.note.textContent = peak > 0 ? `Length: f |cos θi|, ${channel}; ${length}.${limitsOf(models)}` : `No model scatters light from this ωo.${limitsOf(models)}`;
   }
 }

@@ -1,4 +1,4 @@
-/** The numbers under the pointer: linear radiance of the raster picture and of the reference, and their difference. */
+/** Values under the pointer: linear radiance of the raster picture and of the reference, and their difference. */
 import type { App, Panel, Picture } from "../panel";
 import { channelOf, element, exact } from "../plots/base";
 import { comparisonOf } from "../plots/comparison";
@@ -43,7 +43,7 @@ class ProbePanel implements Panel {
     this.soon();
   }
 
-  /** Reading the picture back stops the GPU: five times a second at most. */
+  /** Reading the picture back blocks the GPU: five times a second at most. */
   private soon(): void {
     if (this.timer) return;
     this.timer = window.setTimeout(() => {
@@ -55,7 +55,7 @@ class ProbePanel implements Panel {
   private write(): void {
     if (!this.at) {
       this.table.replaceChildren();
-      this.note.textContent = "Point at the picture.";
+      this.note.textContent = "Move the pointer over the picture.";
       return;
     }
     const raster = this.app.picture();

@@ -22,7 +22,7 @@ class SlicesPanel implements Panel {
   readonly title = "Slices";
   readonly order = 2;
   readonly marksPoint = true;
-  readonly doc = "Polar and Cartesian slices in the plane of incidence, or turned out of it";
+  readonly doc = "Polar and Cartesian slices in the plane of incidence, or rotated out of it";
   private app!: App;
   private viewing!: ViewingControls;
   private quantity!: { show(value: Quantity): void };
@@ -40,7 +40,7 @@ class SlicesPanel implements Panel {
     host.classList.add("p-panel");
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
-    this.quantity = select(bar, "show", "f |cos θi| is what a picture adds up; f the BSDF itself; pdf the density of sample()", QUANTITIES, (quantity) => set({ quantity }));
+    this.quantity = select(bar, "show", "f |cos θi| is the integrand of a picture; f the BSDF itself; pdf the density of sample()", QUANTITIES, (quantity) => set({ quantity }));
     this.log = check(bar, "log", "Logarithmic values", (log) => set({ log }));
     this.turn = range(bar, "turn", "Angle between the plane of the slice and the plane of incidence", [-90, 90, 1], "°", (turn) => set({ turn }));
     this.viewing = new ViewingControls(bar, app);
@@ -79,7 +79,7 @@ class SlicesPanel implements Panel {
     this.quantity.show(quantity);
     this.log.show(log);
     this.turn.show(turn);
-    // Positive angles lie on the side of the mirror direction: azimuth phi_o + 180 degrees.
+    // Positive angles are on the side of the mirror direction: azimuth phi_o + 180 degrees.
     const azimuth = phiOf(wo) + Math.PI + turn * RADIANS;
     const read = async (model: Model, angles: number[]): Promise<number[]> => {
       const wi = angles.flatMap((a) => polar(a * RADIANS, azimuth));
@@ -93,15 +93,15 @@ class SlicesPanel implements Panel {
     const even = Array.from({ length: 721 }, (_, i) => -half + ((i + 0.5) * 2 * half) / 721);
     const angles = [...even, thetaOf(wo) / RADIANS];
     const coarse = angles.slice();
-    // Angles crowd round the largest value of each model and side: a narrow lobe is drawn with its true height.
+    // Angles are denser near the largest value of each model and side, so that a narrow lobe has its true height.
     for (const values of await Promise.all(models.map((model) => read(model, coarse)))) {
       for (const side of [(a: number) => Math.abs(a) < 90, (a: number) => Math.abs(a) > 90]) {
         let best = -1;
         values.forEach((v, i) => {
           if (side(coarse[i] as number) && (best < 0 || v > (values[best] as number))) best = i;
         });
-        const centre = best < 0 ? null : (coarse[best] as number);
-        if (centre !== null) for (let k = -40; k <= 40; k++) if (k) angles.push(centre + Math.sign(k) * 10 ** (-3.5 + (4 * Math.abs(k)) / 40));
+        const peak = best < 0 ? null : (coarse[best] as number);
+        if (peak !== null) for (let k = -40; k <= 40; k++) if (k) angles.push(peak + Math.sign(k) * 10 ** (-3.5 + (4 * Math.abs(k)) / 40));
       }
     }
     const sorted = [...new Set(angles)].filter((a) => Math.abs(a) < half).sort((a, b) => a - b);
@@ -190,7 +190,7 @@ class SlicesPanel implements Panel {
     context.fillText("ωo", from[0] + 0.8 * (to[0] - from[0]) - 14 * Math.sin(angle), from[1] + 0.8 * (to[1] - from[1]) + 14 * Math.cos(angle));
   }
 
-  /** A number that stays readable over a curve. */
+  /** A label that is readable over a curve. */
   private plate(context: CanvasRenderingContext2D, text: string, x: number, y: number): void {
     const { width } = context.measureText(text);
     context.save();

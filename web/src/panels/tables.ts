@@ -1,4 +1,4 @@
-/** The tables that the shaders read, as pictures, with the float32 number of the texel under the pointer. */
+/** The tables that the shaders read, as images, with the float32 value of the texel under the pointer. */
 import { type SplitSum, decodeFloats } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
@@ -9,7 +9,7 @@ interface Table {
   label: string;
   size: number[];
   channels: number;
-  /** What runs along x, y, z, what a texel holds, and its numbers' names, where the page knows. */
+  /** Quantities along x, y and z, the quantity in a texel, and its channels' names, where known. */
   axes: string[];
   doc: string;
   components: string[];
@@ -22,7 +22,7 @@ class TablesPanel implements Panel {
   readonly id = "tables";
   readonly title = "Tables";
   readonly order = 5;
-  readonly doc = "The precomputed tables as pictures, with a float read-out";
+  readonly doc = "The precomputed tables as images, with a readout of float values";
   private app!: App;
   private which!: ReturnType<typeof select<string>>;
   private channel!: ReturnType<typeof select<string>>;
@@ -42,10 +42,10 @@ class TablesPanel implements Panel {
     host.classList.add("p-panel");
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
-    this.which = select<string>(bar, "table", "Every texture that a shader of the page reads", {}, (table) => set({ table, channel: -1, layer: 0 }));
-    this.channel = select<string>(bar, "component", "Tables may hold several numbers a texel", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
+    this.which = select<string>(bar, "table", "The textures that the page's shaders read", {}, (table) => set({ table, channel: -1, layer: 0 }));
+    this.channel = select<string>(bar, "component", "Component of the texel, if it has several", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
     this.layer = range(bar, "layer", "Slice of a three-dimensional table", [0, 0, 1], "", (layer) => set({ layer }));
-    this.fixed = check(bar, "0 to 1", "Colours from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
+    this.fixed = check(bar, "0 to 1", "Colors from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
     const body = element("div", "p-body");
     const cell = element("div", "p-cell p-wide");
     body.append(cell);
@@ -71,7 +71,7 @@ class TablesPanel implements Panel {
     if (what === "theme") this.show();
   }
 
-  /** The albedo that facets have, which everybody looks for first, then all tables of the shown models. */
+  /** The albedo of the microfacet models first, then all tables of the shown models. */
   private collect(): void {
     const wanted = new Map<string, () => Table>();
     for (const slot of this.app.visibleSlots()) {
@@ -108,16 +108,16 @@ class TablesPanel implements Panel {
     if (!table) {
       this.current = null;
       this.read.textContent = "";
-      this.note.textContent = "The shown models read no table: all their values are computed where they are needed.";
+      this.note.textContent = "The shown models read no tables: they compute all values directly.";
       this.layer.hide(true);
       this.sketch.redraw();
       return;
     }
     const [width, height = 1, depth = 1] = table.size as [number, number?, number?];
-    const whole = (value: unknown, most: number) => Math.min(most, Math.max(0, Math.round(Number(value)) || 0));
-    // Of the split sum first what it is best known for, the albedo: its last.
-    const channel = settings.channel === -1 ? (table.components.length ? table.channels - 1 : 0) : whole(settings.channel, table.channels - 1);
-    const layer = whole(settings.layer, depth - 1);
+    const index = (value: unknown, most: number) => Math.min(most, Math.max(0, Math.round(Number(value)) || 0));
+    // Of the split sum the albedo, its last component, first.
+    const channel = settings.channel === -1 ? (table.components.length ? table.channels - 1 : 0) : index(settings.channel, table.channels - 1);
+    const layer = index(settings.layer, depth - 1);
     this.channel.options(Object.fromEntries(Array.from({ length: table.channels }, (_, i) => [String(i), table.components[i] ?? String(i)])));
     this.channel.show(String(channel));
     this.channel.enable(table.channels > 1);
@@ -127,13 +127,13 @@ class TablesPanel implements Panel {
     const plane = Float32Array.from({ length: width * height }, (_, i) => table.floats[(layer * width * height + i) * table.channels + channel] as number);
     const [low, high] = plane.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity] as [number, number]);
     this.span = settings.fixed ? [0, 1] : low === high ? [low - 0.5, high + 0.5] : [low, high];
-    // Row 0 of a texture is its smallest y: shown at the bottom, as an axis wants it.
+    // Row 0 of a texture is its smallest y: shown at the bottom, as on a vertical axis.
     const flipped = new Float32Array(plane.length);
     for (let y = 0; y < height; y++) flipped.set(plane.subarray(y * width, (y + 1) * width), (height - 1 - y) * width);
     Object.assign(this.bitmap, { width, height });
     (this.bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(paint(flipped, width, height, "viridis", ...this.span), 0, 0);
     this.current = { table, channel, layer };
-    this.note.textContent = `${table.doc ? `${table.doc}. ` : ""}${table.size.join(" × ")} texels of ${table.channels} float32; this picture: smallest ${exact(low)}, largest ${exact(high)}. Axes count texel centres from 0 to 1.`;
+    this.note.textContent = `${table.doc ? `${table.doc}. ` : ""}${table.size.join(" × ")} texels of ${table.channels} float32; this image: smallest ${exact(low)}, largest ${exact(high)}. Axes: texel centers from 0 to 1.`;
     this.write();
     this.sketch.redraw();
   }
@@ -141,7 +141,7 @@ class TablesPanel implements Panel {
   private box(width: number, height: number): { x: number; y: number; w: number; h: number } {
     const [columns, lines = 1] = (this.current as NonNullable<typeof this.current>).table.size as [number, number?];
     const room = { w: Math.max(20, width - 150), h: Math.max(16, height - 46) };
-    // Texels are square where that leaves a picture worth looking at; the rows of a table of few are drawn as bars.
+    // Texels are square if that gives an image of useful size; the rows of a small table are drawn as bars.
     const scale = Math.min(room.w / columns, room.h / lines);
     const [w, h] = [Math.max(columns * scale, Math.min(room.w, 120)), Math.max(lines * scale, Math.min(room.h, 45 * lines, 0.5 * room.w))];
     return { x: 56 + (room.w - w) / 2, y: 8, w, h };
@@ -202,7 +202,7 @@ class TablesPanel implements Panel {
 
   private write(): void {
     if (!this.current || !this.pointed) {
-      this.read.textContent = "Point at the picture to read a texel.";
+      this.read.textContent = "Move the pointer over the image to read a texel.";
       return;
     }
     const { table, layer } = this.current;
@@ -215,7 +215,7 @@ class TablesPanel implements Panel {
   }
 }
 
-/** A and B of the split sum, and their sum: the albedo of the same lobe where nothing is absorbed. */
+/** A and B of the split sum, and their sum: the albedo of the lobe without absorption. */
 function splitSum({ facets: [distribution, masking], size, data }: SplitSum): Table {
   const ab = decodeFloats(data);
   const floats = new Float32Array((ab.length / 2) * 3);
@@ -228,13 +228,13 @@ function splitSum({ facets: [distribution, masking], size, data }: SplitSum): Ta
     size,
     channels: 3,
     axes: ["μ", "roughness"],
-    doc: "Albedo: F0 A + B for that reflectance at normal incidence, A + B = E(μ) for F = 1",
+    doc: "Albedo: F0 A + B for reflectance F0 at normal incidence, A + B = E(μ) for F = 1",
     components: ["A", "B", "A + B = E"],
     floats,
   };
 }
 
-/** A vertical viridis bar with its two ends written beside it. */
+/** A vertical viridis bar, labeled at both ends. */
 export function colorBar(context: CanvasRenderingContext2D, x: number, y: number, height: number, [low, high]: [number, number], text: string): void {
   const table = colorTable("viridis");
   const gradient = context.createLinearGradient(0, y + height, 0, y);

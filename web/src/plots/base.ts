@@ -1,4 +1,4 @@
-/** What every panel needs: the models it overlays, small controls, and work where the newest request wins. */
+/** Helpers of all panels: the models to overlay, small controls, and work of which the newest request wins. */
 import type { Values, Vec3 } from "../data";
 import type { App } from "../panel";
 import type { Shader } from "../shaders";
@@ -6,7 +6,7 @@ import type { Shader } from "../shaders";
 /** One curve or surface of a plot: a slot's material with the values of the picked ball in that row. */
 export interface Model {
   slot: number;
-  /** "A", "B", ...: also told apart by it where colours are not seen. */
+  /** "A", "B", ...: identifies a curve without relying on its color. */
   letter: string;
   label: string;
   color: string;
@@ -32,18 +32,18 @@ export function overlaid(app: App): Model[] {
   });
 }
 
-/** What a plot of eval cannot show of these models, as sentences to follow its note; "" where there is nothing to say. */
+/** Limits of a plot of eval for these models, as sentences that follow its note; "" if there are none. */
 export function limitsOf(models: readonly Model[]): string {
   const letters = (which: (model: Model) => boolean) => models.filter(which).map((m) => m.letter).join(", ");
   const delta = letters((m) => m.shader.manifest.delta !== "never");
   const noisy = letters((m) => m.shader.manifest.stochastic);
   return (
-    (delta ? ` ${delta}: a mirror's or smooth glass's light goes into single directions, has no finite value and is not drawn.` : "") +
-    (noisy ? ` ${noisy}: values are random, right in the mean only.` : "")
+    (delta ? ` ${delta}: the light of a mirror or of smooth glass leaves in single directions, has no finite value and is not drawn.` : "") +
+    (noisy ? ` ${noisy}: values are random, correct only on average.` : "")
   );
 }
 
-/** Calls `work` at most once at a time; requests that come meanwhile become one more run with the newest state. */
+/** Calls `work` at most once at a time; requests made meanwhile become one further run with the newest state. */
 export function latest(app: App, work: () => Promise<void>): () => void {
   let running = false;
   let again = false;
@@ -87,12 +87,12 @@ export function short(value: number): string {
   return String(Number(value.toPrecision(3)));
 }
 
-/** Nine digits tell any two float32 values apart. */
+/** Nine digits distinguish any two float32 values. */
 export const exact = (value: number) => (Number.isFinite(value) ? String(Number(value.toPrecision(9))) : String(value));
 
 // ------------------------------------------------------------------ elements
 
-/** An element by its class and text, which is nearly all that panels need. */
+/** An element by its class and text. */
 export function element<K extends keyof HTMLElementTagNameMap>(tag: K, className = "", text = ""): HTMLElementTagNameMap[K] {
   const made = document.createElement(tag);
   if (className) made.className = className;
@@ -123,9 +123,9 @@ export function select<T extends string>(
 ): Control<T> & { options(options: Record<string, string>): void } {
   const input = element("select");
   const fill = (all: Record<string, string>) => {
-    const kept = input.value;
+    const value = input.value;
     input.replaceChildren(...Object.entries(all).map(([value, text]) => new Option(text, value)));
-    if (kept in all) input.value = kept;
+    if (value in all) input.value = value;
   };
   fill(options);
   input.addEventListener("change", () => change(input.value as T));
@@ -149,7 +149,7 @@ export function check(host: HTMLElement, label: string, doc: string, change: (on
   return { show: (on) => (input.checked = on), enable: (on) => (input.disabled = !on), hide: (on) => (wrap.hidden = on) };
 }
 
-/** A slider with its number beside it; `unit` follows the number. */
+/** A slider with its value; `unit` follows the value. */
 export function range(
   host: HTMLElement,
   label: string,
@@ -184,7 +184,7 @@ export function range(
   };
 }
 
-/** A canvas in device pixels; `draw` gets a context scaled to CSS pixels. Drawn again when its box changes. */
+/** A canvas in device pixels; `draw` gets a context scaled to CSS pixels. It is redrawn when its box changes. */
 export class Sketch {
   readonly canvas = element("canvas", "p-canvas");
   constructor(
@@ -208,7 +208,7 @@ export class Sketch {
   }
 }
 
-/** The legend below or beside a plot: letter, colour, name. */
+/** The legend of a plot: letter, color, name. */
 export function legend(host: HTMLElement, models: readonly Model[], extra: (model: Model) => string = () => ""): void {
   host.replaceChildren(
     ...models.map((model) => {

@@ -1,6 +1,6 @@
 /**
- * Perceptually even colour maps, safe for colour-blind eyes: viridis for quantities, magma for differences.
- * Seventeen sRGB stops of matplotlib's maps (released into the public domain, CC0), blended linearly between.
+ * Perceptually uniform color maps, safe for color-blind readers: viridis for quantities, magma for differences.
+ * Seventeen sRGB stops of matplotlib's maps (released into the public domain, CC0), interpolated linearly.
  */
 const STOPS = {
   viridis: "44015448186a472d7b4240863b528b33638d2c728e26828e21918c1fa08828ae803fbc735ec96284d44baddc30d8e219fde725",
@@ -8,7 +8,7 @@ const STOPS = {
 };
 export type ColorMap = keyof typeof STOPS;
 
-/** 256 colours, RGBA bytes, alpha 255: an image row, a texture, a table. */
+/** 256 colors, RGBA bytes, alpha 255: an image row, a texture, a table. */
 export function colorTable(map: ColorMap): Uint8ClampedArray<ArrayBuffer> {
   const stops = (STOPS[map].match(/../g) as string[]).map((pair) => parseInt(pair, 16));
   const last = stops.length / 3 - 1;
@@ -25,13 +25,13 @@ export function colorTable(map: ColorMap): Uint8ClampedArray<ArrayBuffer> {
   return table;
 }
 
-/** Where a value lies in [low, high], 0 to 1; on a logarithmic axis if `log` (low > 0). */
+/** Position of a value in [low, high], 0 to 1; on a logarithmic axis if `log` (low > 0). */
 export function place(value: number, low: number, high: number, log: boolean): number {
   const t = log ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low);
   return Math.min(1, Math.max(0, Number.isFinite(t) ? t : 0));
 }
 
-/** A picture of values: 256 colours from low to high; NaN stays transparent. Row 0 of `values` on top. */
+/** An image of values: 256 colors from low to high; NaN is transparent. Row 0 of `values` on top. */
 export function paint(values: ArrayLike<number>, width: number, height: number, map: ColorMap, low: number, high: number, log = false): ImageData {
   const table = colorTable(map);
   const image = new ImageData(width, height);

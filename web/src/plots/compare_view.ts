@@ -1,6 +1,6 @@
 /**
- * The raster picture against the path-traced one, in the place of the page's own display pass: side by side, wiped,
- * or their difference in false colour. Both go through the same exposure and tone curve (display.ts).
+ * Draws the raster picture and the path-traced one instead of the page's own display pass: side by side, wiped, or as
+ * their difference in false color. Both have the same exposure and tone curve (display.ts).
  */
 import type { App, Picture, Presenter } from "../panel";
 import { BROKEN_GLSL, CHECKER_GLSL, FULLSCREEN_VERTEX, TONE_GLSL, TONES } from "../display";
@@ -16,13 +16,13 @@ const MODES: Record<CompareMode | "reference", number> = { off: 0, reference: 1,
 const FRAGMENT = `${HEADER}${TONE_GLSL}${BROKEN_GLSL}${CHECKER_GLSL}
 uniform sampler2D raster;      // sums, bottom row first
 uniform sampler2D reference;   // means, top row first
-uniform sampler2D differences; // top row first; negative: does not count
+uniform sampler2D differences; // top row first; negative: excluded
 uniform sampler2D colors;
 uniform float samples, exposure, wipe, high, shrink;
 uniform vec2 middle;
 uniform int curve, mode;
 uniform bool stacked, furnace;
-uniform vec3 theme;            // colour behind the balls, sRGB
+uniform vec3 theme;            // color behind the balls, sRGB
 uniform vec2 size;
 out vec4 color;
 
@@ -32,7 +32,7 @@ vec4 picture(bool second, vec2 at) {
 
 vec3 shown(vec4 light) {
   if (page_broken(light.rgb)) return page_checker();
-  // In the furnace the light is all round, behind the balls too; else the theme's colour is, as paper.
+  // In the furnace the light is everywhere, behind the balls too; otherwise the background is the theme's color.
   if (furnace) return tone_mapped((light.rgb + max(1.0 - light.a, 0.0)) * exposure, curve);
   vec3 ball = tone_mapped(light.rgb / max(light.a, 1e-6) * exposure, curve);
   return mix(theme, ball, min(light.a, 1.0));
@@ -43,7 +43,7 @@ void main() {
   if (mode <= 1) color = vec4(shown(picture(mode == 1, at)), 1.0);
   else if (mode == 2) color = vec4(shown(picture(at.x > wipe, at)), 1.0);
   else if (mode == 3) {
-    // Both cut to the part that holds the balls, each in its half. The mean of four: one pixel in several would sparkle.
+    // Both are cropped to the balls, one per half, and averaged over four positions: single pixels would alias.
     bool second = stacked ? at.y < 0.5 : at.x > 0.5;
     vec2 part = stacked ? vec2(at.x, fract(2.0 * at.y)) : vec2(fract(2.0 * at.x), at.y);
     vec2 half_at = middle + (part - 0.5) * (stacked ? vec2(shrink, 0.5 * shrink) : vec2(0.5 * shrink, shrink));
@@ -62,7 +62,7 @@ void main() {
 /** Left, bottom, right, top; 0 to 1. */
 type Box = [number, number, number, number];
 
-/** What the balls cover, a little more, and in steps of 1/32, so that it stands still while the picture converges. */
+/** The balls' bounds with a margin, in steps of 1/32, so that they are constant while the picture converges. */
 function coveredBox({ width, height, data }: Picture): Box {
   let [left, top, right, bottom] = [1, 1, 0, 0];
   for (let y = 0; y < height; y++)
@@ -92,9 +92,9 @@ export class CompareView implements Presenter {
   private differences: WebGLTexture | null = null;
   private colors: WebGLTexture | null = null;
   private vao: WebGLVertexArrayObject | null = null;
-  /** End of the difference's colour scale. */
+  /** Upper end of the difference's color scale. */
   high = 1;
-  /** Whether a map has been given since the sizes last changed. */
+  /** Whether a map was set since the sizes last changed. */
   private mapped: [number, number] | null = null;
 
   constructor(
@@ -111,7 +111,7 @@ export class CompareView implements Presenter {
     return true;
   }
 
-  /** Where in the picture a point of the canvas lies, both 0 to 1 from the top left; null in the margins. */
+  /** The position in the picture of a point of the canvas, both 0 to 1 from the top left; null in the margins. */
   pictureAt(width: number, height: number, x: number, y: number): [number, number] | null {
     if (this.app.state.compare.mode !== "side" || !this.upload(this.app.gl)) return [x, y];
     const { middle, shrink } = this.crop(width, height);
@@ -123,7 +123,7 @@ export class CompareView implements Presenter {
     return u >= 0 && v >= 0 && u < 1 && v < 1 ? [u, v] : null;
   }
 
-  /** Middle of what both halves show, from the bottom left, and how many pixels of the picture fall on one of the screen. */
+  /** Center of the part that both halves show, from the bottom left, and picture pixels per screen pixel. */
   private crop(width: number, height: number): { middle: [number, number]; shrink: number } {
     const [left, bottom, right, top] = this.reference?.box ?? [0, 0, 1, 1];
     const [w, h] = [right - left, top - bottom];
@@ -131,7 +131,7 @@ export class CompareView implements Presenter {
     return { middle: [(left + right) / 2, (bottom + top) / 2], shrink };
   }
 
-  /** Values a pixel, top row first; NaN: does not count. */
+  /** Values per pixel, top row first; NaN: excluded. */
   setMap(map: Float32Array, width: number, height: number): void {
     const { gl } = this.app;
     this.differences ??= gl.createTexture();
@@ -139,7 +139,7 @@ export class CompareView implements Presenter {
     this.mapped = [width, height];
   }
 
-  /** The pair as the screen shows it, as linear RGB in [0, 1], top row first. */
+  /** Both pictures as displayed, as linear RGB in [0, 1], top row first. */
   screens({ width, height, test, reference }: Pair): { test: Float32Array; reference: Float32Array } {
     const { gl } = this.app;
     const target = createTarget(gl, width, height, true, false);
@@ -159,8 +159,8 @@ export class CompareView implements Presenter {
   }
 
   /**
-   * Both pictures' linear radiance, at the reference's size: where the raster picture is a whole number of times larger,
-   * its pixels are averaged, which is what its own pixel filter, a box, would have done. Null for any other sizes.
+   * Both pictures' linear radiance, at the reference's size: if the raster picture is an integer number of times larger,
+   * its pixels are averaged, which equals a box filter of the larger pixels. Null for any other sizes.
    */
   pair(): (Pair & { samples: [number, number] }) | null {
     const reference = this.app.referencePicture();
@@ -250,7 +250,7 @@ function shrunk({ width, height, data }: Picture, factor: number): Float32Array 
   return out;
 }
 
-/** Undoes the display's sRGB curve; RGBA in, RGB out. */
+/** Inverts the display's sRGB curve; RGBA in, RGB out. */
 function linear(shown: Float32Array): Float32Array {
   const out = new Float32Array((shown.length / 4) * 3);
   for (let i = 0; i < out.length / 3; i++)

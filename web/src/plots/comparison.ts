@@ -1,6 +1,6 @@
 /**
- * Keeps the comparison with the reference up to date: the view over the canvas, its handle and scale, the figures.
- * One a page, made at its start, since a link may open a page that already compares; the panel only shows and sets.
+ * Updates the comparison with the reference: the view over the canvas, its handle and scale, the figures.
+ * One per page, created at its start, since a link may open a page in which it is on; the panel only shows and sets it.
  */
 import type { App } from "../panel";
 import type { Change } from "../state";
@@ -16,23 +16,23 @@ export const COMPARISON = "compare";
 export const SETTINGS = { kind: "absolute" as Kind, pixels: "inside" as Pixels, range: "auto" };
 
 export interface Figures extends Measures {
-  /** Pixels that hold no finite number and count in FLIP alone. */
+  /** Pixels that are not finite; only FLIP includes them. */
   broken: number;
   flip: number | null;
   samples: [number, number];
 }
 
-/** Twice a second at most: reading the raster picture back stops the GPU. */
+/** Twice a second at most: reading the raster picture back blocks the GPU. */
 const PAUSE = 500;
 
 export class Comparison {
   readonly view: CompareView;
   figures: Figures | null = null;
-  /** Why there are no figures, for the panel to say. */
+  /** Why there are no figures, for the panel to show. */
   lack = "";
   pair: Pair | null = null;
   private listeners = new Set<() => void>();
-  private seen = "";
+  private lastInputs = "";
   private flipOf = "";
   private flip: { map: Float32Array; mean: number } | null = null;
   private timer = 0;
@@ -46,7 +46,7 @@ export class Comparison {
     this.view = new CompareView(app, () => this.presented());
     app.presenter = this.view;
     this.ask = latest(app, () => this.compute());
-    this.handle.setAttribute("aria-label", "Wipe: raster left, reference right; arrow keys move it");
+    this.handle.setAttribute("aria-label", "Wipe: raster left, reference right; arrow keys move the boundary");
     app.overlay.append(this.handle, ...this.tags, this.scale);
     this.listen();
     app.store.subscribe((change) => this.update(change));
@@ -54,8 +54,8 @@ export class Comparison {
   }
 
   settings(): typeof SETTINGS {
-    const kept = this.app.store.panel(COMPARISON, SETTINGS);
-    return { ...kept, kind: kept.kind in KINDS ? kept.kind : "absolute", pixels: kept.pixels in PIXELS ? kept.pixels : "inside" };
+    const settings = this.app.store.panel(COMPARISON, SETTINGS);
+    return { ...settings, kind: settings.kind in KINDS ? settings.kind : "absolute", pixels: settings.pixels in PIXELS ? settings.pixels : "inside" };
   }
 
   subscribe(listener: () => void): () => void {
@@ -63,7 +63,7 @@ export class Comparison {
     return () => this.listeners.delete(listener);
   }
 
-  /** Whether anybody looks at figures or differences. */
+  /** Whether the figures or the differences are visible. */
   private wanted(): boolean {
     return this.app.state.compare.mode === "difference" || this.app.state.dock.open === COMPARISON;
   }
@@ -74,7 +74,7 @@ export class Comparison {
       this.app.redraw();
     }
     if (change.touches(`panels.${COMPARISON}`, "dock", "display", "compare")) {
-      this.seen = "";
+      this.lastInputs = "";
       this.presented();
     }
   }
@@ -98,8 +98,8 @@ export class Comparison {
         app.data.mode === "live"
           ? app.state.view.mesh === "sphere"
             ? "The reference has not sent its first frame yet."
-            : "The reference is of spheres only: choose the sphere as shape to compare."
-          : "This page stands alone: it has no path tracer to compare with. Start `gonio view` for a live reference.";
+            : "The reference renders spheres only: select the sphere as the shape to compare."
+          : "This page has no server, and thus no path tracer to compare with. Start `gonio view` for a live reference.";
       for (const listener of this.listeners) listener();
       return;
     }
@@ -107,27 +107,27 @@ export class Comparison {
     const { term } = app.state.view;
     if (term !== "full" && term !== "compensated") {
       this.figures = this.pair = null;
-      this.lack = "The picture shows one term; the reference shows the whole material. Choose Full to compare.";
+      this.lack = "The picture shows one term; the reference shows the whole material. Select Full to compare.";
       for (const listener of this.listeners) listener();
       return;
     }
     const pair = this.view.pair();
     if (!pair) {
       this.figures = this.pair = null;
-      this.lack = `The reference has ${reference.width} × ${reference.height} pixels, which does not divide the raster picture's.`;
+      this.lack = `The reference has ${reference.width} × ${reference.height} pixels, which do not divide the raster picture's size.`;
       for (const listener of this.listeners) listener();
       return;
     }
     const { kind, pixels, range } = this.settings();
     const { samples } = pair;
     const { exposure, tone, theme } = app.state.display;
-    const seen = [samples, kind, pixels, range, exposure, tone, theme, pair.width, pair.height].join();
-    if (seen === this.seen) return;
-    this.seen = seen;
+    const inputs = [samples, kind, pixels, range, exposure, tone, theme, pair.width, pair.height].join();
+    if (inputs === this.lastInputs) return;
+    this.lastInputs = inputs;
     this.pair = pair;
     this.lack = "";
     const mask = counted(pair, pixels);
-    // What is no number has no distance; on the screen it is a pattern, which FLIP sees as anybody does.
+    // Values that are not finite have no distance; on the screen they are a pattern, which FLIP compares like any other.
     const { finite, broken } = withoutBroken(pair, mask);
     const figures = { ...measure(pair, finite), broken };
     this.figures = { ...figures, flip: this.flip?.mean ?? null, samples };
@@ -149,11 +149,11 @@ export class Comparison {
     for (const listener of this.listeners) listener();
   }
 
-  /** The picture and the reference are of two scenes: no figures of them. */
+  /** The picture and the reference show two scenes: there are no figures. */
   private wait(): void {
     this.figures = this.pair = null;
-    this.seen = "";
-    this.lack = "Waiting for the reference of what is shown now.";
+    this.lastInputs = "";
+    this.lack = "Waiting for the reference of the current state.";
     for (const listener of this.listeners) listener();
   }
 
@@ -173,7 +173,7 @@ export class Comparison {
     const reference = this.app.referencePicture();
     const ready = reference !== null && reference.samples > 0;
     const decorated = JSON.stringify([mode, wipe, reference?.samples, reference?.done, reference?.stale, this.view.high, this.settings(), this.app.canvas.clientWidth, this.app.canvas.clientHeight]);
-    if (decorated === this.decorated) return; // asked after every frame
+    if (decorated === this.decorated) return; // called after every frame
     this.decorated = decorated;
     const two = ready && (mode === "wipe" || mode === "side");
     this.handle.hidden = !(ready && mode === "wipe");
@@ -182,9 +182,9 @@ export class Comparison {
     const [left, right] = this.tags;
     left.hidden = right.hidden = !two;
     left.textContent = "raster";
-    right.textContent = ready ? (reference.stale ? "reference of before …" : `reference, ${reference.samples} spp${reference.done ? "" : " …"}`) : "";
+    right.textContent = ready ? (reference.stale ? "earlier reference …" : `reference, ${reference.samples} spp${reference.done ? "" : " …"}`) : "";
     const stacked = tall && mode === "side";
-    // In the wipe the words go with the bar; below the page's own bar of terms in any case.
+    // In the wipe the labels move with the boundary; they are always below the page's bar of terms.
     const bar = `${100 * wipe}%`;
     Object.assign(left.style, mode === "wipe" ? { left: "auto", right: `calc(100% - ${bar} + 18px)` } : { left: "8px", right: "auto" });
     Object.assign(right.style, mode === "wipe" ? { left: `calc(${bar} + 18px)`, top: "" } : stacked ? { left: "8px", top: "50%" } : { left: "50%", top: "" });
@@ -196,10 +196,10 @@ export class Comparison {
     const { kind, range, pixels } = this.settings();
     const table = colorTable("magma");
     const bar = element("i");
-    const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels lie inside" : "";
+    const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels are inside" : "";
     this.scale.title = `${KINDS[kind]}, ${PIXELS[pixels]}${how}`;
     bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
-    const high = `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " and more"}`;
+    const high = `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " or more"}`;
     this.scale.replaceChildren(element("span", "", `${KINDS[kind]}${this.app.referencePicture()?.stale ? ", of before" : ""}`), element("b", "", "0"), bar, element("b", "", high));
   }
 
@@ -229,7 +229,7 @@ export class Comparison {
   }
 }
 
-/** The next of 1, 2, 5 times a power of ten: a scale that does not twitch while the pictures converge. */
+/** The next of 1, 2, 5 times a power of ten: the scale is constant while the pictures converge. */
 function roundUp(value: number): number {
   if (!(value > 0)) return 1e-6;
   const decade = 10 ** Math.floor(Math.log10(value));
@@ -238,7 +238,7 @@ function roundUp(value: number): number {
 
 const made = new WeakMap<App, Comparison>();
 
-/** The page's comparison; the page calls this once at its start. */
+/** The page's comparison; called once at its start. */
 export function comparisonOf(app: App): Comparison {
   let known = made.get(app);
   if (!known) {

@@ -8,7 +8,7 @@ export interface Series {
   label: string;
   color: string;
   values: (number | null)[];
-  /** Line of a bound rather than of a model. */
+  /** Line style of a bound, as opposed to a model. */
   dashed?: boolean;
   width?: number;
   /** The edge of a band: not in the legend. */
@@ -21,11 +21,11 @@ export interface Chart {
   xTitle: string;
   yTitle: string;
   log?: boolean;
-  /** Bounds of y; computed from the data where null. */
+  /** Bounds of y; computed from the data if null. */
   y?: [number, number] | null;
   xRange: [number, number];
   xTicks?: number;
-  /** Vertical lines with a word: where wo stands, the mirror direction. */
+  /** Labeled vertical lines, such as wo and the mirror direction. */
   marks?: { x: number; label: string }[];
   /** Pairs of series indices (in `series`) to be filled between: error bands. */
   bands?: [number, number, string][];
@@ -50,7 +50,7 @@ export class Curves {
     this.last = chart;
     const { clientWidth: width, clientHeight: height } = this.host;
     if (width < 40 || height < 40) return;
-    // uPlot keeps series and scales from its birth on: born anew where those differ, fed otherwise.
+    // uPlot fixes series and scales at construction: it is rebuilt if those differ, otherwise only its data changes.
     const shape = JSON.stringify([chart.series.map((s) => [s.label, s.color, s.dashed]), chart.xTitle, chart.yTitle, chart.log, chart.xRange, this.app.theme(), width < 480]);
     const data = [chart.x, ...chart.series.map((s) => s.values)] as uPlot.AlignedData;
     if (!this.plot || shape !== this.shape) {
@@ -87,7 +87,7 @@ export class Curves {
           width: s.width ?? 2,
           dash: s.dashed ? [6, 4] : [],
           points: { show: false },
-          pxAlign: 0, // snapped to pixels, a smooth curve gets steps
+          pxAlign: 0, // snapping to pixels would put steps into a smooth curve
           class: s.edge ? "p-edge" : "p-series",
           value: (_: uPlot, v: number | null) => (v === null ? "" : exact(Number(v.toPrecision(6)))),
         })),
@@ -102,9 +102,9 @@ export class Curves {
     const chart = this.last as Chart;
     if (chart.y) return chart.y;
     if (!Number.isFinite(high) || high <= 0) return chart.log ? [1e-3, 1] : [0, 1];
-    // Six decades are what a look at a lobe can use; below lie float32's crumbs.
+    // Six decades are enough to judge a lobe; smaller values are below float32's precision.
     if (chart.log) return [Math.max(low > 0 ? low : high * 1e-6, high * 1e-6) * 0.8, high * 1.5];
-    return [Math.min(0, low), high * (chart.marks?.length ? 1.18 : 1.06)]; // room for the marks' words
+    return [Math.min(0, low), high * (chart.marks?.length ? 1.18 : 1.06)]; // room for the marks' labels
   }
 
   private marks(plot: uPlot): void {
@@ -130,7 +130,7 @@ export class Curves {
   }
 }
 
-/** Powers of ten, and their halves and fifths where there are few. */
+/** Powers of ten, and their 2- and 5-fold multiples if there are few. */
 function decades(low: number, high: number): number[] {
   const [from, to] = [Math.floor(Math.log10(low)), Math.ceil(Math.log10(high))];
   const steps = to - from <= 3 ? [1, 2, 5] : [1];

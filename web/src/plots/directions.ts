@@ -10,7 +10,7 @@ export function polar(theta: number, phi: number): Vec3 {
 }
 
 export const thetaOf = (w: Vec3) => Math.atan2(Math.hypot(w[0], w[1]), w[2]);
-/** Azimuth; 0 for the normal, whose azimuth is any. */
+/** Azimuth; 0 for the normal, whose azimuth is undefined. */
 export const phiOf = (w: Vec3) => (w[0] === 0 && w[1] === 0 ? 0 : Math.atan2(w[1], w[0]));
 
 /** Two unit vectors that complete `axis` to a right-handed frame. */
@@ -21,8 +21,8 @@ export function frameAround(axis: Vec3): [Vec3, Vec3] {
 }
 
 /**
- * wo and wi of the half and difference angles [Rusinkiewicz 1998]: h at (thetaH, phiH); seen from h, wi at
- * (thetaD, phiD); wo is wi mirrored at h. At phiD = 90 degrees and thetaD = 45 degrees both stand beside the plane of h and n.
+ * wo and wi of the half and difference angles [Rusinkiewicz 1998]: h at (thetaH, phiH); relative to h, wi at
+ * (thetaD, phiD); wo is wi mirrored at h. At phiD = 90 and thetaD = 45 degrees both are outside the plane of h and n.
  */
 export function fromHalf(thetaH: number, thetaD: number, phiD: number, phiH = 0): { wo: Vec3; wi: Vec3 } {
   const h = polar(thetaH, phiH);

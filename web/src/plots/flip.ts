@@ -1,13 +1,13 @@
 /**
- * LDR-FLIP [Andersson2020], "FLIP: A Difference Evaluator for Alternating Images": what a person sees who flips
- * between two pictures on a screen, 0 (nothing) to 1, per pixel.
+ * LDR-FLIP [Andersson2020], "FLIP: A Difference Evaluator for Alternating Images": the difference perceived by a viewer
+ * who alternates between two pictures on a screen, 0 (none) to 1, per pixel.
  *
- * Both pictures are what the screen shows, as linear RGB in [0, 1]. The eye's contrast sensitivity blurs both, colours
- * are compared in an L*a*b* with Hunt's adjustment, and edges and points that differ raise the result.
+ * Both pictures are as displayed, as linear RGB in [0, 1]. The eye's contrast sensitivity blurs both, colors are
+ * compared in L*a*b* with Hunt's adjustment, and edges and points that differ increase the result.
  * The same constants and border rule as gonio.pictures.metrics.
  */
 
-/** The usual desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m (section 6 of the paper). */
+/** The usual desk: a 3840-pixel monitor, 0.7 m wide, viewed from 0.7 m (section 6 of the paper). */
 export const PIXELS_PER_DEGREE = (0.7 * (3840 / 0.7) * Math.PI) / 180;
 
 const XYZ_FROM_RGB = [
@@ -34,10 +34,10 @@ const WIDEST = 0.04;
 type Plane = Float64Array;
 type Planes = [Plane, Plane, Plane];
 
-/** A pause between steps: the map of a large picture takes about a second, and the page must stay alive. */
+/** A pause between steps: the map of a large picture takes about a second, and the page has to stay responsive. */
 const breathe = () => new Promise((resolve) => setTimeout(resolve, 0));
 
-/** Interleaved RGB, row 0 on top; returns one value a pixel. */
+/** Interleaved RGB, row 0 on top; returns one value per pixel. */
 export async function flipMap(
   test: ArrayLike<number>,
   reference: ArrayLike<number>,
@@ -46,7 +46,7 @@ export async function flipMap(
   pixelsPerDegree = PIXELS_PER_DEGREE,
 ): Promise<Float32Array> {
   const opponents: Planes[] = [];
-  const seen: Planes[] = [];
+  const labs: Planes[] = [];
   for (const picture of [test, reference]) {
     const opponent = toOpponent(picture, width * height);
     opponents.push(opponent);
@@ -55,12 +55,12 @@ export async function flipMap(
       filtered.push(contrastFilter(plane, SENSITIVITY[i] as (typeof SENSITIVITY)[number], width, height, pixelsPerDegree));
       await breathe();
     }
-    seen.push(huntLab(filtered as Planes));
+    labs.push(huntLab(filtered as Planes));
     await breathe();
   }
   const features = await featureDistance((opponents[0] as Planes)[0], (opponents[1] as Planes)[0], width, height, pixelsPerDegree);
-  const [a, b] = seen as [Planes, Planes];
-  // The farthest pair of the sRGB cube is green and blue.
+  const [a, b] = labs as [Planes, Planes];
+  // The most distant pair of the sRGB cube is green and blue.
   const largest = hyab(labOf(0, 1, 0), labOf(0, 0, 1)) ** HYAB_POWER;
   const knee = KNEE_IN * largest;
   return Float32Array.from(features, (feature, i) => {
@@ -82,12 +82,12 @@ function inverse(m: typeof XYZ_FROM_RGB): number[][] {
   ].map((row) => row.map((x) => x / determinant));
 }
 
-/** XYZ over white. */
+/** XYZ over the white point's. */
 function relativeXyz(r: number, g: number, b: number): [number, number, number] {
   return XYZ_FROM_RGB.map((row, i) => (row[0] * r + row[1] * g + row[2] * b) / (WHITE[i] as number)) as [number, number, number];
 }
 
-/** YyCxCz, the linear twin of L*a*b* in which the eye's filter acts. */
+/** YyCxCz, a linear counterpart of L*a*b* in which the eye's filter is applied. */
 function toOpponent(rgb: ArrayLike<number>, count: number): Planes {
   const planes: Planes = [new Float64Array(count), new Float64Array(count), new Float64Array(count)];
   const clamp = (v: number) => Math.min(1, Math.max(0, v));
@@ -100,7 +100,7 @@ function toOpponent(rgb: ArrayLike<number>, count: number): Planes {
   return planes;
 }
 
-/** Back to RGB in [0, 1], then L*a*b* with a and b scaled by 0.01 L: colours seem fuller when brighter. */
+/** Back to RGB in [0, 1], then L*a*b* with a and b scaled by 0.01 L: brighter colors appear more saturated. */
 function huntLab(ycc: Planes): Planes {
   const count = ycc[0].length;
   const lab: Planes = [new Float64Array(count), new Float64Array(count), new Float64Array(count)];
@@ -127,13 +127,13 @@ function labOf(r: number, g: number, b: number): [number, number, number] {
   return [lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)];
 }
 
-/** City-block in lightness, Euclidean in chroma: better than either for large differences. */
+/** City-block distance in lightness, Euclidean in chroma: better than either for large differences. */
 function hyab(a: readonly number[], b: readonly number[]): number {
   const [l, u, v] = a.map((x, i) => x - (b[i] as number)) as [number, number, number];
   return Math.abs(l) + Math.hypot(u, v);
 }
 
-/** The eye's blur: two separable Gaussians that together sum to one. */
+/** The eye's blur: two separable Gaussians with weights that sum to one. */
 function contrastFilter(plane: Plane, [a1, b1, a2, b2]: readonly [number, number, number, number], width: number, height: number, ppd: number): Plane {
   const radius = Math.ceil(3 * Math.sqrt(WIDEST / (2 * Math.PI ** 2)) * ppd);
   const total = new Float64Array(plane.length);
@@ -177,7 +177,7 @@ async function featureDistance(test: Plane, reference: Plane, width: number, hei
   return worst.map((v) => Math.min(1, (v / Math.SQRT2) ** FEATURE_POWER));
 }
 
-/** Correlates along a row (or a column), the border pixels repeated outward. */
+/** Correlates along a row (or a column), with the border pixels repeated outward. */
 function along(plane: Plane, weights: Float64Array, width: number, height: number, horizontal: boolean): Plane {
   const radius = (weights.length - 1) / 2;
   const [length, lines, step, next] = horizontal ? [width, height, 1, width] : [height, width, width, 1];

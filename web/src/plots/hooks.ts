@@ -1,4 +1,4 @@
-/** What the tests drive from outside: the evaluator by slot and ball, and the metrics, on plain arrays. */
+/** Interface for the tests: the evaluator by slot and ball, and the metrics, on plain arrays. */
 import type { App } from "../panel";
 import { comparisonOf, type Comparison } from "./comparison";
 import { flipMap } from "./flip";

@@ -1,4 +1,4 @@
-/** The lobe as a surface: radius = eval over wi, on rings that crowd round the largest value. */
+/** The lobe as a surface: radius = eval over wi, on rings that are denser near the largest value. */
 import type { Vec3 } from "../data";
 import type { Evaluator } from "../evaluator";
 import { sequence } from "../targets";
@@ -8,7 +8,7 @@ import { frameAround, polar } from "./directions";
 export const RINGS = 120;
 export const SPOKES = 120;
 /**
- * Ring k of n stands at pi (k/n)^2.5 from the axis: the first at 0.02 degrees, so that a lobe of alpha = 0.001 still has
+ * Ring k of n is at pi (k/n)^2.5 from the axis: the first at 0.02 degrees, so that a lobe of alpha = 0.001 still has
  * rings, and the last 2.6 degrees apart.
  */
 const CROWDING = 2.5;
@@ -48,8 +48,8 @@ export async function lobeOf(evaluator: Evaluator, model: Model, wo: Vec3, chann
 }
 
 /**
- * The direction of the largest value among an even grid and 512 directions that the material's own sample() draws: a
- * lobe too narrow for the grid is found by the latter.
+ * The direction of the largest value among a uniform grid and 512 samples of the material's own sample(), which finds
+ * lobes that are too narrow for the grid.
  */
 async function peakDirection(evaluator: Evaluator, model: Model, wo: Vec3, channel: Channel): Promise<Vec3> {
   const candidates: number[] = [];

@@ -1,4 +1,4 @@
-/** Draws lobes in a small WebGL view of its own: z up, orbit by dragging, the surface as a disc. */
+/** Draws lobes in a WebGL view of its own: z up, orbit by dragging, the surface as a disc. */
 import type { Vec3 } from "../data";
 import { add, cross, dot, normalize, scale, sub } from "../vectors";
 import { frameAround } from "./directions";
@@ -7,9 +7,9 @@ import { HEADER, link, type Program } from "../programs";
 export interface Surface {
   /** xyz and RGB (0 to 1), interleaved. */
   vertices: Float32Array;
-  /** See-through, because it holds another. */
+  /** Transparent, because it encloses another lobe. */
   glass: boolean;
-  /** Sorts nested surfaces. */
+  /** Sort key of nested surfaces. */
   size: number;
 }
 
@@ -38,7 +38,7 @@ void main() {
   vec3 normal = normalize(cross(dFdx(at), dFdy(at)) + vec3(0.0, 0.0, 1e-12));
   float facing = abs(dot(normal, normalize(eye - at)));
   float shade = mix(1.0, 0.45 + 0.55 * facing, lit);
-  // Glass shows at its rim, where it is looked through lengthwise, and leaves what it holds its own colour.
+  // A transparent lobe is visible at its rim, at grazing angles, and does not tint the lobe inside it.
   float alpha = mix(1.0, mix(0.75, 0.07, facing), glass);
   result = vec4(tint * shade * alpha, alpha);
 }`;
@@ -61,7 +61,7 @@ export class LobeView {
     private readonly indices: Uint32Array,
   ) {
     const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
-    if (!gl) throw new Error("No second WebGL2 context for the lobe.");
+    if (!gl) throw new Error("The browser provides no second WebGL 2 context for the lobe.");
     this.gl = gl;
     this.program = link(gl, "lobe", VERTEX, FRAGMENT);
     this.buffer = gl.createBuffer();
@@ -70,7 +70,7 @@ export class LobeView {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     this.canvas.className = "p-canvas p-orbit";
     this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("aria-label", "Lobe; drag or arrow keys to turn, wheel to zoom, double-click to reset");
+    this.canvas.setAttribute("aria-label", "Lobe; drag or use arrow keys to rotate, wheel to zoom, double-click to reset");
     this.labels.className = "p-labels";
     host.append(this.canvas, this.labels);
     this.listen();
@@ -158,7 +158,7 @@ export class LobeView {
     gl.uniform3fv(program.uniform("eye"), eye);
     this.lines(this.scaffold());
     gl.enable(gl.CULL_FACE);
-    // Nested shells, from the outside in by their far sides, then from the inside out by their near sides.
+    // Nested shells: from the outside in by their far sides, then from the inside out by their near sides.
     const passes: [Surface, number][] = this.surfaces.map((s) => [s, gl.BACK]);
     for (const surface of this.surfaces) passes.unshift([surface, gl.FRONT]);
     for (const [surface, culled] of passes) {
@@ -207,7 +207,7 @@ export class LobeView {
     for (const { direction, color } of this.arrows) {
       const tip = scale(direction, ARROW);
       segment([0, 0, 0], tip, color);
-      // Four barbs, across two directions at right angles to the arrow.
+      // Four barbs, along two directions perpendicular to the arrow.
       const [x, y] = frameAround(direction);
       for (const [across, sign] of [[x, 1], [x, -1], [y, 1], [y, -1]] as const)
         segment(tip, add(tip, add(scale(direction, -0.08), scale(across, 0.03 * sign))), color);
@@ -225,9 +225,9 @@ export class LobeView {
       const label = this.labels.children[i] as HTMLElement;
       let left = (0.5 + (0.5 * x) / w) * width;
       const top = (0.5 - (0.5 * y) / w) * height;
-      // The view from near the normal: two letters in one place read as a word.
-      const beside = placed.find(([px, py]) => Math.abs(px - left) < 18 && Math.abs(py - top) < 14);
-      if (beside) left = beside[0] + (left < beside[0] ? -20 : 20);
+      // Viewed from near the normal, two letters would overlap and read as one word.
+      const overlapped = placed.find(([px, py]) => Math.abs(px - left) < 18 && Math.abs(py - top) < 14);
+      if (overlapped) left = overlapped[0] + (left < overlapped[0] ? -20 : 20);
       placed.push([left, top]);
       label.style.left = `${left}px`;
       label.style.top = `${top}px`;
@@ -236,11 +236,11 @@ export class LobeView {
   }
 }
 
-/** Arrows end outside the unit ring, so that a lobe does not hide them. */
+/** Arrows end outside the unit ring, where no lobe hides them. */
 const ARROW = 1.12;
 const HOME = { azimuth: -1.15, elevation: 0.42, distance: 2.9 };
 
-/** Column-major, z up, a vertical field of view of 40 degrees that grows where the view is taller than wide. */
+/** Column-major, z up, a vertical field of view of 40 degrees that grows if the view is taller than wide. */
 function viewProjection(eye: Vec3, target: Vec3, aspect: number): Float32Array {
   const back = normalize(sub(eye, target));
   const right = normalize(cross([0, 0, 1], back));

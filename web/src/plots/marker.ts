@@ -1,9 +1,9 @@
-/** Marks the clicked point on its ball while a panel that speaks of it is open: a ring, and the normal as a stroke. */
+/** Marks the clicked point on its ball while a panel that refers to it is open: a ring, and the normal as a line. */
 import type { App, Panel } from "../panel";
 import { add, cameraFrame, scale, toPixel } from "../vectors";
 import { element } from "./base";
 
-/** Length of the normal's stroke, in radii of a ball. */
+/** Length of the normal's line, in radii of a ball. */
 const STROKE = 0.35;
 
 export function installMarker(app: App, panels: readonly Panel[]): void {
@@ -25,7 +25,7 @@ export function installMarker(app: App, panels: readonly Panel[]): void {
     const [dx, dy] = [tip[0] - at[0], tip[1] - at[1]];
     Object.assign(stroke.style, { left: `${at[0]}px`, top: `${at[1]}px`, width: `${Math.hypot(dx, dy)}px`, background: color, rotate: `${Math.atan2(dy, dx)}rad` });
   };
-  // The page picks anew in its own answer to a change, which it subscribed before; a click picks just after its change.
+  // On a change of state the page, which subscribed first, has already picked again; on a click it picks afterwards.
   app.store.subscribe(() => queueMicrotask(place));
   new ResizeObserver(place).observe(app.canvas);
 }

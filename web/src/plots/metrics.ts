@@ -1,11 +1,11 @@
 /**
- * How far the raster picture is from the reference: RMSE and relMSE, over the pixels that count.
+ * Difference of the raster picture from the reference: RMSE and relMSE over a mask of pixels.
  * The same definitions as gonio.pictures.metrics, which `gonio compare` prints.
  */
 
-/** relMSE divides by r^2 + this: a black reference pixel does not rule the mean. */
+/** relMSE divides by r^2 + this, so that a black reference pixel does not dominate the mean. */
 export const RELATIVE_FLOOR = 0.01;
-/** A pixel is inside where its coverage differs from 1 by no more than half float's step (2^-11). */
+/** A pixel is inside if its coverage differs from 1 by no more than the step of half floats (2^-11). */
 const INSIDE = 1 - 2 ** -11;
 
 export type Pixels = "all" | "balls" | "inside";
@@ -24,8 +24,8 @@ export interface Pair {
 }
 
 /**
- * 1 for each pixel that counts. "inside" leaves out every pixel that is partly covered, or beside one that is, in
- * either picture: there the two renderers' pixel filters differ, not the materials.
+ * 1 for each included pixel. "inside" excludes every pixel that is partly covered, or adjacent to one that is, in either
+ * picture: the two renderers' pixel filters differ there.
  */
 export function counted({ width, height, test, reference }: Pair, pixels: Pixels): Uint8Array {
   const count = width * height;
@@ -48,7 +48,7 @@ export function counted({ width, height, test, reference }: Pair, pixels: Pixels
   return mask;
 }
 
-/** Takes the pixels out of a mask where either picture holds no finite number; how many they were. */
+/** Excludes pixels that are not finite in either picture from a mask; returns their number. */
 export function withoutBroken({ test, reference }: Pair, mask: Uint8Array): { finite: Uint8Array; broken: number } {
   const finite = mask.slice();
   let broken = 0;
@@ -63,7 +63,7 @@ export function withoutBroken({ test, reference }: Pair, mask: Uint8Array): { fi
 export interface Measures {
   rmse: number;
   relmse: number;
-  /** mean(x) / mean(r): 1 where no energy is lost or made. */
+  /** mean(x) / mean(r): 1 if no energy is lost or gained. */
   meanRatio: number;
   pixels: number;
 }
@@ -86,7 +86,7 @@ export function measure(pair: Pair, mask: Uint8Array): Measures {
   return { rmse: Math.sqrt(squares / n), relmse: relative / n, meanRatio: sumTest / sumReference, pixels };
 }
 
-/** Per pixel, the mean over the channels; NaN for pixels that do not count. */
+/** Per pixel, the mean over the channels; NaN for excluded pixels. */
 export function differenceMap(pair: Pair, mask: Uint8Array, kind: "absolute" | "relative"): Float32Array {
   return Float32Array.from(mask, (used, i) => {
     if (!used) return Number.NaN;
@@ -109,7 +109,7 @@ export function meanOf(map: Float32Array, mask: Uint8Array): number {
   return sum / n;
 }
 
-/** The value that `share` of the counted pixels do not exceed. */
+/** The value that `share` of the included pixels do not exceed. */
 export function quantile(map: Float32Array, share: number): number {
   const sorted = map.filter((v) => !Number.isNaN(v)).sort();
   return sorted.length ? (sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] as number) : 0;

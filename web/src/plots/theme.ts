@@ -1,13 +1,13 @@
-/** The theme's colours as numbers. */
+/** The theme's colors as numbers. */
 import type { Vec3 } from "../data";
 
 const known = new Map<string, Vec3>();
 let pixel: CanvasRenderingContext2D | null = null;
 
-/** Any CSS colour as sRGB numbers 0 to 1, by asking the browser. */
+/** Any CSS color as sRGB numbers 0 to 1, as parsed by the browser. */
 export function rgb(color: string): Vec3 {
-  const found = known.get(color);
-  if (found) return found;
+  const cached = known.get(color);
+  if (cached) return cached;
   const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
   pixel ??= canvas.getContext("2d", { willReadFrequently: true }) as CanvasRenderingContext2D;
   pixel.fillStyle = "#888";

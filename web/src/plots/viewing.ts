@@ -1,4 +1,4 @@
-/** Where the plots look from: wo of the clicked point, or of two sliders. One setting for all panels that need it. */
+/** The viewing direction of the plots: wo of the clicked point, or of two sliders. One setting for all panels. */
 import type { Vec3 } from "../data";
 import type { App } from "../panel";
 import type { Change } from "../state";
@@ -17,7 +17,7 @@ export function woOf(app: App): Vec3 {
   return clicked ? app.picked.wo : polar(theta * RADIANS, phi * RADIANS);
 }
 
-/** What a plot of wo depends on. */
+/** Dependencies of a plot of wo. */
 export const viewingTouched = (change: Change) => change.touches("slots", "solo", "selection", `panels.${ID}`, "camera", "view.mesh");
 
 export class ViewingControls {
@@ -31,12 +31,12 @@ export class ViewingControls {
     private readonly app: App,
   ) {
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(ID, values);
-    this.clicked = check(host, "ωo of the clicked point", "The direction to the camera at the point clicked in the picture; else the two sliders", (on) =>
+    this.clicked = check(host, "ωo of the clicked point", "The direction to the camera at the point clicked in the picture; otherwise the two sliders", (on) =>
       set(on ? { clicked: true } : { clicked: false, ...this.angles() }),
     );
     this.theta = range(host, "θo", "Angle between ωo and the normal", [0, 180, 0.1], "°", (theta) => set({ ...this.angles(), clicked: false, theta }));
     this.phi = range(host, "φo", "Azimuth of ωo from the tangent", [-180, 180, 1], "°", (phi) => set({ ...this.angles(), clicked: false, phi }));
-    this.channel = select(host, "channel", "Which number of the RGB value is drawn", CHANNELS, (channel) => set({ channel }));
+    this.channel = select(host, "channel", "Channel of the RGB value to draw", CHANNELS, (channel) => set({ channel }));
   }
 
   private angles(): { theta: number; phi: number } {
@@ -44,7 +44,7 @@ export class ViewingControls {
     return { theta: thetaOf(wo) / RADIANS, phi: phiOf(wo) / RADIANS };
   }
 
-  /** `inside`: whether some model transmits, so that wo below the surface means something. */
+  /** `inside`: whether some model transmits, so that wo below the surface is valid. */
   show(inside: boolean): void {
     const { theta, phi } = this.angles();
     this.theta.limits(0, inside ? 180 : 90);

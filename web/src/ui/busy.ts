@@ -1,4 +1,4 @@
-/** The sign that the page is at work, and for how long: where nothing is drawn for a while, it is not broken. */
+/** Indicator of long work, with its duration: it shows that a page without a new picture is not broken. */
 import { element } from "./dom";
 
 export class Busy {
@@ -12,7 +12,7 @@ export class Busy {
     this.host.append(element("i"), this.line);
   }
 
-  /** What is waited for, by what makes the page wait; null: no more. */
+  /** What the page is waiting for, per cause; null: no longer waiting. */
   set(what: string, text: string | null): void {
     const known = this.waits.get(what);
     if (text === null ? !known : known?.text === text) return;

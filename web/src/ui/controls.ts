@@ -1,22 +1,22 @@
 /**
- * Controllers for lil-gui that read and write the page's state: range with a scale, triple of numbers, colour,
- * choice, tick. All of them show the state on `updateDisplay`, and go back on a double click.
+ * Controllers for lil-gui that read and write the page's state: scaled range, triple of numbers, color, choice, tick.
+ * All of them show the state on `updateDisplay`, and restore the initial value on a double click.
  */
 import { Controller, type GUI } from "lil-gui";
 import { element, short } from "./dom";
 
-/** How a slider's travel maps to the value. "square" gives small values room; "log" is for what spans decades. */
+/** Mapping from slider position to value. "square" resolves small values; "log" suits ranges of several decades. */
 export type Scale = "linear" | "square" | "log";
 
 export interface Field<T> {
   label: string;
-  /** What it does, in a line; shown as a tooltip. */
+  /** Its effect, in one line; shown as a tooltip. */
   doc: string;
   symbol?: string;
   unit?: string;
   get(): T;
   set(value: T): void;
-  /** What a double click on the label or the slider brings back. */
+  /** The value that a double click on the label or the slider restores. */
   initial(): T;
 }
 
@@ -28,7 +28,7 @@ class Base<T> extends Controller {
   ) {
     super(gui, { value: 0 }, "value", kind);
     this.name(field.label);
-    const tip = [field.symbol ? `${field.symbol} — ` : "", field.doc, field.unit ? ` [${field.unit}]` : "", "\nDouble click: back to the default."].join("");
+    const tip = [field.symbol ? `${field.symbol} — ` : "", field.doc, field.unit ? ` [${field.unit}]` : "", "\nDouble click: restore the default."].join("");
     this.domElement.title = tip;
     if (field.symbol && field.symbol !== field.label) this.$name.append(" ", element("i", {}, field.symbol));
     if (field.unit) this.$name.append(" ", element("small", {}, field.unit === "degrees" ? "°" : field.unit));
@@ -44,9 +44,9 @@ export interface RangeOptions {
   low: number;
   high: number;
   scale?: Scale;
-  /** Digits of the number; the slider's own step is a thousandth of its way. */
+  /** Digits of the number; the slider's own step is a thousandth of its range. */
   integer?: boolean;
-  /** The number may go beyond the slider's end. */
+  /** The number may exceed the slider's range. */
   open?: boolean;
   hint?: (value: number) => string;
 }
@@ -87,7 +87,7 @@ export class RangeControl extends Base<number> {
     const { low, high, scale } = this.settings;
     if (scale === "square") return low + (high - low) * t * t;
     if (scale === "log") return low * (high / low) ** t;
-    // Three digits of the range: a slider that writes 0.53249 says more than it knows.
+    // Three digits of the range: 0.53249 would pretend precision that a slider lacks.
     const step = 10 ** Math.floor(Math.log10((high - low) / 200));
     return Math.min(high, Math.max(low, Math.round((low + (high - low) * t) / step) * step));
   }
@@ -100,7 +100,7 @@ export class RangeControl extends Base<number> {
   }
 
   override updateDisplay(): this {
-    if (!this.field) return this; // lil-gui's constructor calls before ours has run
+    if (!this.field) return this; // called by lil-gui's constructor, before ours has run
     const value = this.field.get();
     const travel = Math.min(1, Math.max(0, this.toTravel(value)));
     this.slider.value = String(Math.round(travel * TRAVEL));
@@ -115,7 +115,7 @@ export class TripleControl extends Base<number[]> {
   private readonly inputs: HTMLInputElement[];
   private readonly swatch: HTMLInputElement | null;
 
-  /** `color`: values 0 to 1 with a swatch to pick from; the swatch speaks sRGB, the numbers are linear. */
+  /** `color`: values 0 to 1 with a swatch as color picker; the swatch is sRGB, the numbers are linear. */
   constructor(
     gui: GUI,
     field: Field<number[]>,
@@ -138,7 +138,7 @@ export class TripleControl extends Base<number[]> {
     this.swatch = settings.color ? element("input", { type: "color" }) : null;
     if (this.swatch) {
       const swatch = this.swatch;
-      swatch.setAttribute("aria-label", `${field.label}, colour`);
+      swatch.setAttribute("aria-label", `${field.label}, color`);
       swatch.addEventListener("input", () => {
         field.set([1, 3, 5].map((i) => Number(toLinear(Number.parseInt(swatch.value.slice(i, i + 2), 16) / 255).toPrecision(4))));
         this.updateDisplay();
@@ -173,7 +173,7 @@ export class ChoiceControl extends Base<string> {
     gui: GUI,
     field: Field<string>,
     private readonly settings: () => { value: string; label: string; doc?: string; disabled?: boolean }[],
-    /** Linear RGB of what is chosen, shown beside it. */
+    /** Linear RGB of the current choice, shown as a swatch. */
     private readonly color: (() => readonly number[] | null) | null = null,
   ) {
     super(gui, field, "g-choice");
@@ -182,7 +182,7 @@ export class ChoiceControl extends Base<string> {
     this.select.addEventListener("change", () => {
       field.set(this.select.value);
       this.updateDisplay();
-      // Chosen by hand: keys mean the page again. Who chooses by keys goes on in the list.
+      // After a choice by mouse, keys control the page again; after one by keyboard, they stay with the list.
       if (!this.select.matches(":focus-visible")) this.select.blur();
     });
     this.$widget.append(this.select);

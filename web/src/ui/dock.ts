@@ -1,4 +1,4 @@
-/** The tabs under the picture: panels are mounted when first opened and hear of changes while they are open. */
+/** The tabs under the picture: panels are mounted when first opened and notified of changes while they are open. */
 import type { Refresh, PageApp } from "../app";
 import type { Panel } from "../panel";
 import { Change } from "../state";
@@ -28,7 +28,7 @@ export class Dock {
   add(panel: Panel): void {
     const { app, panels } = this;
     if (!panel?.id || !panel.title || typeof panel.mount !== "function") throw new Error("A panel needs an id, a title and mount(host, app).");
-    if (panels.some(({ id }) => id === panel.id)) throw new Error(`There is a panel '${panel.id}' already.`);
+    if (panels.some(({ id }) => id === panel.id)) throw new Error(`A panel '${panel.id}' already exists.`);
     const tab = button(panel.title, panel.doc ?? panel.title, () => app.store.set("dock.open", app.state.dock.open === panel.id ? null : panel.id));
     tab.setAttribute("role", "tab");
     tab.dataset["panel"] = panel.id;
@@ -37,7 +37,7 @@ export class Dock {
     this.tabs.insertBefore(tab, next < 0 ? null : (this.tabs.children[next] ?? null));
     panels.splice(next < 0 ? panels.length : next, 0, panel);
     this.guard(() => panel.install?.(app));
-    this.update(new Change(new Set([""]))); // a link may ask for it to be open
+    this.update(new Change(new Set([""]))); // a link may open it
   }
 
   update(change: Change): void {
@@ -68,7 +68,7 @@ export class Dock {
     if (panel && this.bodies.has(panel.id)) this.guard(() => panel.refresh?.(what));
   }
 
-  /** A panel that fails says so and leaves the page alive. */
+  /** A panel that fails shows the error and does not affect the page. */
   private guard(act: () => void): void {
     try {
       act();

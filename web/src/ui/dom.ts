@@ -1,4 +1,4 @@
-/** Elements in one call, and the few icons of the page. */
+/** Creation of elements, and the page's icons. */
 
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K,
@@ -13,14 +13,14 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** A button with a tooltip that also names its key. */
+/** A button with a tooltip that includes its key. */
 export function button(label: string | Node, title: string, act: () => void, names = ""): HTMLButtonElement {
   const made = element("button", { type: "button", title, class: names, onclick: act }, label);
   if (typeof label !== "string" || label.length < 3) made.setAttribute("aria-label", title);
   return made;
 }
 
-/** One of several: a row of buttons that acts as radio buttons. */
+/** A row of buttons that acts as radio buttons. */
 export function segmented<T extends string>(
   options: readonly { value: T; label: string; title: string }[],
   choose: (value: T) => void,
@@ -45,7 +45,7 @@ export function segmented<T extends string>(
   };
 }
 
-/** 3 significant digits, as people write them in papers: no exponent between 0.001 and 99,999. */
+/** 3 significant digits, without an exponent between 0.001 and 99,999. */
 export function short(value: number): string {
   if (!Number.isFinite(value)) return String(value);
   const size = Math.abs(value);

@@ -1,7 +1,7 @@
-/** Files that are dropped on the page or opened: pictures become the environment, meshes the shape. */
+/** Files dropped on the page or opened: a picture becomes the environment, a mesh the shape. */
 import type { PageApp } from "../app";
 import { environmentFromFloats } from "../environment";
-import { readFactors, wear } from "../gltf-material";
+import { readFactors, applyFactors } from "../gltf-material";
 import { newLight } from "../lights";
 import { readMesh } from "../meshes";
 import { readRadiance } from "../radiance";
@@ -19,7 +19,7 @@ export function openFile(app: PageApp, kind: "environment" | "mesh"): void {
   input.click();
 }
 
-/** The first picture or mesh of what was dropped together; the others are what it may refer to. */
+/** The first picture or mesh of the files dropped together; it may refer to the others. */
 export async function useFiles(app: PageApp, files: readonly File[]): Promise<void> {
   const file = files.find(({ name }) => PICTURES.test(name) || MESHES.test(name)) ?? files[0];
   if (!file) return;
@@ -30,7 +30,7 @@ export async function useFiles(app: PageApp, files: readonly File[]): Promise<vo
     } else if (MESHES.test(file.name)) {
       app.useMesh(await readMesh(file, files.filter((other) => other !== file)));
       const factors = /\.obj$/i.test(file.name) ? null : readFactors(new Uint8Array(await file.arrayBuffer()));
-      if (factors) return app.say(`${file.name} is in use; ${wear(app, factors)}`);
+      if (factors) return app.say(`${file.name} is in use; ${applyFactors(app, factors)}`);
     } else throw new Error(`${file.name}: drop a Radiance picture (.hdr) or a mesh (.glb, .gltf, .obj).`);
     app.say(`${file.name} is in use.`);
   } catch (error) {

@@ -1,4 +1,4 @@
-/** Keys, and the card that lists them. */
+/** Keyboard shortcuts, and the card that lists them. */
 import type { PageApp } from "../app";
 import { orbit, resetCamera, zoom } from "../camera";
 import type { MeshName } from "../state";
@@ -21,7 +21,7 @@ const STEP = Math.PI / 36;
 const MESHES: MeshName[] = ["sphere", "shaderball", "torus"];
 
 const KEYS: Key[] = [
-  { keys: ["ArrowLeft"], name: "← →", doc: "turn the camera about the vertical", act: (app) => orbit(app.store, STEP, 0) },
+  { keys: ["ArrowLeft"], name: "← →", doc: "rotate the camera about the vertical", act: (app) => orbit(app.store, STEP, 0) },
   { keys: ["ArrowRight"], name: "", doc: "", act: (app) => orbit(app.store, -STEP, 0) },
   { keys: ["ArrowUp"], name: "↑ ↓", doc: "raise and lower the camera", act: (app) => orbit(app.store, 0, STEP) },
   { keys: ["ArrowDown"], name: "", doc: "", act: (app) => orbit(app.store, 0, -STEP) },
@@ -50,18 +50,18 @@ const KEYS: Key[] = [
       if (app.state.slots[slot]) app.store.set("solo", app.state.solo === slot ? null : slot);
     },
   },
-  { keys: ["Escape"], name: "Esc", doc: "all rows again", act: (app) => app.store.set("solo", null) },
+  { keys: ["Escape"], name: "Esc", doc: "show all rows", act: (app) => app.store.set("solo", null) },
 ];
 
 export function attachKeys(app: PageApp, actions: Actions, help: HTMLDialogElement): void {
-  // On the way down: the side panel's controls keep key presses to themselves.
+  // In the capture phase: the side panel's controls stop key presses from propagating.
   const listen = (event: KeyboardEvent) => {
     if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
     const target = event.target as HTMLElement;
-    // Letters belong to what is written in; a slider, a tick or a colour just used must not swallow them.
+    // Text fields take letters; a slider, a tick or a color that was just used must not.
     if (target.matches("input:not([type=range], [type=checkbox], [type=color]), select, textarea, [contenteditable]")) return;
     if (target.matches("input") && (event.key.length > 1 || event.key === " ") && event.key !== "Escape") return;
-    // In a row of tabs or a panel's own canvas the arrows belong to it.
+    // In a row of tabs or a panel's own canvas the arrow keys belong to that element.
     if (event.key.startsWith("Arrow") && target.closest(".dock, .overlay, [role=radiogroup]")) return;
     if (event.key === "?" || event.key === "h") {
       help.showModal();
@@ -85,10 +85,10 @@ export function helpCard(notes: readonly string[]): HTMLDialogElement {
     element(
       "ul",
       {},
-      element("li", {}, "Drag turns, shift or right drag moves, the wheel or two fingers zoom."),
-      element("li", {}, "Click on a ball: its parameters are edited, and the panels below show its lobe at that point."),
-      element("li", {}, "Double click on a control: back to its default."),
-      element("li", {}, "Drop an .hdr picture as environment, a .glb, .gltf or .obj as shape."),
+      element("li", {}, "Drag to rotate, shift or right drag to pan, wheel or two fingers to zoom."),
+      element("li", {}, "Click a ball to edit its parameters; the panels below show its lobe at that point."),
+      element("li", {}, "Double-click a control to restore its default."),
+      element("li", {}, "Drop an .hdr picture to set the environment, a .glb, .gltf or .obj to set the shape."),
       ...notes.map((note) => element("li", {}, note)),
     ),
     button("Close", "Close (Esc)", () => dialog.close()),

@@ -1,4 +1,4 @@
-/** Names over the picture: what each row is, and under every ball what sets it apart. */
+/** Labels over the picture: each row's name, and under every ball the parameters in which it differs. */
 import type { PageApp } from "../app";
 import { cameraFrame, sphereBounds, toPixel } from "../vectors";
 import { element } from "./dom";
@@ -24,7 +24,7 @@ export class Labels {
     const letter = (slot: number) => String.fromCharCode(65 + slot);
     const first = app.visibleSlots()[0] ?? 0;
     const minuend = state.view.term === "rows" && !balls.some((b) => b.slot === first) ? `${letter(first)} − ` : "";
-    // Over a bright environment the words stand on paper of their own.
+    // Over a bright environment the labels have a background of their own.
     this.host.toggleAttribute("data-pictured", state.furnace || (state.view.background === "environment" && state.lights.some((l) => l.on && l.type === "environment")));
     let gap = Infinity;
     let last: [number, number] | null = null;
@@ -42,11 +42,11 @@ export class Labels {
       }
       if (ball === 0) {
         const [top, bottom] = [1, -1].map((y) => toPixel(frame, [center[0] - 1.08, center[1] + y, center[2]], width, height));
-        const beside = toPixel(frame, [center[0] - 1.08, center[1], center[2]], width, height);
+        const left = toPixel(frame, [center[0] - 1.08, center[1], center[2]], width, height);
         const name = `${minuend}${letter(slot)}  ${row.label}`;
-        // What does not fit beside the ball would run into the next row's name; the side panel has it in full.
+        // Text too long for the space at the ball would run into the next row's name; the side panel shows it in full.
         const room = Math.floor(Math.max(60, top && bottom ? bottom[1] - top[1] : 0) / 6);
-        if (beside) wanted.push({ text: name.length > room ? `${name.slice(0, room - 1)}…` : name, x: Math.max(16, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot), long: Math.max(60, top && bottom ? bottom[1] - top[1] : 0) });
+        if (left) wanted.push({ text: name.length > room ? `${name.slice(0, room - 1)}…` : name, x: Math.max(16, left[0]), y: left[1], kind: "rowname", color: app.slotColor(slot), long: Math.max(60, top && bottom ? bottom[1] - top[1] : 0) });
       }
     }
     while (this.spans.length < wanted.length) {
@@ -58,7 +58,7 @@ export class Labels {
       const label = wanted[index];
       span.hidden = !label;
       if (!label) return;
-      // Where balls stand close, the word that all of them share would make the labels run into one another.
+      // If balls are close together, the word that all of them share would make the labels overlap.
       const text = label.kind === "ball" && gap < 88 ? label.text.replace(/^roughness /, "r ") : label.text;
       if (span.textContent !== text) span.textContent = text;
       span.className = label.kind;

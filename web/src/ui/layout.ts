@@ -1,4 +1,4 @@
-/** The page's frame: bar on top, picture with its labels, panel at the side, dock below. */
+/** The page's layout: bar on top, picture with its labels, panel at the side, dock below. */
 import { GUI } from "lil-gui";
 import type { Fault, PageApp } from "../app";
 import type { Live } from "../live";
@@ -20,10 +20,10 @@ export interface Frame {
   overlay: HTMLElement;
 }
 
-/** What must stand before the app: a canvas of a size, and a place for labels. */
+/** Elements that the app needs at its start: a canvas with a size, and a container for labels. */
 export function frame(host: HTMLElement): Frame {
   const canvas = element("canvas", { class: "picture", tabIndex: 0 });
-  canvas.setAttribute("aria-label", "Shading balls. Drag to turn, click a ball to edit it, ? for keys.");
+  canvas.setAttribute("aria-label", "Shading balls. Drag to rotate, click a ball to edit it, press ? for keys.");
   const overlay = element("div", { class: "overlay" });
   const stage = element("main", { class: "stage" }, canvas, overlay);
   const root = element("div", { class: "page" }, stage);
@@ -51,7 +51,7 @@ export class Layout {
     const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
     const notes = app.data.notes ?? [];
     const help = helpCard(notes);
-    this.furnace = button("Furnace", "White furnace: radiance 1 from everywhere (F)", () => app.store.set("furnace", !app.state.furnace));
+    this.furnace = button("Furnace", "White furnace: radiance 1 from all directions (F)", () => app.store.set("furnace", !app.state.furnace));
     this.furnace.dataset["act"] = "furnace";
     this.solo = button("All rows", "Show all rows again (Esc)", () => app.store.set("solo", null), "solo-note");
     const bar = element(
@@ -62,9 +62,9 @@ export class Layout {
       ...(notes.length ? [button(notes.length === 1 ? "1 note" : `${notes.length} notes`, notes.join("\n"), () => help.showModal(), "notes")] : []),
       element("span", { class: "spacer" }),
       this.furnace,
-      button("Link", "Copy a link that holds everything you see (C)", actions.copyLink),
+      button("Link", "Copy a link to this view with all its settings (C)", actions.copyLink),
       button("PNG", "Save the picture (S)", actions.screenshot),
-      button("Reset", "Everything back to how the page was made", () => app.store.reset()),
+      button("Reset", "Restore the page's initial state", () => app.store.reset()),
       button("◐", "Light or dark theme (T)", actions.theme, "icon"),
       button("?", "Keys and gestures (?)", () => help.showModal(), "icon"),
     );
@@ -128,7 +128,7 @@ export class Layout {
     if (this.status.textContent !== text) this.status.textContent = text;
   }
 
-  /** Over the last good picture, until the file is mended. */
+  /** Shown over the last valid picture until the file is corrected. */
   private showFault(fault: Fault | null): void {
     this.fault.hidden = fault === null;
     this.fault.replaceChildren(
@@ -140,15 +140,15 @@ export class Layout {
     const link = this.app.link();
     try {
       await navigator.clipboard.writeText(link);
-      this.say("Link copied: it holds everything you see.");
+      this.say("Link copied: it contains all settings of this view.");
     } catch {
-      // Pages from disk and frames may not write to the clipboard: the old way asks for no permission.
+      // Pages from disk and frames may not write to the clipboard: the older API needs no permission.
       const area = element("textarea", { value: link });
       document.body.append(area);
       area.select();
       const copied = document.execCommand("copy");
       area.remove();
-      this.say(copied ? "Link copied: it holds everything you see." : "The browser does not let this page copy; take the link from the address bar.", copied ? "info" : "error");
+      this.say(copied ? "Link copied: it contains all settings of this view." : "The browser does not allow this page to copy; copy the link from the address bar.", copied ? "info" : "error");
     }
   }
 

@@ -1,4 +1,4 @@
-/** Every light that acts, with its values: none is hidden, and each can be switched off. */
+/** Every active light with its values; each can be switched off. */
 import { type GUI } from "lil-gui";
 import type { PageApp } from "../app";
 import type { Vec3 } from "../data";
@@ -9,7 +9,7 @@ import { ChoiceControl, type Field, RangeControl, TickControl, TripleControl, ad
 import { button, element } from "./dom";
 
 const DEGREES = 180 / Math.PI;
-const MOST = 8;
+const MAX_LIGHTS = 8;
 
 export class LightSection {
   private built = "";
@@ -38,7 +38,7 @@ export class LightSection {
     gui.$children.replaceChildren();
     new TickControl(gui, {
       label: "White furnace (F)",
-      doc: "All lights replaced by a constant radiance of 1 from everywhere: a surface that loses nothing vanishes.",
+      doc: "All lights replaced by a constant radiance of 1 from all directions: a surface without energy loss becomes invisible.",
       get: () => app.state.furnace,
       set: (on) => app.store.set("furnace", on),
       initial: () => false,
@@ -47,8 +47,8 @@ export class LightSection {
     if (app.state.furnace) addRow(gui, element("p", { class: "note" }, "The furnace is the only light: radiance 1 from every direction. The lights above are off."));
     const add = (type: Light["type"], label: string) =>
       button(`+ ${label}`, `Add a light: ${label}`, () => {
-        if (app.state.lights.length >= MOST) return app.say(`${MOST} lights are the most.`);
-        if (type === "environment" && app.state.lights.some((l) => l.type === "environment")) return app.say("There is one environment already.");
+        if (app.state.lights.length >= MAX_LIGHTS) return app.say(`No more than ${MAX_LIGHTS} lights are possible.`);
+        if (type === "environment" && app.state.lights.some((l) => l.type === "environment")) return app.say("The scene already has an environment.");
         app.store.update("lights", (state) => state.lights.push(newLight(type)));
       });
     addRow(gui, element("div", { class: "buttons" }, add("directional", "sun"), add("point", "point"), add("area", "area"), add("environment", "environment")));
@@ -68,7 +68,7 @@ export class LightSection {
       set: (value) => app.store.update(`lights.${index}`, (state) => write(state.lights[index] as Light, value)),
       initial: () => read(first()),
     });
-    new TickControl(folder, field("on", "Whether it shines.", (l) => l.on, (l, on) => void (l.on = on)));
+    new TickControl(folder, field("on", "Whether the light is on.", (l) => l.on, (l, on) => void (l.on = on)));
     const vector = (label: string, doc: string, key: string) =>
       new TripleControl(
         folder,
@@ -90,17 +90,17 @@ export class LightSection {
         const [a, e] = [azimuth / DEGREES, elevation / DEGREES];
         Object.assign(l, { direction: [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)] });
       };
-      new RangeControl(folder, field("azimuth", "Where the light stands, about the vertical; 0 is behind the camera.", (l) => angles(l)[0], (l, v) => point(l, v, angles(l)[1]), "degrees"), { low: -180, high: 180 });
+      new RangeControl(folder, field("azimuth", "Azimuth of the light about the vertical; 0 is behind the camera.", (l) => angles(l)[0], (l, v) => point(l, v, angles(l)[1]), "degrees"), { low: -180, high: 180 });
       new RangeControl(folder, field("elevation", "Height above the horizon.", (l) => angles(l)[1], (l, v) => point(l, angles(l)[0], Math.min(89.9, Math.max(-89.9, v))), "degrees"), { low: -90, high: 90 });
       power("irradiance", "On a surface that faces the light, linear RGB.", "irradiance", "W/m²");
     } else if (light.type === "point") {
       vector("position", "World coordinates; a ball has radius 1.", "position");
       power("intensity", "Linear RGB.", "intensity", "W/sr");
     } else if (light.type === "area") {
-      vector("centre", "World coordinates; a ball has radius 1.", "center");
-      vector("half edge u", "From the centre to the middle of one edge.", "u");
-      vector("half edge v", "From the centre to the middle of the other edge.", "v");
-      power("radiance", "The same on both sides, linear RGB.", "radiance", "W/(m² sr)");
+      vector("center", "World coordinates; a ball has radius 1.", "center");
+      vector("half edge u", "From the center to the middle of one edge.", "u");
+      vector("half edge v", "From the center to the middle of the other edge.", "v");
+      power("radiance", "Equal on both sides, linear RGB.", "radiance", "W/(m² sr)");
     } else this.addEnvironment(folder, index, field);
     addRow(folder, element("div", { class: "buttons" }, button("Remove", `Remove this light`, () => app.store.update("lights", (state) => state.lights.splice(index, 1)))));
   }
@@ -110,28 +110,28 @@ export class LightSection {
     const light = app.state.lights[index];
     const pictured = light?.type === "environment" && light.image !== null;
     if (!pictured)
-      new TripleControl(folder, field("radiance", "The same from everywhere, linear RGB.", (l) => (l as { constant: number[] }).constant ?? [], (l, v) => Object.assign(l, { constant: v }), "W/(m² sr)"), { low: 0, high: null, color: false });
-    new RangeControl(folder, field("scale", "Factor on its radiance.", (l) => (l as { scale: number }).scale, (l, v) => Object.assign(l, { scale: v })), { low: 0.01, high: 100, scale: "log", open: true });
+      new TripleControl(folder, field("radiance", "Equal from all directions, linear RGB.", (l) => (l as { constant: number[] }).constant ?? [], (l, v) => Object.assign(l, { constant: v }), "W/(m² sr)"), { low: 0, high: null, color: false });
+    new RangeControl(folder, field("scale", "Factor of its radiance.", (l) => (l as { scale: number }).scale, (l, v) => Object.assign(l, { scale: v })), { low: 0.01, high: 100, scale: "log", open: true });
     if (pictured) {
-      new RangeControl(folder, field("rotation", "About the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180 });
+      new RangeControl(folder, field("rotation", "Angle about the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180 });
       new ChoiceControl(
         folder,
         {
           label: "integral",
-          doc: "How the light of the picture is summed over directions.",
+          doc: "How the light of the picture is integrated over directions.",
           get: () => app.state.environment,
           set: (value) => app.store.set("environment", value as EnvironmentMethod),
           initial: () => "sampled",
         },
         () => [
-          { value: "sampled", label: "sampled, brute force", doc: "Directions by the material's own sample() and toward what is bright, weighed by both densities, summed until it stands still. While they are few the split sum counts beside them, as far as that brings the picture nearer the truth." },
-          ...(app.data.dfg.length ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B (Karis 2013) times the blurred picture: what engines do. Materials with compensation, or without F, take their own albedo." }] : []),
-          { value: "split-sum", label: "split sum, own albedo", doc: "Albedo times the picture blurred by the lobe, both made by the material's own sample()." },
+          { value: "sampled", label: "sampled, brute force", doc: "Multiple importance sampling by the material's own sample() and by the picture's brightness, accumulated until it converges. While there are few samples, a share of the split sum is added to reduce the error." },
+          ...(app.data.dfg.length ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B (Karis 2013) times the blurred picture, as in game engines. Materials with compensation, or without F, take their own albedo." }] : []),
+          { value: "split-sum", label: "split sum, own albedo", doc: "Albedo times the picture blurred by the lobe, both computed by the material's own sample()." },
         ],
       );
     }
-    const drop = button(pictured ? "Other picture…" : "Picture (.hdr)…", "Open a Radiance picture; or drop one on the balls.", () => this.openFile("environment"));
-    const clear = button("No picture", "Back to a constant radiance.", () =>
+    const drop = button(pictured ? "Other picture…" : "Picture (.hdr)…", "Open a Radiance picture, or drop one on the balls.", () => this.openFile("environment"));
+    const clear = button("No picture", "Replace the picture by a constant radiance.", () =>
       app.store.update(`lights.${index}`, (state) => Object.assign(state.lights[index] as Light, { image: null })),
     );
     addRow(folder, element("div", { class: "buttons" }, drop, ...(pictured ? [clear] : [])));

@@ -18,7 +18,7 @@ export class ModelsSection {
     private readonly gui: GUI,
   ) {}
 
-  /** Controls are made anew when the row, its model or its variant changes; else they only show new values. */
+  /** Controls are rebuilt when the row, its model or its variant changes; otherwise they only show new values. */
   update(): void {
     const { app } = this;
     const { selection, slots } = app.state;
@@ -88,13 +88,13 @@ export class ModelsSection {
     }
     const choices = manifest.parameters.filter((p) => (p.kind === "choice" || p.kind === "flag") && this.isOpen(slot, p));
     if (choices.length) {
-      addRow(gui, element("div", { class: "subhead", title: "What shapes the code: each combination is a shader of its own." }, "Choices"));
+      addRow(gui, element("div", { class: "subhead", title: "Options of the shader code: each combination is a separate shader." }, "Choices"));
       for (const parameter of choices) this.addChoice(slot, parameter);
     }
     if (app.state.slots.length > 1)
       new TickControl(gui, {
         label: "Linked rows",
-        doc: "An edit goes to the parameter of the same name in the other rows too.",
+        doc: "An edit also changes the parameter of the same name in the other rows.",
         get: () => app.state.linked,
         set: (on) => app.store.set("linked", on),
         initial: () => true,
@@ -116,7 +116,7 @@ export class ModelsSection {
         const solo = button("solo", `Show row ${letter(slot)} alone`, () => app.store.set("solo", app.state.solo === slot ? null : slot), "mini");
         solo.setAttribute("aria-pressed", String(app.state.solo === slot));
         const eye = button(row.visible ? "●" : "○", `${row.visible ? "Hide" : "Show"} row ${letter(slot)}`, () => {
-          if (row.visible && app.visibleSlots().length === 1) return app.say("One row stays visible.");
+          if (row.visible && app.visibleSlots().length === 1) return app.say("At least one row has to be visible.");
           app.store.set(`slots.${slot}.visible`, !row.visible);
         }, "mini");
         return element("div", { class: "chip-row" }, select, ...(app.state.slots.length > 1 ? [solo, eye] : []));
@@ -126,7 +126,7 @@ export class ModelsSection {
 
   // ---------------------------------------------------------------- one parameter
 
-  /** A choice that the page cannot change is not worth a line, unless a server can write the shader for it. */
+  /** A choice that the page cannot change is not shown, unless a server can write the shader for it. */
   private isOpen(slot: number, parameter: Parameter): boolean {
     return Boolean(this.app.data.socket) || edits.possibleChoices(this.app, slot, parameter).filter((o) => o.here).length > 1;
   }
@@ -172,7 +172,7 @@ export class ModelsSection {
       const width = (value: Value, k: 0 | 1) => (Array.isArray(value) ? (value[k] as number) : (value as number));
       const hint = (roughness: number) => `α = ${short(roughness * roughness)}`;
       const dial = name === "alpha" ? "roughness" : name.replace(/alpha$/, "roughness");
-      // The artist's dial is the square root of the width: what looks like equal steps.
+      // The slider is the square root of the width, which gives perceptually equal steps.
       const top = Math.sqrt(parameter.high ?? 1);
       const clamp = (r: number) => Number((r * r).toPrecision(6));
       if (round)
@@ -197,7 +197,7 @@ export class ModelsSection {
       const value = [edits.currentValue(app, slot, parameter)].flat()[0] as number;
       const open = parameter.high === null;
       const high = parameter.high ?? Math.max(1, 4 * Math.abs(value || 1));
-      // What spans decades gets a logarithm, what starts at 0 and has no end a square.
+      // Ranges of several decades get a logarithmic scale, those from 0 to infinity a square.
       const scale = low > 0 && high / low >= 100 ? "log" : open && low === 0 ? "square" : "linear";
       const scalar = (v: Value) => [v].flat()[0] as number;
       new RangeControl(gui, field(name, scalar, (v) => v), { low, high, scale, open });

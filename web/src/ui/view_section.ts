@@ -11,19 +11,19 @@ import { button, element, segmented } from "./dom";
 
 const TERM_LABELS: Record<Term, [string, string]> = {
   full: ["Full", "The whole material under all lights."],
-  D: ["D", "Distribution of microfacet normals at the half vector, in 1/sr, of the first light. Mind the exposure."],
+  D: ["D", "Distribution of microfacet normals at the half vector, in 1/sr, of the first light. It may need a lower exposure."],
   G: ["G", "Masking and shadowing for the first light."],
   F: ["F", "Fresnel reflectance at the half vector of the first light."],
-  single: ["Single", "Light that bounced once between facets: the base alone."],
-  multi: ["Multi", "Light that bounced more than once: what compensation adds."],
-  compensated: ["Compensated", "Single and multi together. A row without compensation shows what it has."],
-  difference: ["Full − single", "What compensation adds: orange above zero, blue below, black none."],
-  split: ["Split sum", "As engines do: albedo times the blurred environment. Full is the truth."],
-  "split-error": ["Split − full", "Error of the split sum: orange too bright, blue too dark, black none."],
-  rows: ["Row A − row", "The first row minus each other row: orange above zero, blue below, black none."],
+  single: ["Single", "Light scattered once by the facets: the base alone."],
+  multi: ["Multi", "Light scattered more than once: the compensation's addition."],
+  compensated: ["Compensated", "Single and multi together. A row without compensation shows its single scattering."],
+  difference: ["Full − single", "The compensation's addition: positive orange, negative blue, zero black."],
+  split: ["Split sum", "The approximation of game engines: albedo times the blurred environment. Full is the reference."],
+  "split-error": ["Split − full", "Error of the split sum: too bright orange, too dark blue, none black."],
+  rows: ["Row A − row", "The first row minus each other row: positive orange, negative blue, zero black."],
 };
 
-/** The bar above the picture that picks a term, and a line that says what is seen where that is not plain. */
+/** The bar above the picture that selects a term, and a line that explains the picture where necessary. */
 export function termBar(app: PageApp): { host: HTMLElement; note: HTMLElement; update(): void } {
   const bar = segmented(
     (Object.keys(TERM_LABELS) as Term[]).map((value) => ({ value, label: TERM_LABELS[value][0], title: TERM_LABELS[value][1] })),
@@ -45,19 +45,19 @@ export function termBar(app: PageApp): { host: HTMLElement; note: HTMLElement; u
       };
       bar.show(app.state.view.term, possible);
       const { term } = app.state.view;
-      const said = term === "full" ? unseen(app, slots) : TERM_LABELS[term][1];
-      if (note.textContent !== said) note.textContent = note.title = said;
+      const text = term === "full" ? unseen(app, slots) : TERM_LABELS[term][1];
+      if (note.textContent !== text) note.textContent = note.title = text;
     },
   };
 }
 
-/** Why a row is black, where the lights are to blame. */
+/** Why a row is black, if the lights are the cause. */
 function unseen(app: PageApp, slots: number[]): string {
   const lights = actingLights(app.state);
   if (lights.length === 0) return "No light is on.";
   if (lights.some((light) => light.type === "environment")) return "";
   const mirrors = slots.filter((slot) => app.shaderOf(slot).manifest.delta === "always").map((slot) => String.fromCharCode(65 + slot));
-  return mirrors.length ? `${mirrors.join(", ")}: a mirror shows an environment only; its one direction never meets these lights.` : "";
+  return mirrors.length ? `${mirrors.join(", ")}: a mirror reflects an environment only; its single direction never hits these lights.` : "";
 }
 
 export class ViewSection {
@@ -71,7 +71,7 @@ export class ViewSection {
       gui,
       {
         label: "Shape",
-        doc: "What carries the material; a dropped .glb, .gltf or .obj takes its place.",
+        doc: "The shape of the material samples; a dropped .glb, .gltf or .obj replaces it.",
         get: () => app.state.view.mesh,
         set: (mesh) => (mesh === "file" && !app.hasMeshFile() ? openFile("mesh") : store.set("view.mesh", mesh as State["view"]["mesh"])),
         initial: () => store.initial.view.mesh,
@@ -87,7 +87,7 @@ export class ViewSection {
       gui,
       {
         label: "Behind",
-        doc: "What is seen behind the balls.",
+        doc: "What is visible behind the balls.",
         get: () => (app.state.furnace ? "environment" : app.state.view.background),
         set: (value) => store.set("view.background", value === "environment" ? "environment" : "theme"),
         initial: () => "theme",
@@ -97,14 +97,14 @@ export class ViewSection {
         { value: "environment", label: "environment" },
       ],
     );
-    new RangeControl(gui, { label: "Exposure", doc: "Doublings of the light before the tone curve.", unit: "stops", get: () => app.state.display.exposure, set: (v) => store.set("display.exposure", v), initial: () => store.initial.display.exposure }, { low: -8, high: 8, open: false });
+    new RangeControl(gui, { label: "Exposure", doc: "Exposure in stops, applied before the tone curve.", unit: "stops", get: () => app.state.display.exposure, set: (v) => store.set("display.exposure", v), initial: () => store.initial.display.exposure }, { low: -8, high: 8, open: false });
     new ChoiceControl(
       gui,
-      { label: "Tone curve", doc: "From radiance to the screen; sRGB comes after it.", get: () => app.state.display.tone, set: (tone) => store.set("display.tone", tone as State["display"]["tone"]), initial: () => store.initial.display.tone },
+      { label: "Tone curve", doc: "Mapping of radiance to the display range, before sRGB.", get: () => app.state.display.tone, set: (tone) => store.set("display.tone", tone as State["display"]["tone"]), initial: () => store.initial.display.tone },
       () => Object.entries(TONES).map(([value, { doc }]) => ({ value, label: value, doc })),
     );
-    new TickControl(gui, { label: "Labels", doc: "Names under the balls and beside the rows. Key: L", get: () => app.state.view.labels, set: (on) => store.set("view.labels", on), initial: () => true });
-    addRow(gui, element("div", { class: "buttons" }, button("Reset camera", "Back to the first view (double click on the picture)", () => resetCamera(store))));
+    new TickControl(gui, { label: "Labels", doc: "Names under the balls and at the rows. Key: L", get: () => app.state.view.labels, set: (on) => store.set("view.labels", on), initial: () => true });
+    addRow(gui, element("div", { class: "buttons" }, button("Reset camera", "Restore the initial view (double-click the picture)", () => resetCamera(store))));
   }
 
   update(): void {

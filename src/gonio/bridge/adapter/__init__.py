@@ -1,10 +1,10 @@
 """Every Gonio model as a Mitsuba plugin, by one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
 
-A plugin's properties carry the names of the model's parameters. Every plugin takes two properties more: `two_sided`
-(shade both sides; no nested call as in Mitsuba's own `twosided`) and, where the model has presets, `preset`.
+The properties of a plugin have the names of the model's parameters. Every plugin takes two more: `two_sided` (shades
+both sides, without the nested call of Mitsuba's own `twosided`) and, if the model has presets, `preset`.
 
-In polarized variants a plugin hands out Mueller matrices of what single facets have reflected or refracted; all else
-leaves unpolarized.
+In polarized variants a plugin returns Mueller matrices of the light that single facets have reflected or refracted; the
+rest leaves unpolarized.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _models: dict[str, type[BSDF]] = {}  # plugin -> model, the newest of that name
 
 
 def register(mi: ModuleType) -> None:
-    """Register every model with the current variant, now and whenever another one joins the family."""
+    """Register every model with the current variant, now and each time another one joins the family."""
     BSDF.family.watch(_joined)
     if mi.variant() is not None:
         for name, model in models().items():
@@ -33,7 +33,7 @@ def register(mi: ModuleType) -> None:
 
 
 def register_model(mi: ModuleType, model: type[BSDF]) -> str:
-    """The name of a model's plugin, which a class of the user's own gets here; call `register` first."""
+    """Name of a model's plugin, which is registered here if the class is the user's own; call `register` first."""
     if models().get(model.name) is model:
         return plugin_name(model.name)
     name = f"gonio_own_{model.name.replace('-', '_')}"
@@ -61,5 +61,5 @@ def _register(mi: ModuleType, name: str, model: type[BSDF]) -> None:
 def _refused(props: Properties) -> Plugin:
     import mitsuba as mi
 
-    what = f"variant {mi.variant()} works on one ray at a time, Gonio's materials on arrays"
+    what = f"variant {mi.variant()} works on one ray at a time, but Gonio's materials work on arrays"
     raise InputError(what, str(props.plugin_name()), "set llvm_ad_rgb, or another that starts with llvm or cuda")

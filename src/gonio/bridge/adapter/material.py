@@ -1,4 +1,4 @@
-"""A material in a Mitsuba scene: parameters read from a plugin's properties, and bound at the points that rays hit."""
+"""A material in a Mitsuba scene: reads its parameters from a plugin's properties and binds them at the hit points."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def plugin_name(model_name: str) -> str:
 
 
 class PlacedMaterial:
-    """A material and where its values come from.
+    """A material and the sources of its values.
 
-    model    the material with plain values that tell its facts: of a texture the range, of a plugin of Mitsuba's inside
-             it what stands for that
-    slots    where each numeric parameter's value comes from
-    inner    plugins of the materials inside it: Mitsuba's, and Gonio's with their placed materials
-    derived  what it derives from its parameters, found once, where these are the same at every hit
+    model    the material with plain values that describe its facts: a texture is represented by its range, a Mitsuba
+             plugin inside it by a stand-in
+    slots    the source of each numeric parameter's value
+    inner    plugins of the nested materials: Mitsuba's, and Gonio's with their placed materials
+    derived  quantities derived from the parameters, computed once if these are the same at every hit
     """
 
     def __init__(self, variant: Variant, props: Properties, model: type[BSDF]) -> None:
@@ -40,17 +40,17 @@ class PlacedMaterial:
         self.inner: dict[str, tuple[BSDFPlugin, PlacedMaterial | MitsubaBSDF]] = {}
         values: dict[str, OfVariant] = {}
         for name, parameter in model.parameters().items():
-            where = f"{self.name}.{name}"
+            location = f"{self.name}.{name}"
             if parameter.inner:
                 self.inner[name] = self._child(props, name)
                 held = self.inner[name][1]
                 values[name] = held.model if isinstance(held, PlacedMaterial) else held
             elif parameter.numeric:
-                self.slots[name] = Slot(variant, props, parameter, where, preset)
+                self.slots[name] = Slot(variant, props, parameter, location, preset)
                 values[name] = self.slots[name].plain
             else:
                 values[name] = props.get(name, preset.values.get(name, parameter.default))
-                parameter.check(values[name], where)
+                parameter.check(values[name], location)
         unknown = list(props.unqueried())
         if unknown:
             hint = did_you_mean(unknown[0], [*model.parameters(), "two_sided"])
@@ -63,7 +63,7 @@ class PlacedMaterial:
             raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
         for name in ("absorption", "priority"):
             if name in self.slots and self.slots[name].varies:
-                raise InputError("a texture given, and the inside has no place on the surface", f"{self.name}.{name}")
+                raise InputError("a texture given, but the interior has no uv coordinates", f"{self.name}.{name}")
         self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
         self.derived: OfVariant = None
         self.derive()
@@ -75,12 +75,12 @@ class PlacedMaterial:
         return child, getattr(child, "placed", None) or MitsubaBSDF(child)
 
     def derive(self) -> None:
-        """Find once what the model derives from values that are the same at every hit."""
+        """Compute once what the model derives from values that are the same at every hit."""
         self.derived = None
         if self.varies and self.model.needs_uniform:
-            what = "this base is measured: it takes colours and numbers, no texture, unlike conductor and dielectric"
-            raise InputError(what, f"{self.name}.base")
-        guide_search.prepare(self.model)  # integrators ask inside loops
+            what = "a texture given, but this base needs tables, which are computed for colors and numbers"
+            raise InputError(what, f"{self.name}.base", "conductor and dielectric take textures")
+        guide_search.prepare(self.model)  # no guide can be built while an integrator records a loop
         if self.model.derives and not self.varies:
             self.derived = binding.evaluate_derived(
                 self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True)
@@ -88,8 +88,8 @@ class PlacedMaterial:
 
     @property
     def varies(self) -> bool:
-        """Whether a parameter, here or further in, has not the same value at every hit: textures, and spectra, which
-        are looked up at a ray's wavelengths."""
+        """Whether a parameter of this material or of a nested one differs between hits: textures do, and so do spectra,
+        which are evaluated at a ray's wavelengths."""
         return (
             self._by_wavelength
             or any(slot.textures or slot.curves for slot in self.slots.values())
@@ -98,12 +98,12 @@ class PlacedMaterial:
 
     @property
     def _by_wavelength(self) -> bool:
-        """Whether the model is told the rays' wavelengths."""
+        """Whether the model reads the wavelengths of the rays."""
         return self.variant.spectral and self.model.reads_wavelengths
 
     @property
     def disperses(self) -> bool:
-        """Whether an index, here or further in, depends on the wavelength."""
+        """Whether an index of this material or of a nested one depends on the wavelength."""
         return any(slot.curves for slot in self.slots.values()) or any(
             isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
         )
@@ -116,11 +116,11 @@ class PlacedMaterial:
         outer: Float | None = None,
         inner: bool = False,
     ) -> BSDF:
-        """The model, its parameters bound to their values at a surface interaction.
+        """The model with its parameters bound to their values at a surface interaction.
 
-        separates  whether an index that depends on the wavelength is that of the first of the ray's
-        outer      index outside of the surface, over which those of the inside are then
-        inner      it is part of another material, which alone decides whether both sides are shaded
+        separates  whether a dispersive index is evaluated at the ray's first wavelength
+        outer      index outside the surface, by which those of the inside are divided
+        inner      whether it is part of another material, which then alone determines whether both sides are shaded
         """
         values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
@@ -132,12 +132,12 @@ class PlacedMaterial:
         if self.model.reads_surface:
             x, y = si.sh_frame.s, si.sh_frame.t
             values["surface"] = (dr.dot(si.dp_du, x), dr.dot(si.dp_dv, x), dr.dot(si.dp_dv, y))
-        # what was derived once is that of the index over the vacuum's
+        # The derived quantities were computed for an index relative to vacuum.
         bound = binding.bound_copy(self.model, values, self.derived if outer is None else None)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 
     def traverse(self, callback: TraversalCallback) -> None:
-        """Tell Mitsuba of every value that may be changed."""
+        """Announce every value that may be changed to Mitsuba."""
         flag = self.variant.mi.ParamFlags.Differentiable
         for slot in self.slots.values():
             for name, value in {**slot.values, **slot.textures}.items():
@@ -146,7 +146,7 @@ class PlacedMaterial:
             callback.put(name, plugin, flag)
 
     def changed(self) -> None:
-        """Values have been changed."""
+        """Update what depends on the values after a change."""
         for slot in self.slots.values():
             dr.make_opaque(*slot.values.values())
         if self.follows:
@@ -156,19 +156,19 @@ class PlacedMaterial:
 
     @property
     def follows(self) -> bool:
-        """Whether the model's plain values must be those of now: tables are found from them, or layers that are off by
-        them have no code."""
+        """Whether the model must hold the current values, because tables are computed from them or because layers that
+        they switch off have no code."""
         layers = any(leaf.parameter.off is not None for leaf in tree.leaves(self.model))
         return layers or bool(self.model.fixed)
 
     def now(self) -> BSDF:
-        """The model with the values of now, where those are the same everywhere."""
+        """The model with its current values, where these are the same everywhere."""
         inner = {name: held.now() for name, (_, held) in self.inner.items() if isinstance(held, PlacedMaterial)}
         return tree.rebuild(self.model, {**{name: slot.now() for name, slot in self.slots.items()}, **inner})
 
 
 def _preset(props: Properties, model: type[BSDF]) -> NamedPreset:
-    """The preset that is named; one without values where none is."""
+    """The preset that the properties name; one without values if they name none."""
     known = model.presets()
     if "preset" not in props or not known:
         return NamedPreset("", {})

@@ -1,7 +1,7 @@
-"""Where the values of a plugin's parameters come from: numbers and colours that Dr.Jit holds, or textures.
+"""The sources of a plugin's parameter values: numbers and colors held by Dr.Jit, or textures.
 
-A number or colour is opaque (a changed value compiles nothing); anything else is a texture that is looked up at each
-hit. Widths may be given as `alpha`, or as `alpha_x` and `alpha_y`.
+Numbers and colors are opaque (a changed value compiles nothing); textures are evaluated at each hit. A roughness may be
+given as `alpha`, or as `alpha_x` and `alpha_y`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ...optics.dispersion import DispersiveIndex
 from ..types import Float, Mask, OfVariant, Properties, SurfaceInteraction, Texture
 from .variant import Variant
 
-Plain: TypeAlias = OfVariant  # a number, a colour or a pair of widths, as a material's constructor takes them
+Plain: TypeAlias = OfVariant  # a number, a color or a pair of alphas, as a material's constructor takes them
 
 
 class NamedPreset(NamedTuple):
@@ -34,13 +34,13 @@ class Slot:
     """A numeric parameter of a plugin.
 
     values    opaque values by property ("alpha", or "alpha_x" and "alpha_y")
-    textures  the others
-    curves    those of an index that depends on the wavelength: eta by nanometre
-    plain     numbers that tell the parameter's range (of a texture: from the lowest to the highest)
+    textures  properties that are textures
+    curves    dispersive indices: eta per nanometer
+    plain     plain numbers within the parameter's range; of a texture the lowest and the highest value
     """
 
-    def __init__(self, variant: Variant, props: Properties, parameter: Parameter, where: str, preset: NamedPreset):
-        self.variant, self.parameter, self.where = variant, parameter, where
+    def __init__(self, variant: Variant, props: Properties, parameter: Parameter, location: str, preset: NamedPreset):
+        self.variant, self.parameter, self.location = variant, parameter, location
         self.values: dict[str, Float] = {}
         self.textures: dict[str, Texture] = {}
         self.curves: dict[str, Float] = {}
@@ -54,7 +54,7 @@ class Slot:
         if self.parameter.kind != "alpha" or not any(one in props for one in both):
             return [name]
         if not all(one in props for one in both) or name in props:
-            raise InputError(f"give {name}, or both {both[0]} and {both[1]}", self.where)
+            raise InputError(f"give {name}, or both {both[0]} and {both[1]}", self.location)
         return both
 
     def _read(self, props: Properties, name: str, preset: NamedPreset) -> Plain:
@@ -64,30 +64,30 @@ class Slot:
         if name in props:
             given = props.type(name)
             if given == kinds.String and isinstance(parameter, IndexParameter):
-                return self._constant(name, parameter.coerce(str(props[name]), self.where))
+                return self._constant(name, parameter.coerce(str(props[name]), self.location))
             if given == kinds.String:
-                raise InputError(f"'{props[name]}' given, a number or a texture expected", self.where)
+                raise InputError(f"'{props[name]}' given, a number or a texture expected", self.location)
             if given in (kinds.Float, kinds.Integer):
                 return self._constant(name, float(props[name]))
             if given == kinds.Color and not variant.spectral:
                 return self._constant(name, np.asarray(props[name], dtype=float).ravel())
             return self._texture(name, props.get_unbounded_texture(name))
         if parameter.required and name not in preset.values:
-            raise InputError("missing", self.where, parameter.doc)
+            raise InputError("missing", self.location, parameter.doc)
         value = preset.values.get(name, parameter.default)
         if np.ndim(value) == 0 or not variant.spectral:
             return self._constant(name, value)
         if np.min(value) < 0.0:
-            what = f"{np.min(value):g} given, and spectral variants have no spectrum of a negative colour"
-            raise InputError(what, self.where, "render it in an RGB variant, such as llvm_ad_rgb")
+            what = f"{np.min(value):g} given, but a negative color has no spectrum"
+            raise InputError(what, self.location, "render it in an RGB variant, such as llvm_ad_rgb")
         measured = variant.measured(preset.name, name) if name in preset.values else None
         self.textures[name] = variant.through_rgb(value) if measured is None else measured
         return value
 
     def _constant(self, name: str, value: Plain) -> Plain:
-        self.parameter.check(value, self.where)
+        self.parameter.check(value, self.location)
         if self.parameter.kind == "angle" and value == 0:
-            return value  # no rotation at all
+            return value  # static: no rotation is compiled
         if self.variant.spectral and isinstance(value, DispersiveIndex) and value.constants.disperses:
             self.curves[name] = self.variant.dispersion(value.constants)
         if self.parameter.kind == "spectrum":
@@ -99,49 +99,49 @@ class Slot:
 
     def _texture(self, name: str, texture: Texture) -> Plain:
         if self.parameter.kind == "spectrum":
-            colour = self.variant.uniform(texture)
-            if colour is not None:
-                self.values[name] = colour
-                return np.broadcast_to(np.asarray(colour).ravel(), 3)
+            color = self.variant.uniform(texture)
+            if color is not None:
+                self.values[name] = color
+                return np.broadcast_to(np.asarray(color).ravel(), 3)
         self.textures[name] = texture
-        span = getattr(texture, "span", None)  # one of ours knows its own
+        span = getattr(texture, "span", None)  # Gonio's textures have one
         if span is not None:
             for plain in span:
-                self.parameter.check(plain if self.parameter.kind == "spectrum" else float(plain[0]), self.where)
+                self.parameter.check(plain if self.parameter.kind == "spectrum" else float(plain[0]), self.location)
             return span if self.parameter.kind == "spectrum" else span[:, 0]
         span = np.array([max(self.parameter.low, 0.0), min(self.parameter.high, 1.0)])
         return np.tile(span[:, None], 3) if self.parameter.kind == "spectrum" else span
 
     @property
     def varies(self) -> bool:
-        """Whether it has other values elsewhere on the surface."""
+        """Whether the value differs between points of the surface."""
         return any(texture.is_spatially_varying() for texture in self.textures.values())
 
     def now(self) -> Plain:
-        """Numbers that tell the values of now, within their range; of textures and curves as `plain`."""
+        """Plain numbers for the current values, clamped to the parameter's range; `plain` for textures and curves."""
         if self.textures or self.curves or self.variant.spectral or not self.values:
             return self.plain
         parameter = self.parameter
-        found = [
+        values = [
             np.clip(np.asarray(dr.detach(v), float).ravel(), parameter.low, parameter.high)
             for v in self.values.values()
         ]
         if parameter.kind == "spectrum":
-            return tuple(np.broadcast_to(found[0], 3).tolist())
-        return tuple(float(value[0]) for value in found) if len(found) == 2 else float(found[0][0])
+            return tuple(np.broadcast_to(values[0], 3).tolist())
+        return tuple(float(value[0]) for value in values) if len(values) == 2 else float(values[0][0])
 
     def at(
         self, si: SurfaceInteraction, active: Mask, separates: bool = False, outer: Float | None = None
     ) -> OfVariant:
-        """The bound value at a surface interaction: as `Parameter.bind` would have it.
+        """The bound value at a surface interaction, as `Parameter.bind` returns it.
 
-        separates  whether an index is that of the ray's first wavelength, or one for all of them
-        outer      what an index is divided by
+        separates  whether a dispersive index is evaluated at the ray's first wavelength
+        outer      index outside the surface, by which an index is divided
         """
         kind = self.parameter.kind
         result = dict(self.values)
         for name, curve in self.curves.items() if separates else ():
-            result[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
+            result[name] = self.variant.interpolated(curve, si.wavelengths[0], active)
         for name, texture in self.textures.items():
             result[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
         if outer is not None and isinstance(self.parameter, IndexParameter):

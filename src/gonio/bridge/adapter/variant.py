@@ -1,4 +1,4 @@
-"""What differs between Mitsuba's variants: how a colour is held, and what a BSDF hands out."""
+"""The differences between Mitsuba's variants: how a color is represented, and what a BSDF returns."""
 
 from __future__ import annotations
 
@@ -18,48 +18,48 @@ from ..types import Float, Mask, Radiance, Texture, Vector
 
 Floats: TypeAlias = NDArray[np.float64]
 
-GRID = np.arange(360.0, 831.0)  # nm, where spectral variants have light
+GRID = np.arange(360.0, 831.0)  # nm, the wavelengths of spectral variants
 
 
-# Of a BSDF's flags: its index depends on the wavelength. Mitsuba's own end at bit 15, and it passes others on.
+# BSDF flag: the index depends on the wavelength. Mitsuba's own flags end at bit 15, and it passes others on.
 DISPERSES = 1 << 24
 
-# The types of lobes that an integrator of Gonio's asks for: all, and by the last bit, which is no type, it says that it
-# lets a path go on with its first wavelength alone where that refracts otherwise than the others. Anyone else gets the
-# index of sodium light at all wavelengths.
+# Type mask of Gonio's integrators: all lobes, plus a last bit that stands for no type and tells the BSDF that a path
+# continues with its first wavelength alone where wavelengths refract differently. Other callers get the index of sodium
+# light at all wavelengths.
 SEPARATES = (1 << 31) - 1
 
-# The same of one that knows what lies outside of a surface: a hit's `duv_dx.x`, which nothing of ours has a use for, is
-# the index there less 1.
+# The same for an integrator that knows the medium outside a surface: it passes the index there, minus 1, in the hit's
+# `duv_dx.x`, which Gonio does not use otherwise.
 NESTS = SEPARATES - (1 << 30)
 
 
 class Variant:
     """The variant that was set when this was made.
 
-    spectrum  the type of an unpolarized spectrum: one channel, three, or one a wavelength
+    spectrum  the type of an unpolarized spectrum: one channel, three, or one per wavelength
     """
 
     def __init__(self, mi: ModuleType) -> None:
         self.mi = mi
         self.spectrum = mi.UnpolarizedSpectrum
         self.channels = dr.size_v(self.spectrum)
-        self.spectral = bool(mi.is_spectral)  # colours depend on the ray's wavelengths: they are textures
+        self.spectral = bool(mi.is_spectral)  # colors depend on the ray's wavelengths, so they are textures
 
-    def handed_out(self, value: Radiance) -> Radiance:
-        """A material's value as Mitsuba takes it, where it is no Mueller matrix."""
+    def to_mitsuba(self, value: Radiance) -> Radiance:
+        """A material's value in Mitsuba's type, unpolarized."""
         return self.mi.Spectrum(value)
 
     def mueller(
         self, value: Radiance, total: Radiance, parts: Sequence[Polarized], toward: Vector, away: Vector
     ) -> Radiance:
-        """A material's value as a Mueller matrix: of each part as its facets have it, and what is left unpolarized.
+        """A material's value as a Mueller matrix: polarized parts by their facets, plus an unpolarized rest.
 
-        value   what unpolarized light gives
-        total   what the parts are parts of
-        toward  from where light arrives, and
-        away    where it goes to; both away from the surface. As in Mitsuba the matrix is one from the Stokes basis of
-                the one ray to that of the other (`mi.mueller.stokes_basis`)
+        value   the value for unpolarized light
+        total   the sum of which `parts` are parts
+        toward  direction to the light source, away from the surface
+        away    direction in which the light leaves. As in Mitsuba, the matrix maps the Stokes basis of the one ray to
+                that of the other (`mi.mueller.stokes_basis`)
         """
         mi = self.mi
         matrix, rest = dr.zeros(mi.Spectrum), self.spectrum(value)
@@ -76,21 +76,21 @@ class Variant:
         return matrix
 
     def _across(self, normal: Vector, ray: Vector) -> Vector:
-        """The direction of s on a ray: perpendicular to the plane of incidence; any where the ray is the normal."""
+        """The s direction of a ray: perpendicular to the plane of incidence; arbitrary at normal incidence."""
         across = dr.cross(self.mi.Vector3f(normal), ray)
         length2 = dr.squared_norm(across)
         any_ = self.mi.coordinate_system(ray)[0]
         return dr.select(length2 > 1e-12, across * dr.rsqrt(dr.maximum(length2, 1e-30)), any_)
 
     def constant(self, value: float | Sequence[float]) -> Radiance:
-        """A number (grey), or r, g, b where the variant is not spectral; alone, r, g, b is its luminance."""
+        """A number (gray) or r, g, b, the latter not in spectral variants; in mono, r, g, b becomes its luminance."""
         if np.ndim(value) == 0:
             return self.spectrum(float(value))  # type: ignore[arg-type]
-        colour = self.mi.Color3f(*map(float, value))  # type: ignore[arg-type]
-        return self.spectrum(self.mi.luminance(colour)) if self.mi.is_monochromatic else self.spectrum(colour)
+        color = self.mi.Color3f(*map(float, value))  # type: ignore[arg-type]
+        return self.spectrum(self.mi.luminance(color)) if self.mi.is_monochromatic else self.spectrum(color)
 
     def uniform(self, texture: Texture) -> Radiance | None:
-        """The opaque colour of a texture that is one colour everywhere, else None; spectra stay textures."""
+        """The opaque color of a texture that is the same everywhere, else None; spectra stay textures."""
         if self.spectral or texture.is_spatially_varying():
             return None
         value = self.spectrum(texture.eval(dr.zeros(self.mi.SurfaceInteraction3f)))
@@ -98,13 +98,13 @@ class Variant:
         return value
 
     def dispersion(self, constants: OpticalConstants) -> Float:
-        """eta at each nanometre of `GRID`, as a kernel reads it; level where the source ends."""
+        """eta at each nanometer of `GRID`, as kernel data; constant beyond the ends of the source."""
         values = self.mi.Float(constants.at(GRID, "level").eta.astype(np.float32))
         dr.make_opaque(values)
         return values
 
-    def looked_up(self, values: Float, wavelength: Float, active: Mask) -> Float:
-        """A table of `dispersion` at a wavelength. Linear over a nanometre: within 1e-7 of the formulas."""
+    def interpolated(self, values: Float, wavelength: Float, active: Mask) -> Float:
+        """A table of `dispersion` at a wavelength, interpolated linearly: within 1e-7 of the formulas."""
         mi = self.mi
         place = dr.clip(wavelength - GRID[0], 0.0, len(GRID) - 1.001)
         left = mi.UInt32(place)
@@ -113,23 +113,25 @@ class Variant:
         return dr.fma(part, high - low, low)
 
     def curve(self, wavelengths: Floats, values: Floats) -> Texture:
-        """A spectrum through points, level beyond; wavelengths in nm. Its values may be above 1, as an index is."""
+        """A spectrum through points, constant beyond their ends; wavelengths in nm. Values may exceed 1, as an index
+        does."""
         text = ", ".join(f"{x:.9g}" for x in np.interp(GRID, wavelengths, values))
-        # on a grid: Mitsuba would look among uneven points, for each wavelength at every hit
+        # on a grid: Mitsuba would search uneven points for each wavelength at every hit
         ends = {"wavelength_min": GRID[0], "wavelength_max": GRID[-1]}
         return self.mi.load_dict({"type": "regular", **ends, "values": text})
 
     def through_rgb(self, values: Sequence[float]) -> Texture:
-        """A spectrum through a colour's values at `RGB_WAVELENGTHS`. Mitsuba's own way from colours to spectra is made
-        for reflectances and would cut an index at 1."""
+        """A spectrum through a color's values at `RGB_WAVELENGTHS`. Mitsuba's own conversion of colors to spectra is
+        for reflectances and would clamp an index to 1."""
         return self.curve(np.array(RGB_WAVELENGTHS[::-1]), np.array(values[::-1], float))
 
     def measured(self, preset: str, parameter: str) -> Texture | None:
-        """The spectrum that Mitsuba brings along for a metal's `eta` or `k`, None where it has none (Fe, Ti).
+        """The spectrum that Mitsuba ships for a metal's `eta` or `k`; None for those it lacks (Fe, Ti).
 
-        These are other measurements than the three numbers of the preset, which for Ag, Au and Cu are a fit
-        [Rakic1998]: by luminance at normal incidence gold is 6.1 % brighter, silver 1.0 %, chromium 18.9 %, copper is
-        4.9 % darker, the others are within 0.8 %. Three points alone cost 0.4 % in gold, 1.2 % in copper.
+        The preset's three numbers come from other measurements; for Ag, Au and Cu they are a fit [Rakic1998]. By
+        luminance at normal incidence, Mitsuba's gold is 6.1 % brighter, its silver 1.0 %, its chromium 18.9 %, its
+        copper is 4.9 % darker, and the others are within 0.8 %. Sampling at three wavelengths alone costs 0.4 % in gold
+        and 1.2 % in copper.
         """
         folder = Path(str(self.mi.__file__)).parent / "data" / "ior"
         files = (folder / f"{preset}{source}.{parameter}.spd" for source in ("", "_palik"))

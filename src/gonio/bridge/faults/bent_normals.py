@@ -1,11 +1,11 @@
-"""Mitsuba 3.9: `normalmap` and `bumpmap` shade with a frame of their own that no call of a BSDF tells.
+"""Mitsuba 3.9: `normalmap` and `bumpmap` shade with a frame of their own that no method of a BSDF returns.
 
     bumpy = mi.load_dict({"type": "bumpmap", ...})
     si.bsdf(ray), si.sh_frame                              # the plugin, and the frame of the surface, not of the plugin
 
-The correction of particles at shading normals (Veach1997, sec. 5.3) needs the cosines of the frame that shades.
+Veach's correction of particles at shading normals (Veach1997, sec. 5.3) needs the cosines in the shading frame.
 
-Workaround: evaluate such BSDFs from the other side, as radiance, and take a sampled half vector for the normal.
+Workaround: evaluate such BSDFs in the reverse direction, as radiance, and use a sampled half vector as the normal.
 """
 
 from __future__ import annotations
@@ -18,5 +18,5 @@ _BENT = re.compile("NormalMap|BumpMap")
 
 
 def bends_normals(scene: Scene) -> bool:
-    """Whether a BSDF of the scene, here or further in, is one of those two plugins."""
+    """Whether a BSDF of the scene, nested ones included, is one of those two plugins."""
     return any(_BENT.search(str(shape.bsdf())) for shape in scene.shapes())

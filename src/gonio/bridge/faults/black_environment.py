@@ -1,9 +1,9 @@
-"""Mitsuba 3.9: an environment map that is black all over has the sampling density 0 / 0.
+"""Mitsuba 3.9: a completely black environment map has the sampling density 0 / 0.
 
     envmap = mi.load_dict({"type": "envmap", "bitmap": mi.Bitmap(np.zeros((4, 8, 3), np.float32))})
     envmap.pdf_direction(it, ds)                    # nan
 
-Workaround: leave black environments out of the lights that are sampled.
+Workaround: exclude black environments from the lights that are sampled.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from ..types import Emitter
 
 
 def is_black_environment(mi: ModuleType, emitter: Emitter) -> bool:
-    """Whether a light is an environment map without any light."""
+    """Whether an emitter is a completely black environment map."""
     if not mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite):
         return False
     pixels = dict(mi.traverse(emitter)).get("data")
     if pixels is None:
         return False
-    if mi.is_spectral:  # three numbers tell a texel's color, black too, and the last one how bright it is
+    if mi.is_spectral:  # a texel has three color coefficients, nonzero for black too, and a scale
         return not np.any(np.asarray(pixels)[..., 3])
     return not dr.any(pixels.array != 0)

@@ -1,10 +1,10 @@
-"""Dr.Jit 1.5: an array made of NumPy's borrows its memory, and the alignment of that becomes part of the kernel.
+"""Dr.Jit 1.5: an array made from a NumPy array borrows its memory, whose alignment becomes part of the kernel.
 
-    a = mi.Float(np.zeros(64, np.float32))                 # compiles one of two kernels, by where NumPy has put it
+    a = mi.Float(np.zeros(64, np.float32))                 # compiles one of two kernels, by NumPy's alignment
 
-Which one is left to chance: kernels are compiled again that were in the cache.
+The alignment is arbitrary, so kernels that are in the cache are compiled again.
 
-Workaround: copy the values into memory of Dr.Jit's own.
+Workaround: copy the values into memory that Dr.Jit allocates.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from ..types import OfVariant
 
 
 def own(kind: OfVariant, values: NDArray[Any]) -> OfVariant:
-    """An array of Dr.Jit's of type `kind` with these values, in memory of its own.
+    """A Dr.Jit array of type `kind` with these values, in its own memory.
 
-    Times one, which keeps every bit, also the sign of a zero.
+    The copy is a product with one, which preserves every bit, including the sign of a zero.
     """
     if isinstance(values, np.ndarray):
         values = backend.aligned(values, values.dtype.type)
     copied = kind(values) * dr.opaque(kind, 1)
     dr.eval(copied)
-    dr.sync_thread()  # while NumPy's memory is there
+    dr.sync_thread()  # before NumPy's memory is freed
     return copied

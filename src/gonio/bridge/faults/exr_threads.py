@@ -1,11 +1,11 @@
-"""Mitsuba 3.9: reading or writing OpenEXR hangs where Dr.Jit has fewer than two threads.
+"""Mitsuba 3.9: reading or writing OpenEXR hangs if Dr.Jit has fewer than two threads.
 
     dr.set_thread_count(1)
-    mi.Bitmap("picture.exr")                               # waits for ever
+    mi.Bitmap("picture.exr")                               # never returns
 
-Its OpenEXR hands blocks to Dr.Jit's threads and waits for them, of which there is none beside the one that waits.
+Mitsuba's OpenEXR submits blocks to Dr.Jit's threads and waits for them, but the waiting thread is the only one.
 
-Workaround: a second thread for as long as Mitsuba reads or writes a file.
+Workaround: use a second thread while Mitsuba reads or writes a file.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def file_threads() -> Iterator[None]:
-    """Inside, Mitsuba may read and write files whatever the number of threads."""
-    import drjit as dr  # here, since readers of pictures are loaded without it
+    """Let Mitsuba read and write files inside the block with any number of threads."""
+    import drjit as dr  # imported here, so that reading pictures does not load Dr.Jit
 
     count = dr.thread_count()
     if count >= 2:

@@ -1,4 +1,4 @@
-"""Dr.Jit 1.5: Ctrl-C while a symbolic loop is recorded becomes a RuntimeError.
+"""Dr.Jit 1.5: Ctrl-C while a symbolic loop is being recorded becomes a RuntimeError.
 
     def body(i):
         raise KeyboardInterrupt
@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Inside, Ctrl-C stays a KeyboardInterrupt."""
+    """Re-raise a KeyboardInterrupt inside the block as such."""
     try:
         yield
     except RuntimeError as error:

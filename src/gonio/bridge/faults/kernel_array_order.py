@@ -1,7 +1,7 @@
-"""Dr.Jit 1.5: kernels with loops and calls are told apart by the order in which the arrays that they read were made.
+"""Dr.Jit 1.5: kernels with loops and calls depend on the order in which the arrays that they read were created.
 
-Seen with the maps of `caustics`, whose kernel was compiled anew where a map was made before the sums, not after them;
-tests/render/test_transport.py counts the kernels. No short reproduction is known, hence no canary.
+Observed with the maps of `caustics`: the kernel was compiled again if a map was created before the sums instead of
+after them; tests/render/test_transport.py counts the kernels. No short reproduction is known, hence no canary.
 
 Workaround: copy all arrays of an object, one after the other, right before a kernel reads them.
 """
@@ -14,7 +14,7 @@ from .borrowed_memory import own
 
 
 def copy_arrays(thing: object) -> None:
-    """Put a copy in the place of every array that is an attribute of `thing`."""
+    """Replace every attribute of `thing` that is an array by a copy."""
     for name, value in vars(thing).items():
         if dr.is_array_v(value):
             setattr(thing, name, own(type(value), value))

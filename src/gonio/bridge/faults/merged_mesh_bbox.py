@@ -1,12 +1,12 @@
-"""Mitsuba 3.9: the mesh that is made of rectangles of equal material has no bounding box.
+"""Mitsuba 3.9: merging rectangles of equal material makes a mesh that has no bounding box.
 
     wall = {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}
     mi.load_dict({"type": "merge", "a": wall, "b": {**wall, "to_world": aside}}).bbox().valid()      # False
 
-The scene's box then leaves it out, and beyond the scene's box nothing is in the way of a sky or a beam: under a far
-roof a sky sends 0.84 in place of 0.81.
+The scene's box does not include it, and nothing outside the scene's box blocks a sky or a beam: under a distant roof a
+sky contributes 0.84 instead of 0.81.
 
-Workaround: compute the box, and load a scene that was made without it once more.
+Workaround: compute the box, and reload a scene that was built without it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ..types import Scene, Shape
 
 
 def compute_boxes(shapes: Iterable[Shape]) -> None:
-    """Give the meshes among shapes the boxes that they may lack."""
+    """Compute missing bounding boxes of the meshes among shapes."""
     for shape in shapes:
         if shape.is_mesh():
             shape.recompute_bbox()
 
 
 def with_valid_bbox(mi: ModuleType, scene: Scene) -> Scene:
-    """The scene, or one of the same parts, whose box holds all of its shapes."""
+    """The scene, rebuilt from the same parts if its box does not contain all of its shapes."""
     compute_boxes(scene.shapes())
     meshes = [shape for shape in scene.shapes() if shape.is_mesh()]
     box = scene.bbox()

@@ -1,8 +1,8 @@
-"""Mitsuba 3.9: `Properties.get_emissive_texture` of a property that is not there follows a null pointer.
+"""Mitsuba 3.9: `Properties.get_emissive_texture` dereferences a null pointer if the property is missing.
 
     mi.Properties("x").get_emissive_texture("radiance")    # segmentation fault
 
-Workaround: ask first whether the property is there.
+Workaround: check first that the property exists.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ..types import Properties, Texture
 
 
 def emissive_texture(properties: Properties, name: str, location: str) -> Texture:
-    """The texture of a property; InputError, which names `location`, where there is none."""
+    """The texture of a property; InputError at `location` if it is missing."""
     if name not in properties:
         raise InputError("missing", location, f"give the {name}: a number, a color or a texture")
     return properties.get_emissive_texture(name)

@@ -1,10 +1,10 @@
-"""Mitsuba 3.9: `spawn_ray_to` ends a thousandth of the distance before the point.
+"""Mitsuba 3.9: rays of `spawn_ray_to` end a thousandth of the distance before the point.
 
     si.spawn_ray_to(si.p + mi.Vector3f(0, 0, 1)).maxt      # 0.999: 1 - ShadowEpsilon
 
-A sheet that stands that close before a lamp does not hide it.
+An occluder in that gap before a lamp does not cast a shadow.
 
-Workaround: end the ray at the point itself, but for the last digits of float32; the point must lie on no surface.
+Workaround: end the ray at the point, up to float32 rounding; the point must lie on no surface.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import drjit as dr
 
 from ..types import Point, Ray, SurfaceInteraction
 
-RELATIVE_GAP = 1e-6  # of the distance: what float32 distinguishes from it
+RELATIVE_GAP = 1e-6  # of the distance: float32 resolves it
 
 
 def shadow_ray_to(si: SurfaceInteraction, point: Point) -> Ray:

@@ -1,8 +1,7 @@
-"""Mitsuba 3.9: `area` lights with a texture are sampled wrongly on most shapes.
+"""Mitsuba 3.9: `area` lights with a texture are sampled incorrectly on most shapes.
 
-The emitter looks for positions by their uv, which triangles of a mesh may share: a cube is 18 % too dark. On round
-shapes that are turned it mistakes the normal (a cylinder is up to 21 % too dark), and on shapes turned inside out the
-side.
+The emitter samples positions by uv, which triangles of a mesh may share: a cube is 18 % too dark. On rotated round
+shapes the normal is wrong (a cylinder is up to 21 % too dark), and on shapes with flipped normals the side.
 
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), np.float32)), "raw": True}
     cube = mi.load_dict({"type": "cube", "emitter": {"type": "area", "radiance": texture}})
@@ -19,7 +18,7 @@ from ..types import Emitter
 
 
 def must_sample_by_area(mi: ModuleType, emitter: Emitter) -> bool:
-    """Whether the light's own samples cannot be trusted."""
+    """Whether the light's own sampling is incorrect."""
     shape = emitter.get_shape()
     varies = mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
     textured = emitter.class_name() == "AreaLight" and shape is not None and varies

@@ -4,7 +4,7 @@
     si.p = mi.Point3f(0, 0, -1)                            # behind the camera, which looks along +z
     lens.sample_direction(si, mi.Point2f(0.5))[1]          # below 0, 0 expected
 
-Workaround: cut it off at 0.
+Workaround: clamp it to 0.
 """
 
 from __future__ import annotations
@@ -15,6 +15,6 @@ from ..types import Mask, Point, Radiance, Record, Sensor, SurfaceInteraction
 
 
 def camera_sample(sensor: Sensor, si: SurfaceInteraction, lens: Point, active: Mask) -> tuple[Record, Radiance]:
-    """The direction sample from a point to the camera, and its importance, which is at least 0."""
+    """The direction sample from a point to the camera and its importance, clamped to 0."""
     ds, importance = sensor.sample_direction(si, lens, active)
     return ds, dr.maximum(importance, 0)

@@ -1,16 +1,17 @@
-"""Files that describe materials, such as glTF's: what a format of them is, and how a text names one.
+"""Files that describe materials, such as glTF: the interface of a format, and how a text names one.
 
     chest.gltf                  the file's only material
-    chest.gltf:Wood             one of several, by its name, or by its number where it has none of its own
-    gold.json                   what `gonio fit` found, or Gonio's own notation
+    chest.gltf:Wood             one of several, by its name, or by its number if it has no unique name
+    gold.json                   a result of `gonio fit`, or Gonio's own notation
 
-A reader writes a material down in Gonio's notation (`notation`), as a tree of types and values; the formats themselves
-are the modules of this package.
+A reader translates a material to Gonio's notation (`notation`), a tree of types and values; the formats are the modules
+of this package.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import warnings
 from collections.abc import Callable, Mapping
@@ -22,15 +23,15 @@ from ...errors import GonioWarning, InputError, did_you_mean
 from ...material import is_model
 from ...members import Family, instances_of
 
-# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material again, or a picture: {"type": "imageTex", ...}
+# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material, or a picture: {"type": "imageTex", ...}
 Notation: TypeAlias = "dict[str, object]"
 
 
 class Described(NamedTuple):
-    """A material as a file has it.
+    """A material as described by a file.
 
-    notation  in Gonio's words, pictures included: what a scene may hold
-    notices   what of it Gonio's words cannot carry, a sentence each
+    notation  in Gonio's notation, pictures included, as in a scene
+    notices   features that the notation cannot express, one sentence each
     """
 
     notation: Notation
@@ -38,11 +39,11 @@ class Described(NamedTuple):
 
 
 class Document:
-    """A format.
+    """A file format.
 
-    name      what a scene calls it: {"type": "gltf", "file": ...}
-    suffixes  by which its files are recognised
-    writes    the type of material that `write` takes, by name; "" where the format cannot be written
+    name      its type in scenes: {"type": "gltf", "file": ...}
+    suffixes  by which its files are recognized
+    writes    the type of material that `write` accepts, by name; "" if the format cannot be written
     """
 
     family: ClassVar[Family[Document]]
@@ -51,27 +52,27 @@ class Document:
     writes: ClassVar[str] = ""
 
     def holds(self, path: Path) -> bool:
-        """Whether a file with a suffix of the format describes materials, where other files have that suffix too."""
+        """Whether a file with a suffix of the format describes materials, if other files have that suffix too."""
         return True
 
     def materials(self, path: Path) -> list[str]:
-        """The names by which a file's materials are asked for. InputError for a file that is none of the format."""
+        """The names by which a file's materials are selected. Raises InputError for a file of another format."""
         raise NotImplementedError
 
     def ranked(self, path: Path) -> bool:
-        """Whether a file's first material is meant where none is named: the best of several fits."""
+        """Whether a file's first material is the default: the best of several fits."""
         return False
 
     def read(self, path: Path, name: str) -> Described:
-        """A file's material of that name. InputError where the file is none of the format."""
+        """A file's material of that name. Raises InputError for a file of another format."""
         raise NotImplementedError
 
     def image(self, path: Path, index: str) -> bytes:
-        """The bytes of a picture that lies inside a file, which textures name FILE#INDEX."""
+        """The bytes of a picture inside a file, which textures name FILE#INDEX."""
         raise InputError(f"no picture '{index}' in it", str(path))
 
     def write(self, notation: Notation, name: str) -> bytes:
-        """The file of one material of the type `writes`, under that name."""
+        """The bytes of a file with one material of the type `writes`, under that name."""
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
 
@@ -81,37 +82,37 @@ Document.family = Family(
 
 
 def parted(text: str) -> tuple[Document, Path, str] | None:
-    """Format, file and material of FILE or FILE:MATERIAL; None where the text names no such file."""
+    """Format, file and material of FILE or FILE:MATERIAL; None if the text names no such file."""
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
-            if match and document.holds(path := Path(match[1]).expanduser()):
+            if match and document.holds(path := Path(os.path.expanduser(match[1]))):
                 return document, path, match[2] or ""
     return None
 
 
 def names_document(text: str) -> bool:
-    """Whether a text is FILE or FILE:MATERIAL of such a file."""
+    """Whether a text is FILE or FILE:MATERIAL of such a format."""
     return parted(text) is not None
 
 
 def inside(text: str) -> tuple[str, str]:
-    """File and number of FILE#NUMBER, a picture inside a document; the text itself and "" of any other file."""
+    """File and number of FILE#NUMBER, a picture inside a document; the text itself and "" for any other file."""
     file, mark, index = text.rpartition("#")
     return (file, index) if mark and names_document(file) else (text, "")
 
 
 def read(document: Document, path: Path, name: str = "") -> Described:
-    """A material of a file; the only one where no name is given. InputError, with the nearest known name."""
+    """A material of a file; the only one if no name is given. Raises InputError, with the closest known name."""
     if not path.is_file():
         raise InputError(f"no file '{path}'", str(path))
     known = document.materials(path) if document.holds(path) else []
     if not known:
-        raise InputError("it holds no material", str(path))
+        raise InputError("it contains no material", str(path))
     if not name and len(known) > 1 and not document.ranked(path):
-        what = f"it holds {len(known)} materials"
+        what = f"it contains {len(known)} materials"
         shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
-        raise InputError(what, str(path), f"say which, such as {path.name}:{known[0]}; there are {shown}")
+        raise InputError(what, str(path), f"name one, such as {path.name}:{known[0]}; there are {shown}")
     if name and name not in known:
         raise InputError(f"no material '{name}' in it", str(path), did_you_mean(name, known[:1000]))
     return document.read(path, name or known[0])
@@ -119,18 +120,18 @@ def read(document: Document, path: Path, name: str = "") -> Described:
 
 def described(text: str) -> dict[str, Notation]:
     """The notation of every material of FILE, or of FILE:MATERIAL, by its name."""
-    found = parted(text)
-    assert found is not None, "asked before"
-    document, path, name = found
+    parts = parted(text)
+    assert parts is not None, "asked before"
+    document, path, name = parts
     names = [name] if name or not path.is_file() else document.materials(path)
     return {one: read(document, path, one).notation for one in names}
 
 
 def without_pictures(text: str) -> Notation:
-    """The notation of FILE or FILE:MATERIAL with numbers alone; GonioWarning for what is left out."""
-    found = parted(text)
-    assert found is not None, "asked before"
-    described = read(*found)
+    """The notation of FILE or FILE:MATERIAL with numbers only; a GonioWarning names omitted pictures."""
+    parts = parted(text)
+    assert parts is not None, "asked before"
+    described = read(*parts)
     lost: list[str] = []
     notation = _plain(described.notation, lost)
     if lost:
@@ -142,7 +143,7 @@ def without_pictures(text: str) -> Notation:
 
 
 def convert(source: str, output: Path) -> tuple[str, ...]:
-    """Write a document's material as JSON in Gonio's notation, or as another document. What the notation lacks.
+    """Write a document's material as JSON in Gonio's notation, or as another document. Returns the notices.
 
     source  FILE or FILE:MATERIAL
     output  .json, or a document's suffix
@@ -151,6 +152,7 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     if found is None:
         raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
     described = read(*found)
+    files.check_file(output)
     if output.suffix.lower() == ".json":
         text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
         files.write_whole(output, text.encode())
@@ -159,10 +161,10 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     target = known.get(output.suffix.lower())
     if target is None:
         hint = f"{', '.join(sorted(known))} or .json"
-        raise InputError(f"'{output.suffix}' is no format of materials", str(output), hint)
+        raise InputError(f"'{output.suffix}' is not a format of materials", str(output), hint)
     kind = described.notation["type"]
     if kind != target.writes:
-        raise InputError(f"a {kind} given, and {target.name} holds {target.writes}", str(output))
+        raise InputError(f"a {kind} given, but {target.name} holds {target.writes}", str(output))
     files.write_whole(output, target.write(described.notation, output.stem))
     return described.notices
 
@@ -181,22 +183,22 @@ def from_scenes(notation: Mapping[str, object]) -> Notation:
 
 
 def _with_types(notation: Mapping[str, object], change: Callable[[str], str]) -> Notation:
-    found: Notation = {}
+    changed: Notation = {}
     for key, value in notation.items():
         if isinstance(value, Mapping):
-            found[key] = _with_types(value, change)
+            changed[key] = _with_types(value, change)
         else:
-            found[key] = change(value) if key == "type" and isinstance(value, str) else value
-    return found
+            changed[key] = change(value) if key == "type" and isinstance(value, str) else value
+    return changed
 
 
 def _plain(notation: Mapping[str, object], lost: list[str]) -> Notation:
-    found: Notation = {}
+    plain: Notation = {}
     for key, value in notation.items():
         if isinstance(value, dict) and value.get("type") == "imageTex":
             lost.append(key)
             if "factor" in value:
-                found[key] = value["factor"]
+                plain[key] = value["factor"]
         else:
-            found[key] = _plain(value, lost) if isinstance(value, dict) else value
-    return {key: value for key, value in found.items() if key != "normalmap"}
+            plain[key] = _plain(value, lost) if isinstance(value, dict) else value
+    return {key: value for key, value in plain.items() if key != "normalmap"}

@@ -1,4 +1,4 @@
-"""glTF 2.0: metallic-roughness with Khronos' extensions, in Gonio's materials (Khronos2021, appendix B)."""
+"""glTF 2.0: metallic-roughness with Khronos' extensions, as Gonio materials (Khronos2021, appendix B)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from . import Described, Document, Notation
 from .gltf_file import LARGEST, GltfFile, Json
 
 WHITE = (1.0, 1.0, 1.0)
-NARROWEST = 2e-3  # width under a sheen, whose sum has no mirrors
+NARROWEST = 2e-3  # width under a sheen, since a sum has no mirrors
 HIGHEST_INDEX = 3.0  # of a coat
 D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um, by which Abbe's number is defined
 
-# What other files may ask for, which has nothing to do with materials or is read here
+# Extensions that files may require, which do not concern materials or are read here
 KNOWN = {
     *(
         f"KHR_materials_{name}"
@@ -29,7 +29,7 @@ KNOWN = {
     ),
     "KHR_lights_punctual", "KHR_mesh_quantization", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
 }  # fmt: skip
-TELLS = "KHR_materials_diffuse_transmission"  # read, and said that it is not carried
+TELLS = "KHR_materials_diffuse_transmission"  # read, with a notice that it is not supported
 
 
 class Gltf(Document):
@@ -39,11 +39,11 @@ class Gltf(Document):
     suffixes: ClassVar[tuple[str, ...]] = (".gltf", ".glb")
 
     def materials(self, path: Path) -> list[str]:
-        return _names(GltfFile(path))
+        return GltfFile(path).material_names()
 
     def read(self, path: Path, name: str) -> Described:
         file = GltfFile(path)
-        return _Material(file, _names(file).index(name)).described()
+        return _Material(file, file.material_names().index(name)).described()
 
     def image(self, path: Path, index: str) -> bytes:
         file = GltfFile(path)
@@ -57,21 +57,11 @@ class Gltf(Document):
         return file.view(file.index(image, "bufferView", "bufferViews", at))
 
 
-def _names(file: GltfFile) -> list[str]:
-    """A material's name where it is the only one of it, else its number."""
-    given = [str(material.get("name", "")) for material in file.items("materials")]
-    count: dict[str, int] = {}
-    for name in given:
-        count[name] = count.get(name, 0) + 1
-    plain = {name for name, times in count.items() if name and times == 1 and not name.isdigit()}
-    return [name if name in plain else str(index) for index, name in enumerate(given)]
-
-
 class _Material:
-    """One material of a file on its way into Gonio's words.
+    """The translation of one material of a file.
 
-    A layered material as the specification has it, from the bottom: a dielectric, which is a clear layer over a diffuse
-    one or transmits; mixed with a metal; under sheen; under a clear coat; with holes.
+    It is a layered material, as in the specification, from the bottom: a dielectric, which is a clear layer over a
+    diffuse one or transmits; mixed with a metal; under sheen; under a clear coat; with holes.
     """
 
     def __init__(self, file: GltfFile, index: int) -> None:
@@ -94,7 +84,7 @@ class _Material:
     # ------------------------------------------------------------------ reading
 
     def extension(self, name: str) -> tuple[Json, str]:
-        """An extension of the material, empty where it has none, and its place."""
+        """An extension of the material, empty if it has none, and its location."""
         key = f"KHR_materials_{name}"
         return self.file.member(self.extensions, key, f"{self.at}/extensions"), f"{self.at}/extensions/{key}"
 
@@ -150,7 +140,7 @@ class _Material:
         self._rest()
 
     def _rest(self) -> None:
-        """What is no part of a scattering function, or has no word here."""
+        """Properties that are not part of a scattering function, or cannot be expressed."""
         file, at = self.file, self.at
         normal = self.texture(self.own, "normalTexture", at)
         scale = file.number(file.member(self.own, "normalTexture", at), "scale", 1.0, at, -LARGEST, LARGEST)
@@ -169,48 +159,48 @@ class _Material:
         values, place = self.extension("diffuse_transmission")
         if file.number(values, "diffuseTransmissionFactor", 0.0, place, 0.0, 1.0) > 0.0:
             file.colour(values, "diffuseTransmissionColorFactor", WHITE, place)
-            self.notices.append("diffuse transmission is not carried: that light is reflected")
+            self.notices.append("diffuse transmission is not supported: that light is reflected")
 
     def leave(self, of: Mapping[str, object], at: str, *textures: str) -> None:
-        """Say of textures that they are left out."""
+        """Add notices for textures that are omitted."""
         for key in textures:
             if self.texture(of, key, at) is not None:
-                self.notices.append(f"{key} is left out: the factor stands alone")
+                self.notices.append(f"{key} is omitted: only its factor is used")
 
     def texture(self, of: Mapping[str, object], key: str, at: str, srgb: bool = False) -> Notation | None:
-        """A picture as scenes name one; None where there is none."""
+        """A picture in the notation of scenes; None if there is none."""
         if key not in of:
             return None
         file, at = self.file, f"{at}/{key}"
         info = file.member(of, key, at)
         texture = file.items("textures")[file.index(info, "index", "textures", at)]
         transform = file.member(info, "extensions", at).get("KHR_texture_transform")
-        if file.whole(info, "texCoord", at, 0):
-            self.notices.append(f"{key} lies over a second set of coordinates, and is left out")
+        if file.integer(info, "texCoord", at, 0):
+            self.notices.append(f"{key} uses a second set of coordinates, and is omitted")
             return None
         if transform:
-            self.notices.append(f"{key} is taken without its transform")
+            self.notices.append(f"{key} is used without its transform")
         if "source" not in texture:
-            self.notices.append(f"{key} has a picture that only an extension names, and is left out")
+            self.notices.append(f"{key} has a picture that only an extension names, and is omitted")
             return None
         number = file.index(texture, "source", "images", at)
         image = file.items("images")[number]
-        found: Notation = {"type": "imageTex", "file": self._picture(image, number)}
+        image_notation: Notation = {"type": "imageTex", "file": self._picture(image, number)}
         if srgb:
-            found["colorSpace"] = "srgb"
+            image_notation["colorSpace"] = "srgb"
         if "sampler" in texture:
             sampler = file.items("samplers")[file.index(texture, "sampler", "samplers", at)]
             if sampler.get("magFilter") == 9728:
-                found["filter"] = "nearest"
+                image_notation["filter"] = "nearest"
             if sampler.get("wrapS", 10497) != sampler.get("wrapT", 10497):
                 self.notices.append(f"{key} is wrapped along v as along u")
-            wrap = {33071: "clamp", 33648: "mirror"}.get(file.whole(sampler, "wrapS", at, 10497))
+            wrap = {33071: "clamp", 33648: "mirror"}.get(file.integer(sampler, "wrapS", at, 10497))
             if wrap:
-                found["wrap"] = wrap
-        return found
+                image_notation["wrap"] = wrap
+        return image_notation
 
     def _picture(self, image: Json, number: int) -> str:
-        """A picture's file, from where the glTF lies; FILE#NUMBER where it is inside."""
+        """A picture's file, relative to the glTF; FILE#NUMBER if it is embedded."""
         at, uri = f"/images/{number}", image.get("uri")
         if uri is None:
             self.file.index(image, "bufferView", "bufferViews", at)
@@ -220,7 +210,7 @@ class _Material:
         if uri.startswith("data:"):
             self.file.data(uri, f"{at}/uri")
             return f"{self.file.path.name}#{number}"
-        return self.file.beside(uri, f"{at}/uri").relative_to(self.file.path.parent.resolve()).as_posix()
+        return self.file.local_file(uri, f"{at}/uri").relative_to(self.file.path.parent.resolve()).as_posix()
 
     # ------------------------------------------------------------------ values
 
@@ -231,10 +221,10 @@ class _Material:
         return factor if texture is None or not factor else {**texture, "channel": channel, "factor": factor}
 
     def widths(self, anisotropic: bool = True) -> Notation:
-        """`alpha` of the roughness, or the dial where a picture holds that."""
+        """`alpha` from the roughness, or the parameter that a picture drives."""
         if isinstance(self.roughness, dict):
             if self.anisotropy:
-                self.say("the anisotropy is left out, as the roughness is a picture")
+                self.say("the anisotropy is omitted, since the roughness is a picture")
             return {"roughness": self.roughness}
         alpha = float(self.roughness) ** 2  # type: ignore[arg-type]
         if any(self.sheen):
@@ -242,8 +232,8 @@ class _Material:
         if not self.anisotropy or not anisotropic:
             return {"alpha": alpha}
         along = alpha + (1.0 - alpha) * self.anisotropy**2
-        turned = {"rotation": math.remainder(self.turn, math.tau)} if self.turn else {}
-        return {"alpha": [along, alpha], **turned}
+        rotation = {"rotation": math.remainder(self.turn, math.tau)} if self.turn else {}
+        return {"alpha": [along, alpha], **rotation}
 
     def say(self, notice: str) -> None:
         if notice not in self.notices:
@@ -253,14 +243,14 @@ class _Material:
 
     def described(self) -> Described:
         if "KHR_materials_unlit" in self.extensions:
-            self.say("it is unlit, shown as painted whatever the light: here it is a matt surface of that colour")
-            found: Notation = {"type": "lambert", "albedo": self.base}
+            self.say("it is unlit, displayed without lighting: here it is a matte surface of that color")
+            notation: Notation = {"type": "lambert", "albedo": self.base}
         else:
-            found = self._coated(self._sheened(self._body()))
-        found = self._holed(found)
+            notation = self._coated(self._sheened(self._body()))
+        notation = self._holed(notation)
         if self.normal is not None:
-            found["normalmap"] = self.normal
-        return Described(found, tuple(self.notices))
+            notation["normalmap"] = self.normal
+        return Described(notation, tuple(self.notices))
 
     def _body(self) -> Notation:
         metallic, through = self.metallic, self.transmission
@@ -276,9 +266,9 @@ class _Material:
         if not self.iridescence:
             return plain
         if isinstance(self.base, dict):
-            self.say("the film is left out, as its metal's colour is a picture")
+            self.say("the film is omitted, since its metal's color is a picture")
             return plain
-        # a metal is known by its reflectance alone; so the specification takes an index without loss
+        # a metal is given by its reflectance only; as in the specification it gets an index without absorption
         roots = [math.sqrt(min(r, 0.9999)) for r in self.base]  # type: ignore[attr-defined]
         filmed: Notation = {"type": "film-conductor", "eta": [(1.0 + r) / (1.0 - r) for r in roots], "k": 0.0}
         filmed |= {**self.widths(), **self._film()}
@@ -286,32 +276,32 @@ class _Material:
 
     def _film(self) -> Notation:
         if self.film > 3000.0 or self.film_index > HIGHEST_INDEX:
-            self.say("the film is held at 3000 nm and an index of 3")
+            self.say("the film is limited to 3000 nm and an index of 3")
         return {"thickness": min(self.film, 3000.0), "film_eta": min(self.film_index, HIGHEST_INDEX)}
 
     def _opaque(self) -> Notation:
-        """A clear layer over a diffuse one, whose colour is what is seen of it."""
+        """A clear layer over a diffuse one, whose color is that of the layered material."""
         if self.iridescence:
-            self.say("the film is left out over the diffuse part")
+            self.say("the film is omitted over the diffuse part")
         matt: Notation = {"type": "lambert", "albedo": self.base}
         index = self._index()
         if index - 1.0 < 1e-4:
             return matt
         if isinstance(self.roughness, dict):
             alpha: object = {**self.roughness, "mean": True}
-            self.say("the clear layer has one roughness, the picture's mean: its tables are of one width")
+            self.say("the clear layer has one roughness, the picture's mean: its tables are for one width")
         else:
             alpha = self.roughness
             if self.anisotropy:
-                self.say("the anisotropy is left out over the diffuse part")
+                self.say("the anisotropy is omitted over the diffuse part")
         width: Notation = {"roughness": alpha} if isinstance(alpha, dict) else self.widths(anisotropic=False)
         return {"type": "coat", "base": matt, "index": index, "bounces": "white", **width}
 
     def _index(self) -> float:
-        """The index that reflects as much from above as ior and specular say."""
+        """The index with the normal reflectance of ior and specular combined."""
         grey = sum(self.specular_colour) / 3.0
         if len(set(self.specular_colour)) > 1:
-            self.say("specularColorFactor is taken as its mean: a clear layer reflects without colour")
+            self.say("specularColorFactor is replaced by its mean: a clear layer reflects without color")
         if self.index == 0.0:
             r0 = 1.0
         elif self.index < 1.0:
@@ -324,20 +314,20 @@ class _Material:
         root = math.sqrt(r0)
         index = (1.0 + root) / max(1.0 - root, 1e-6)
         if self.specular < 1.0 and r0 > 0.0:
-            self.say("specularFactor is taken as a lower index: where light grazes, all of it is still reflected")
+            self.say("specularFactor is replaced by a lower index: at grazing angles all light is still reflected")
         if index > HIGHEST_INDEX:
-            self.say(f"the index {index:.3g} is held at {HIGHEST_INDEX:g}")
+            self.say(f"the index {index:.3g} is limited to {HIGHEST_INDEX:g}")
         return min(index, HIGHEST_INDEX)
 
     def _clear(self) -> Notation:
-        """Glass: a solid where it has a volume, else a sheet."""
+        """Glass: a solid if it has a volume, else a sheet."""
         index = self._index()
         tint = {} if self.base == list(WHITE) else {"albedo": self.base}
         if tint:
-            self.say("the base colour of what transmits tints its reflection too")
+            self.say("the base color of the transmitting part tints its reflection too")
         if not self.thickness:
             if self.roughness != 0.0:
-                self.say("a thin sheet is smooth: its roughness is left out")
+                self.say("a thin sheet is smooth: its roughness is omitted")
             return {"type": "thin-dielectric", "eta": index, **tint}
         glass: Notation = {"type": "dielectric", "eta": self._dispersing(index), **tint, **self.widths()}
         if self.iridescence:
@@ -351,46 +341,46 @@ class _Material:
         """Cauchy's formula through the index at 587.6 nm, with V = 20 / dispersion."""
         if not self.dispersion or self.iridescence:
             if self.dispersion:
-                self.say("the dispersion is left out under a film")
+                self.say("the dispersion is omitted under a film")
             return index
         b = (index - 1.0) * self.dispersion / 20.0 / (F_LINE**-2 - C_LINE**-2)
         return f"cauchy({index - b / D_LINE**2:.9g}, {b:.9g})"
 
     def _sheened(self, body: Notation) -> Notation:
-        """Fibres on top; below them is left what they do not reflect on average."""
+        """Fibers on top; the layers below receive the light that they do not reflect on average."""
         if not any(self.sheen):
             return body
         alpha = self.sheen_roughness**2
         if alpha < ALBEDOS[0][0]:
             alpha = ALBEDOS[0][0]
-            self.say(f"the sheen's roughness is held at {math.sqrt(alpha):.2g}, where its model starts to keep energy")
-        kept = 1.0 - max(self.sheen) * float(np.interp(alpha, *ALBEDOS))
-        below = _mixed({"type": "lambert", "albedo": 0.0}, body, kept)
+            self.say(f"the sheen's roughness is limited to {math.sqrt(alpha):.2g}, below which its model gains energy")
+        transmitted = 1.0 - max(self.sheen) * float(np.interp(alpha, *ALBEDOS))
+        below = _mixed({"type": "lambert", "albedo": 0.0}, body, transmitted)
         return {"type": "sum", "a": {"type": "sheen-charlie", "albedo": list(self.sheen), "alpha": alpha}, "b": below}
 
     def _coated(self, body: Notation) -> Notation:
         if self.clearcoat == 0.0:
             return body
         if self.transmission != 0.0:
-            self.say("the clear coat is left out: a coat's base must not transmit")
+            self.say("the clear coat is omitted: a coat's base must not transmit")
             return body
         alpha = self.clearcoat_roughness**2
         coated: Notation = {"type": "coat", "base": body, "index": 1.5, "alpha": alpha, "bounces": "white"}
         return coated if self.clearcoat == 1.0 else _mixed(body, coated, self.clearcoat)
 
-    def _holed(self, found: Notation) -> Notation:
+    def _holed(self, body: Notation) -> Notation:
         if self.mode == "OPAQUE":
-            return found
+            return body
         opacity: object = self.alpha_factor
         if self.base_texture is not None:
             opacity = {**self.base_texture, "colorSpace": "raw", "channel": "a", "factor": self.alpha_factor}
             if self.mode == "MASK":
-                self.say("the mask's edge is soft: alphaCutoff has no word")
+                self.say("the mask's edge is soft: alphaCutoff cannot be expressed")
         elif self.mode == "MASK":
             opacity = 1.0 if self.alpha_factor >= self.cutoff else 0.0
         if opacity == 1.0:
-            return found
-        both = found if self.transmission != 0.0 else {"type": "two-sided", "base": found}
+            return body
+        both = body if self.transmission != 0.0 else {"type": "two-sided", "base": body}
         return {"type": "opacity", "base": both, "opacity": opacity}
 
 
@@ -398,7 +388,7 @@ def _mixed(a: Notation, b: Notation, weight: object) -> Notation:
     return {"type": "mix", "a": a, "b": b, "weight": weight}
 
 
-# Of white `sheen-charlie`: (alpha, what it reflects of light from all around), measured by go.albedo
+# Of white `sheen-charlie`: (alpha, albedo for uniform illumination), measured by go.albedo
 ALBEDOS = (
     (0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
     (0.0624, 0.0777, 0.1010, 0.1226, 0.1615, 0.1954, 0.2244, 0.2486, 0.2681, 0.2830, 0.2934, 0.2996),

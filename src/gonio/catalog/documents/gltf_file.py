@@ -1,7 +1,7 @@
-"""A glTF 2.0 file as JSON whose numbers can be trusted: .gltf with what lies beside it, or .glb (Khronos2021, sec. 4).
+"""A validated glTF 2.0 file: .gltf with its external files, or .glb (Khronos2021, sec. 4).
 
-Nothing is believed: sizes are compared with the files they speak of, indices with the lists they point into, and what a
-file names must lie in its own folder.
+All content is untrusted: sizes are compared with the actual sizes, indices with the lists they point into, and external
+files must be in the file's own folder.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import base64
 import binascii
 import json
 import struct
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NoReturn, TypeAlias
@@ -19,19 +20,19 @@ from ...errors import InputError
 
 Json: TypeAlias = "dict[str, object]"
 
-MOST = 1 << 30  # bytes of a file: more is no material's
+MAX_BYTES = 1 << 30  # of a file: more is not plausible for materials
 MOST_JSON = 64 << 20
 MOST_ITEMS = 1_000_000  # of a list, so that a check takes a second at most
-LARGEST = 1e18  # as a scene's numbers
+LARGEST = 1e18  # the limit of numbers in scenes
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _PARTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
 class GltfFile:
-    """A file that was checked as a whole.
+    """A file, validated on construction.
 
-    path  it lies there
+    path  its path
     root  its JSON
     """
 
@@ -47,94 +48,100 @@ class GltfFile:
         self.root = self._parsed(text)
         self._check()
 
-    # ------------------------------------------------------------------ what the JSON holds
+    # ------------------------------------------------------------------ access to the JSON
 
     def fail(self, what: str, at: str = "", hint: str = "") -> NoReturn:
-        """InputError at a place in the file."""
+        """Raise InputError at a location in the file."""
         raise InputError(what, f"{self._where}#{at}" if at else self._where, hint)
 
     def items(self, key: str) -> list[Json]:
-        """A list of objects at the top level, empty where there is none."""
+        """A list of objects at the top level, empty if it is missing."""
         if key not in self._lists:
-            found = self.root.get(key, [])
-            if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+            items = self.root.get(key, [])
+            if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
                 self.fail("a list of objects expected", f"/{key}")
-            self._lists[key] = found
+            self._lists[key] = items
         return self._lists[key]
 
+    def material_names(self) -> list[str]:
+        """Each material's name if it is unique, else its number."""
+        given = [str(material.get("name", "")) for material in self.items("materials")]
+        unique = {name for name, times in Counter(given).items() if name and times == 1 and not name.isdigit()}
+        return [name if name in unique else str(index) for index, name in enumerate(given)]
+
     def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
-        """A member that is an object, empty where there is none."""
-        found = of.get(key, {})
-        if not isinstance(found, dict):
+        """A member that is an object, empty if it is missing."""
+        member = of.get(key, {})
+        if not isinstance(member, dict):
             self.fail("an object expected", f"{at}/{key}")
-        return found
+        return member
 
     def number(self, of: Mapping[str, object], key: str, default: float, at: str, low: float, high: float) -> float:
         """A member that is a number from low to high."""
-        found = of.get(key, default)
-        if isinstance(found, bool) or not isinstance(found, int | float):
+        number = of.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int | float):
             self.fail("a number expected", f"{at}/{key}")
-        if not low <= found <= high:  # a number of a thousand digits can be compared, and not be written
-            self.fail(f"{str(found)[:20]} is out of range: {low:g} to {high:g} expected", f"{at}/{key}")
-        return float(found)
+        if not low <= number <= high:  # an integer of a thousand digits can be compared but not printed
+            self.fail(f"{str(number)[:20]} is out of range: {low:g} to {high:g} expected", f"{at}/{key}")
+        return float(number)
 
     def colour(
         self, of: Mapping[str, object], key: str, default: tuple[float, ...], at: str, high: float = 1.0
     ) -> tuple[float, ...]:
-        """A member that is a list of as many numbers as the default, from 0 to `high`."""
-        found = of.get(key, list(default))
-        if not isinstance(found, list) or len(found) != len(default):
+        """A member that is a list of numbers from 0 to `high`, as many as in the default."""
+        color = of.get(key, list(default))
+        if not isinstance(color, list) or len(color) != len(default):
             self.fail(f"a list of {len(default)} numbers expected", f"{at}/{key}")
-        return tuple(self.number({str(i): part}, str(i), 0.0, f"{at}/{key}", 0.0, high) for i, part in enumerate(found))
+        return tuple(self.number({str(i): part}, str(i), 0.0, f"{at}/{key}", 0.0, high) for i, part in enumerate(color))
 
-    def whole(
+    def integer(
         self, of: Mapping[str, object], key: str, at: str, default: int | None = None, high: int = 1 << 40
     ) -> int:
-        """A member that is a whole number from 0 to `high`; an error where it is missing and has no default."""
-        found = of.get(key, default)
-        if isinstance(found, bool) or not isinstance(found, int) or found < 0:
+        """A member that is an integer from 0 to `high`; an error if it is missing and has no default."""
+        number = of.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             self.fail("a whole number of 0 or more expected", f"{at}/{key}")
-        if found > high:
-            self.fail(f"{str(found)[:20]} given, at most {high} expected", f"{at}/{key}")
-        return found
+        if number > high:
+            self.fail(f"{str(number)[:20]} given, at most {high} expected", f"{at}/{key}")
+        return number
 
     def index(self, of: Mapping[str, object], key: str, into: str, at: str) -> int:
         """A member that is an index into a list at the top level."""
         count = len(self.items(into))
-        found = self.whole(of, key, at)
-        if found >= count:
-            self.fail(f"there is no {into} {found}, of {count}", f"{at}/{key}")
-        return found
+        number = self.integer(of, key, at)
+        if number >= count:
+            self.fail(f"there is no {into} {number}, of {count}", f"{at}/{key}")
+        return number
 
     # ------------------------------------------------------------------ bytes
 
     def view(self, index: int) -> bytes:
-        """The bytes of a buffer view, which `_check` has found within its buffer."""
+        """The bytes of a buffer view, which `_check` has validated."""
         view = self.items("bufferViews")[index]
         at = f"/bufferViews/{index}"
         data = self._buffer(self.index(view, "buffer", "buffers", at))
-        start = self.whole(view, "byteOffset", at, 0)
-        return data[start : start + self.whole(view, "byteLength", at)]
+        start = self.integer(view, "byteOffset", at, 0)
+        return data[start : start + self.integer(view, "byteLength", at)]
 
-    def beside(self, uri: str, at: str) -> Path:
-        """The file of a relative address. InputError where it lies outside the folder, or there is none."""
-        hint = "give a file beside it, or put the data into the file"
+    def local_file(self, uri: str, at: str) -> Path:
+        """The file at a relative address. Raises InputError if it is outside the folder or does not exist."""
+        hint = "put the file into the same folder, or embed the data"
         if ":" in uri.split("/")[0] or uri.startswith(("//", "\\")):
-            self.fail(f"'{uri[:60]}' is no file beside it", at, hint)
+            self.fail(f"'{uri[:60]}' is not a file in its folder", at, hint)
         try:
             folder = self.path.parent.resolve()
-            found = (folder / unquote(uri)).resolve()
-            inside, there = found.is_relative_to(folder), found.is_file()
-        except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, links in a circle
-            self.fail(f"no usable file name: {error}", at, hint)
+            path = (folder / unquote(uri)).resolve()
+            inside, there = path.is_relative_to(folder), path.is_file()
+        except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, circular links
+            self.fail(f"not a usable file name: {error}", at, hint)
         if not inside:
-            self.fail(f"'{uri[:60]}' lies outside its folder", at, hint)
+            self.fail(f"'{uri[:60]}' is outside its folder", at, hint)
         if not there:
             self.fail(f"'{uri[:60]}' does not exist", at, "keep a .gltf together with its files, or use .glb")
-        return found
+        return path
 
     def data(self, uri: str, at: str) -> bytes:
-        """What a data: address holds."""
+        """The content of a data: address."""
         head, comma, text = uri.partition(",")
         if not comma or not head.endswith(";base64"):
             self.fail("a data address without ';base64,'", at)
@@ -152,20 +159,22 @@ class GltfFile:
             return self._chunk
         if not isinstance(uri, str):
             self.fail("a text expected", f"{at}/uri")
-        return self.data(uri, f"{at}/uri") if uri.startswith("data:") else self._bytes_of(self.beside(uri, f"{at}/uri"))
+        if uri.startswith("data:"):
+            return self.data(uri, f"{at}/uri")
+        return self._bytes_of(self.local_file(uri, f"{at}/uri"))
 
     def _size(self, index: int) -> int:
-        """How many bytes a buffer really has; a file beside it is not read for that."""
+        """The actual number of bytes in a buffer; an external file is not read for this."""
         uri = self.items("buffers")[index].get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
-            return self.beside(uri, f"/buffers/{index}/uri").stat().st_size
+            return self.local_file(uri, f"/buffers/{index}/uri").stat().st_size
         return len(self._buffer(index))
 
     def _bytes_of(self, path: Path) -> bytes:
         try:
             size = path.stat().st_size
-            if size > MOST:
-                raise InputError(f"{size} bytes, at most {MOST} expected", str(path))
+            if size > MAX_BYTES:
+                raise InputError(f"{size} bytes, at most {MAX_BYTES} expected", str(path))
             return path.read_bytes()
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None
@@ -173,25 +182,25 @@ class GltfFile:
     def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON and the binary chunk of a .glb."""
         if len(data) < 20 or data[:4] != b"glTF":
-            self.fail("no glTF: its first 20 bytes are no head of a .glb")
+            self.fail("not a glTF file: its first 20 bytes are not a .glb header")
         version, length = struct.unpack_from("<II", data, 4)
         if version != 2:
             self.fail(f"version {version} of .glb, 2 expected", hint="save it as glTF 2.0")
         if length != len(data):
-            self.fail(f"it says that it has {length} bytes, and has {len(data)}", hint="it is cut off or damaged")
-        found: dict[int, bytes] = {}
+            self.fail(f"its header states {length} bytes, but it has {len(data)}", hint="it is truncated or damaged")
+        chunks: dict[int, bytes] = {}
         at = 12
         while at < length:
             if at + 8 > length:
-                self.fail(f"a chunk's head is cut off at byte {at}")
+                self.fail(f"a chunk's header is truncated at byte {at}")
             size, kind = struct.unpack_from("<II", data, at)
             if size > length - at - 8:
                 self.fail(f"a chunk of {size} bytes at byte {at}, where {length - at - 8} are left")
-            found.setdefault(kind, data[at + 8 : at + 8 + size])
+            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
             at += 8 + size
-        if _JSON not in found:
+        if _JSON not in chunks:
             self.fail("a .glb without JSON")
-        return found[_JSON], found.get(_BIN)
+        return chunks[_JSON], chunks.get(_BIN)
 
     # ------------------------------------------------------------------ checks
 
@@ -203,14 +212,14 @@ class GltfFile:
             raise ValueError(f"{name} is no number")
 
         try:
-            found = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
+            root = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
         except RecursionError:
             self.fail("JSON that is nested too deep")
-        except ValueError as error:  # no UTF-8 too, and an integer of more digits than Python converts
-            self.fail(f"no JSON: {str(error)[:200]}", hint="it is cut off or damaged")
-        if not isinstance(found, dict):
+        except ValueError as error:  # also invalid UTF-8, and integers with more digits than Python converts
+            self.fail(f"not valid JSON: {str(error)[:200]}", hint="it is truncated or damaged")
+        if not isinstance(root, dict):
             self.fail("an object expected", "/")
-        return found
+        return root
 
     def _check(self) -> None:
         version = self.member(self.root, "asset", "").get("version")
@@ -223,10 +232,10 @@ class GltfFile:
         sizes = self._buffers()
         for index, view in enumerate(self.items("bufferViews")):
             at = f"/bufferViews/{index}"
-            end = self.whole(view, "byteOffset", at, 0) + self.whole(view, "byteLength", at)
+            end = self.integer(view, "byteOffset", at, 0) + self.integer(view, "byteLength", at)
             size = sizes[self.index(view, "buffer", "buffers", at)]
             if end > size:
-                self.fail(f"it ends at byte {end} of a buffer of {size}", at, "it is cut off or damaged")
+                self.fail(f"it ends at byte {end} of a buffer of {size}", at, "it is truncated or damaged")
         for index, accessor in enumerate(self.items("accessors")):
             self._accessor(accessor, f"/accessors/{index}")
         self._nodes()
@@ -234,29 +243,29 @@ class GltfFile:
     def _buffers(self) -> list[int]:
         sizes = []
         for index, buffer in enumerate(self.items("buffers")):
-            claimed, size = self.whole(buffer, "byteLength", f"/buffers/{index}"), self._size(index)
+            claimed, size = self.integer(buffer, "byteLength", f"/buffers/{index}"), self._size(index)
             if claimed > size:
-                what = f"a buffer of {claimed} bytes, and there are {size}"
-                self.fail(what, f"/buffers/{index}/byteLength", "it is cut off or damaged")
+                what = f"a buffer of {claimed} bytes, but there are {size}"
+                self.fail(what, f"/buffers/{index}/byteLength", "it is truncated or damaged")
             sizes.append(claimed)
         return sizes
 
     def _accessor(self, accessor: Json, at: str) -> None:
-        size, parts = _SIZES.get(self.whole(accessor, "componentType", at)), _PARTS.get(str(accessor.get("type")))
+        size, parts = _SIZES.get(self.integer(accessor, "componentType", at)), _PARTS.get(str(accessor.get("type")))
         if size is None or parts is None:
             self.fail("unknown componentType or type", at)
-        count = self.whole(accessor, "count", at)
+        count = self.integer(accessor, "count", at)
         if "bufferView" not in accessor:
             return
         view = self.items("bufferViews")[self.index(accessor, "bufferView", "bufferViews", at)]
         element = size * parts
-        stride = self.whole(view, "byteStride", at, 0, 252) or element
-        end = self.whole(accessor, "byteOffset", at, 0) + (stride * (count - 1) + element if count else 0)
-        if end > self.whole(view, "byteLength", at):
+        stride = self.integer(view, "byteStride", at, 0, 252) or element
+        end = self.integer(accessor, "byteOffset", at, 0) + (stride * (count - 1) + element if count else 0)
+        if end > self.integer(view, "byteLength", at):
             self.fail(f"{count} entries end at byte {end} of a view of {view['byteLength']}", at)
 
     def _nodes(self) -> None:
-        """Every node has one parent at most, and none is its own ancestor."""
+        """Check that every node has at most one parent and is not its own ancestor."""
         nodes = self.items("nodes")
         parent: dict[int, int] = {}
         for index, node in enumerate(nodes):

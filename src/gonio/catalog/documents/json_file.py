@@ -1,16 +1,17 @@
-"""JSON files that hold a material: in Gonio's notation, or as what a fit, a capture or a compression found.
+"""JSON files that describe a material: in Gonio's notation, or as the result of a fit, a capture or a compression.
 
-{"type": "gonio-conductor", "alpha": 0.3}             as `gonio convert` writes it
+{"type": "gonio-conductor", "alpha": 0.3}             written by `gonio convert`
 {"fits": [{"notation": {"type": ...}}, ...]}          `gonio fit`: the best, or gold.json:2 for the second
 [{"file": "gold.binary", "fits": [...]}, ...]         `gonio fit` of several files: all.json:gold.binary
 {"notations": {"shapes.0.material": {"type": ...}}}   `gonio fit --from`
 {"fit": {"notation": {"type": ...}}}                  `gonio capture`
-{"path": "gold.gonio", "kind": "log", ...}            `gonio compress --json`, of several files a list
+{"path": "gold.gonio", "kind": "log", ...}            `gonio compress --json`, a list for several files
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar, TypeAlias
@@ -24,7 +25,7 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | float | bool | None"
 LARGEST = 64 << 20  # bytes: a fit of a thousand files has less than ten million
 
 _read: dict[Path, tuple[tuple[int, int], dict[str, Json] | None]] = {}
-KEPT = 8  # files, the last that were asked for
+CACHED = 8  # files, the most recently used
 
 
 class JsonFile(Document):
@@ -44,7 +45,7 @@ class JsonFile(Document):
 
     def read(self, path: Path, name: str) -> Described:
         entry = (_entries(path) or {})[name]
-        if isinstance(entry, str):  # of an earlier version, or of a class that no file holds
+        if isinstance(entry, str):  # from an earlier version, or a class without a file
             hint = f"name the material itself: '{entry}'"
             raise InputError("it has the material as a text only, which is not read from files", str(path), hint)
         if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
@@ -53,7 +54,7 @@ class JsonFile(Document):
 
 
 def _entries(path: Path) -> dict[str, Json] | None:
-    """What describes each material in a file, by name; None where the file is missing, or holds something else."""
+    """The description of each material in a file, by name; None if the file is missing or has other content."""
     try:
         about = path.stat()
         stamp = (about.st_mtime_ns, about.st_size)
@@ -61,23 +62,23 @@ def _entries(path: Path) -> dict[str, Json] | None:
             return _read[path][1]
         if not path.is_file() or about.st_size > LARGEST:
             return None
-        found = dict(_found(json.loads(path.read_bytes())))
+        entries = dict(_materials_in(json.loads(path.read_bytes())))
     except (OSError, ValueError, RecursionError):
         return None
-    while len(_read) >= KEPT:
+    while len(_read) >= CACHED:
         _read.pop(next(iter(_read)))
-    _read[path] = stamp, found or None
-    return found or None
+    _read[path] = stamp, entries or None
+    return entries or None
 
 
-def _found(content: Json) -> Iterator[tuple[str, Json]]:
-    """Name and description of each material; nothing where the content is something else, such as a scene."""
+def _materials_in(content: Json) -> Iterator[tuple[str, Json]]:
+    """Name and description of each material; empty for other content, such as a scene."""
     if isinstance(content, list):
         rows = [row for row in content if isinstance(row, dict)]
         names = [str(row.get("file") or row.get("path")) for row in rows]
         short = [Path(name).name for name in names]
         for name, row in zip(names if len(set(short)) < len(short) else short, rows, strict=True):
-            for _, entry in [*_found(row)][:1]:
+            for _, entry in [*_materials_in(row)][:1]:
                 yield name, entry
         return
     if not isinstance(content, dict):
@@ -100,18 +101,18 @@ def _found(content: Json) -> Iterator[tuple[str, Json]]:
 
 
 def _located(notation: Mapping[str, object], folder: Path, where: str, depth: int = 0) -> Notation:
-    """The notation with the paths of its files, which start from a folder. InputError for a document in a document, and
-    for more materials inside each other than a material may have."""
+    """The notation with file paths relative to a folder made absolute. Raises InputError for a document inside a
+    document, and for too many nested materials."""
     if depth > tree.MAX_MATERIALS:
-        raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
-    found: Notation = {}
+        raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
+    located: Notation = {}
     for key, value in notation.items():
         if isinstance(value, dict):
-            found[key] = _located(value, folder, where, depth + 1)
+            located[key] = _located(value, folder, where, depth + 1)
         elif key == "type" and from_scenes({key: value})[key] in Document.family.all():
             raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
         elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
-            found[key] = str(folder / Path(value).expanduser())
+            located[key] = str(folder / Path(os.path.expanduser(value)))
         else:
-            found[key] = value
-    return found
+            located[key] = value
+    return located

@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import InputError, MachineError, did_you_mean
 from . import Described, Document, Notation, xml_guard
 
-Node: TypeAlias = Any  # of MaterialX's own, in C++, without stubs
+Node: TypeAlias = Any  # of MaterialX, in C++, without stubs
 Number: TypeAlias = float | bool | tuple[float, ...]
 Inputs: TypeAlias = dict[str, Number]
 
@@ -31,7 +31,7 @@ FRAMES = {
     "normal",
 }
 
-# What `to_open_pbr` has no word for, and where it then makes no difference
+# Inputs that `to_open_pbr` cannot express, with the values at which they have no effect
 LEFT: Mapping[str, Number] = {
     "specular_rotation": 0.0, "transmission_extra_roughness": 0.0, "coat_rotation": 0.0, "coat_affect_color": 0.0,
 }  # fmt: skip
@@ -48,16 +48,16 @@ class MaterialX(Document):
         return list(_surfaces(_document(path)))
 
     def read(self, path: Path, name: str) -> Described:
-        document = _document(path)  # its nodes do not keep it
+        document = _document(path)  # must be referenced here, since its nodes do not hold it
         surface = _surfaces(document)[name]
         where = f"{path}#{surface.getName()}"
         given = _inputs(surface, where)
         notices: list[str] = []
         if surface.getCategory() == STANDARD:
-            definition = surface.getNodeDef()  # of its version
-            whole = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
-            notices = [f"{key} is left out" for key, without in LEFT.items() if whole[key] != without]
-            given = to_open_pbr(whole)
+            definition = surface.getNodeDef()  # for its version
+            inputs = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
+            notices = [f"{key} is omitted" for key, without in LEFT.items() if inputs[key] != without]
+            given = to_open_pbr(inputs)
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in given.items()}
         return Described({"type": "openpbr", **values}, tuple(notices))
 
@@ -68,7 +68,7 @@ class MaterialX(Document):
         surface = document.addNode(OPEN_PBR, "surface_" + mx.createValidName(name), "surfaceshader")
         known = _types(OPEN_PBR)
         for key, value in notation.items():
-            if key in ("type", "layering"):  # how the same lobes are put together is Gonio's own matter
+            if key in ("type", "layering"):  # how the lobes are combined is specific to Gonio
                 continue
             if key not in known:
                 raise InputError(f"{OPEN_PBR} has no input '{key}'", "material", did_you_mean(key, list(known)))
@@ -80,11 +80,11 @@ class MaterialX(Document):
 
 
 def to_open_pbr(s: Mapping[str, Number]) -> Inputs:
-    """The parameters of OpenPBR that stand for those of Autodesk's Standard Surface.
+    """The parameters of OpenPBR that correspond to those of Autodesk's Standard Surface.
 
     The formulas are those of MaterialX's node graph NG_standard_surface_to_open_pbr_surface (MaterialX2024), in its
-    libraries/bxdf/translation. There a film's thickness becomes micrometres, a coat over metal only tints, and
-    `coat_affect_roughness` is handed to `coat_darkening`.
+    libraries/bxdf/translation. It converts a film's thickness to micrometers, lets a coat over metal only tint, and
+    maps `coat_affect_roughness` to `coat_darkening`.
     """
     coat, metal = _number(s["coat"]), _number(s["metalness"])
     colour, coat_colour = _colour(s["base_color"]), _colour(s["coat_color"])
@@ -131,16 +131,16 @@ def to_open_pbr(s: Mapping[str, Number]) -> Inputs:
 
 
 def _number(value: Number) -> float:
-    assert isinstance(value, float), "of that type in the definition"
+    assert isinstance(value, float), "guaranteed by the definition"
     return value
 
 
 def _colour(value: Number) -> tuple[float, ...]:
-    assert isinstance(value, tuple), "of that type in the definition"
+    assert isinstance(value, tuple), "guaranteed by the definition"
     return value
 
 
-# --------------------------------------------------------------------------- MaterialX's own
+# --------------------------------------------------------------------------- the library MaterialX
 
 
 def _wheel() -> ModuleType:
@@ -164,17 +164,17 @@ def _library() -> Node:
 @lru_cache(maxsize=4)
 def _types(category: str) -> dict[str, str]:
     """The type of each input of a surface that is a value."""
-    found = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
-    return {one.getName(): one.getType() for one in found if one.getName() not in FRAMES}
+    inputs = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
+    return {one.getName(): one.getType() for one in inputs if one.getName() not in FRAMES}
 
 
 def _defaults(definition: str) -> Inputs:
-    found = _library().getNodeDef(definition).getActiveInputs()
-    return {one.getName(): _plain(one.getValue()) for one in found if one.getName() not in FRAMES | {"tangent"}}
+    inputs = _library().getNodeDef(definition).getActiveInputs()
+    return {one.getName(): _plain(one.getValue()) for one in inputs if one.getName() not in FRAMES | {"tangent"}}
 
 
 def _plain(value: Node) -> Number:
-    """A value; of what is held as float32 the shortest number that stands for it."""
+    """A value; a float32 as the shortest decimal number that rounds to it."""
     if isinstance(value, bool):
         return value
     if isinstance(value, int | float):
@@ -183,59 +183,59 @@ def _plain(value: Node) -> Number:
 
 
 def _document(path: Path) -> Node:
-    """A file as a document of MaterialX's, after it was looked through: no include is left, no entity, no odd size."""
+    """A file as a MaterialX document, after checks: includes are resolved, entities rejected, sizes limited."""
     mx = _wheel()
     root = xml_guard.read(path)
     if root.tag != "materialx":
-        raise InputError(f"<{root.tag[:40]}> is no MaterialX document", str(path), "it starts with <materialx>")
+        raise InputError(f"<{root.tag[:40]}> is not a MaterialX document", str(path), "it must start with <materialx>")
     document = mx.createDocument()
     try:
         mx.readFromXmlString(document, ElementTree.tostring(root, "unicode"))
         document.setDataLibrary(_library())
-    except Exception as error:  # of MaterialX, which has a family of its own
-        raise InputError(f"MaterialX refuses it: {str(error)[:200]}", str(path), "mend it there") from None
+    except Exception as error:  # MaterialX has its own exceptions
+        raise InputError(f"MaterialX rejects it: {str(error)[:200]}", str(path), "correct it there") from None
     return document
 
 
 def _surfaces(document: Node) -> dict[str, Node]:
     """The surface of each material by the material's name, and surfaces without one by their own."""
-    found: dict[str, Node] = {}
+    surfaces: dict[str, Node] = {}
     loose = {node.getName(): node for node in document.getNodes() if node.getType() == "surfaceshader"}
     for material in document.getNodes():
         link = material.getInput("surfaceshader") if material.getType() == "material" else None
         name = link.getNodeName() if link is not None else ""
         if name in loose:
-            found[material.getName()] = loose[name]
-    worn = {node.getName() for node in found.values()}
-    return {**found, **{name: node for name, node in loose.items() if name not in worn}}
+            surfaces[material.getName()] = loose[name]
+    worn = {node.getName() for node in surfaces.values()}
+    return {**surfaces, **{name: node for name, node in loose.items() if name not in worn}}
 
 
 def _inputs(surface: Node, where: str) -> Inputs:
-    """What a surface is given, each a value of the type in its definition."""
+    """The inputs that are set on a surface, each a value of the type in its definition."""
     category = surface.getCategory()
     if category not in (OPEN_PBR, STANDARD):
         raise InputError(f"unknown node '{category[:60]}'", where, f"{OPEN_PBR} and {STANDARD} are read")
-    known, found = _types(category), {}
+    known, inputs = _types(category), {}
     for one in surface.getInputs():
         name = one.getName()
         linked = [key for key in ("nodename", "nodegraph", "interfacename", "output") if one.hasAttribute(key)]
         if linked:
-            what = f"its {name[:60]} is joined to '{one.getAttribute(linked[0])[:60]}', and only values can be read"
+            what = f"its {name[:60]} is connected to '{one.getAttribute(linked[0])[:60]}', but only values can be read"
             raise InputError(what, where, "bake it into a value")
         if name not in known:
             raise InputError(f"{category} has no input '{name[:60]}'", where, did_you_mean(name, list(known)))
         if one.getType() != known[name]:
             what = f"{name} is of type {one.getType()[:40]}, {known[name]} expected"
             raise InputError(what, where)
-        found[name] = _value(one, where)
-    return found
+        inputs[name] = _value(one, where)
+    return inputs
 
 
 def _value(one: Node, where: str) -> Number:
     name, text = one.getName(), one.getValueString()
     try:
         value = _plain(one.getValue())
-    except Exception:  # no value, or a text that is no number
+    except Exception:  # no value, or a text that is not a number
         raise InputError(f"{name} = '{text[:60]}' is no {one.getType()}", where) from None
     numbers = value if isinstance(value, tuple) else (value,)
     if not all(math.isfinite(number) for number in numbers):

@@ -1,4 +1,4 @@
-"""XML from strangers: its size is known before anything is built from it, and files that it includes are read here."""
+"""Untrusted XML: sizes are checked before anything is built, and included files are resolved here."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _INCLUDE = "{http://www.w3.org/2001/XInclude}include"
 
 
 def read(path: Path) -> ElementTree.Element:
-    """The root of a file, with what it includes in the includes' places.
+    """The root of a file, with included files in place of the includes.
 
-    Included files must lie in the folder of the first. InputError for what is not well-formed, declares entities (which
-    may grow without bounds), includes itself, or is larger, deeper or made of more parts than any document of people's.
+    Included files must be in the folder of the first. Raises InputError for a file that is not well-formed, declares
+    entities (which may grow without bounds), includes itself, or exceeds the limits of size, depth or number of parts.
     """
     folder = path.parent.resolve()
     left, files = MOST_ELEMENTS, 0
@@ -48,9 +48,9 @@ def _included(element: ElementTree.Element, file: Path, folder: Path, above: tup
         target = (file.parent / name).resolve()
         there = target.is_file()
     except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"no usable file name: {error}", str(file), "include a file beside it") from None
+        raise InputError(f"not a usable file name: {error}", str(file), "include a file in the same folder") from None
     if ":" in name.split("/")[0] or not target.is_relative_to(folder):
-        raise InputError(f"it includes '{name[:60]}', which lies outside its folder", str(file), "copy it there")
+        raise InputError(f"it includes '{name[:60]}', which is outside its folder", str(file), "copy it there")
     if target in above:
         raise InputError(f"it includes '{name[:60]}', which includes it again", str(file), "remove one of the includes")
     if not there:
@@ -76,9 +76,9 @@ def _guarded(path: Path, most: int) -> tuple[ElementTree.Element, int]:
         nonlocal count, depth
         count, depth = count + 1, depth + 1
         if count > most:
-            raise InputError(f"more than {MOST_ELEMENTS} elements", str(path), "keep the materials that are wanted")
+            raise InputError(f"more than {MOST_ELEMENTS} elements", str(path), "keep only the materials you need")
         if depth > DEEPEST:
-            raise InputError(f"more than {DEEPEST} elements inside each other", str(path))
+            raise InputError(f"more than {DEEPEST} nested elements", str(path))
 
     def closed(name: str) -> None:
         nonlocal depth
@@ -93,4 +93,4 @@ def _guarded(path: Path, most: int) -> tuple[ElementTree.Element, int]:
     except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"not well-formed XML: {error}", str(path), "mend it there") from None
+        raise InputError(f"not well-formed XML: {error}", str(path), "correct it there") from None

@@ -1,4 +1,4 @@
-"""What a verb of the command line is: a function with Typer's annotations, and its place in the help.
+"""A verb of the command line: a function with Typer's annotations, and its place in the help.
 
     @verb(MATERIALS)
     def sheen(model: Model, made: Material, as_json: Json = False) -> None:
@@ -40,7 +40,7 @@ class Verb:
         return inspect.cleandoc(self.function.__doc__ or "").partition("\n")[0]
 
     def with_single_options(self) -> Callable[..., None]:
-        """The function with an option for each field of each dataclass that it takes: what Typer can read."""
+        """The function with an option for each field of each dataclass that it takes, as Typer reads it."""
         hints = get_type_hints(self.function, include_extras=True)
         groups: dict[str, type] = {}
         single: list[inspect.Parameter] = []

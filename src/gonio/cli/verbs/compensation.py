@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument
 
 from .. import completion
-from ..options import Json, Material
+from ..options import Json, Material, output_option, samples_option
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
@@ -24,43 +24,40 @@ def compensation(
             autocompletion=completion.materials,
         ),
     ] = None,
-    output: Annotated[Path | None, Option("-o", "--output", metavar="DIR", help="Write a picture and JSON.")] = None,
-    walks: Annotated[int, Option(metavar="N", help="Random walks a point of the referee.")] = 200_000,
+    output: Annotated[Path | None, output_option("DIR", "Write a picture and JSON there.")] = None,
+    samples: Annotated[int, samples_option("Random walks per point of the reference.")] = 200_000,
     as_json: Json = False,
 ) -> None:
-    """Compare the ways to give back lost light: furnace, distance to the random walk, reciprocity, cost.
+    """Compare the ways to restore light lost by single scattering: furnace, error, reciprocity, cost.
 
     \b
     Examples:
       gonio compensation -o comparison
       gonio compensation mine.py:Compensation
     """
+    from ...viewer.compensations import compensation
+
+    result = compensation(*Material().texts(model or ()), output=output, samples=samples)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        _print(result)
+
+
+def _print(result: dict[str, Any]) -> None:
+    """A row for each method, and the albedos that no random walk judges."""
     import numpy as np
 
-    from ...catalog import notation
-    from ...materials.compensated import comparison
-
-    if output is not None:
-        from ... import files
-        from ...viewer import energy_figures
-
-        output = files.check_folder(output)
-    found = comparison.compare(walks=walks, own=[notation.named(text)[0] for text in Material().texts(model or ())])
-    if output is not None:
-        energy_figures.plot_comparison(found, output)
-    if as_json:
-        print(json.dumps(found))
-        return
-    names = list(found["rms"])
+    names = list(result["rms"])
     table = listing("method", *names, "loss", "recip.", "time")
-    print("RMS distance of the albedo to the random walk; largest loss in a white furnace; breach of reciprocity; time")
-    for method in found["cost"]:
-        distances = [found["rms"][n].get(method) for n in names]
+    print("RMS distance of the albedo to the random walk; largest loss in a white furnace; error of reciprocity; time")
+    for method in result["cost"]:
+        distances = [result["rms"][n].get(method) for n in names]
         rms = ["" if d is None else f"{d:.3f}" if d >= 1e-3 else f"{d:.0e}" for d in distances]
-        broken = f"{found['reciprocity'][method]:.0e}" if method in found["reciprocity"] else ""
-        furnace = f"{found['furnace']['white'].get(method, 0.0):.0e}"
-        table.add_row(method, *rms, furnace, broken, f"{found['cost'][method]:.2f}")
+        broken = f"{result['reciprocity'][method]:.0e}" if method in result["reciprocity"] else ""
+        furnace = f"{result['furnace']['white'].get(method, 0.0):.0e}"
+        table.add_row(method, *rms, furnace, broken, f"{result['cost'][method]:.2f}")
     print_rich(table)
-    for name in (n for n in names if not found["rms"][n]):
-        means = (f"{method} {np.mean(values):.4f}" for method, values in found["albedo"][name].items())
+    for name in (n for n in names if not result["rms"][n]):
+        means = (f"{method} {np.mean(values):.4f}" for method, values in result["albedo"][name].items())
         print(f"{name}: albedo, the mean over roughness and angle: {', '.join(means)}")

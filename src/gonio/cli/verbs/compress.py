@@ -8,31 +8,32 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from ..options import Json
+from ..options import Json, output_option
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
 
 @verb(MATERIALS, place=10)
 def compress(
-    files: Annotated[list[str], Argument(metavar="FILE...", help="Measured values; of several one file is made.")],
+    files: Annotated[list[str], Argument(metavar="FILE...", help="Files of measured values; several make one file.")],
     *,
-    output: Annotated[Path, Option("-o", "--output", metavar="OUT.gonio", help="The file to write.")],
-    method: Annotated[str, Option(metavar="NAME", help="log, lowrank, rgl or network.")] = "log",
-    size: Annotated[int, Option("--bytes", metavar="N", help="A material, for log and lowrank.")] = 16384,
+    output: Annotated[Path, output_option("FILE", "The file to write: .gonio.")],
+    codec: Annotated[str, Option(metavar="NAME", help="log, lowrank, rgl or network.")] = "log",
+    bytes: Annotated[int, Option(metavar="N", help="Size per material, of log and lowrank.")] = 16384,
     as_json: Json = False,
 ) -> None:
-    """Write measured materials in fewer bytes, and say how far off that is.
+    """Write measured materials in fewer bytes, and report the error.
 
-    log keeps logarithms as rounded cosines, lowrank factors of low rank that several materials share, rgl an RGL table
-    without its visible normals, network 675 weights that are trained here. The result stands wherever a file can.
+    log stores the logarithms as rounded cosine coefficients, lowrank low-rank factors that several materials share, rgl
+    an RGL table without its visible normals, network the 675 weights of a network that is trained here. The result can
+    be used wherever a measured file can.
 
     \b
     Examples:
       gonio compress gold.binary -o gold.gonio
-      gonio compress gold.binary silk.bsdf --method lowrank --bytes 8192 -o both.gonio
-      gonio compress paint.bsdf --method rgl -o paint.gonio
-      gonio compress gold.binary --method network -o gold.gonio
+      gonio compress gold.binary silk.bsdf --codec lowrank --bytes 8192 -o both.gonio
+      gonio compress paint.bsdf --codec rgl -o paint.gonio
+      gonio compress gold.binary --codec network -o gold.gonio
     """
     from ...catalog import operands
     from ...measure.compression.compress import compress as compressed
@@ -40,7 +41,7 @@ def compress(
     for file in files:
         operands.kind_of(file, {operands.Kind.TABLE}, "FILE")
 
-    rows = compressed(files, output, method, size)
+    rows = compressed(files, output, codec, bytes)
     if as_json:
         print(json.dumps([row.as_dict() for row in rows] if len(rows) > 1 else rows[0].as_dict()))
         return

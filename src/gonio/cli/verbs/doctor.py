@@ -14,14 +14,14 @@ from .base import SUPPORT, verb
 
 @verb(SUPPORT, place=2)
 def doctor(
-    bench: Annotated[bool, Option("--bench", help="Measure how fast it is, beside Mitsuba's own plugins.")] = False,
-    device: Device = "auto",
+    bench: Annotated[bool, Option("--bench", help="Measure its speed, compared with Mitsuba's own plugins.")] = False,
+    device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
-    """Say what this machine can render with, what is missing, and how to get it.
+    """Report what this machine can render with, what is missing, and how to install it.
 
-    Exit code 3 where there is nothing to render with. With --bench a short table to send along: rays, a material's eval
-    and sample, direct light and paths, in millions a second.
+    The exit code is 3 if it cannot render at all. With --bench a short table of speeds for bug reports: rays, eval and
+    sample of a material, direct light and paths, in millions per second.
 
     \b
     Examples:

@@ -15,7 +15,7 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=5)
 def explain(
-    model: Annotated[
+    name: Annotated[
         str,
         Argument(
             metavar="[NAME]",
@@ -27,8 +27,8 @@ def explain(
 ) -> None:
     """Print the manual page of a material, or of any member of a family: formula, parameters, limits, source.
 
-    The families are materials, distributions of normals, masking terms, Fresnel kinds, integrators, laws and more: a
-    family's own name lists its members, no name the families.
+    The families are materials, distributions of normals, masking terms, Fresnel kinds, integrators, laws and more. The
+    name of a family lists its members; without a name the families are listed.
 
     \b
     Examples:
@@ -37,21 +37,7 @@ def explain(
       gonio explain fresnel
       gonio explain
     """
-    from ...catalog import notation, operands
-    from ...viewer import families, manual
+    from ...viewer.explanation import explain
 
-    width = shutil.get_terminal_size().columns
-    if not model:
-        page = families.index()
-        print(json.dumps(page.as_dict()) if as_json else page.text(width))
-        return
-    found: list[manual.Page | families.MemberPage | families.FamilyPage]
-    if operands.is_material(model):
-        found = [manual.page(notation.taken_apart(model)[0])]
-    else:
-        found = [*families.pages(model)]
-    if as_json:
-        first, *others = (page.as_dict() for page in found)
-        print(json.dumps({**first, "also": others} if others else first))
-        return
-    print("\n\n".join(page.text(width) for page in found))
+    page = explain(name)
+    print(json.dumps(page.as_dict()) if as_json else page.text(shutil.get_terminal_size().columns))

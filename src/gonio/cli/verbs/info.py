@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument
 
@@ -18,9 +18,9 @@ def info(
     path: Annotated[str, Argument(metavar="FILE", help="Measured values, materials, or a baked folder.")],
     as_json: Json = False,
 ) -> None:
-    """Say what a file holds: a measured material, described ones (.json of a fit, .gltf, .mtlx), or baked tables.
+    """Describe a file: a measured material, materials in a .json of a fit, .gltf or .mtlx, or baked tables.
 
-    Of measurements: dimensions, ranges, what is invalid or negative, the albedo over the angle, energy and reciprocity.
+    Of measurements: dimensions, ranges, invalid and negative values, albedo over the angle, energy and reciprocity.
 
     \b
     Examples:
@@ -29,36 +29,30 @@ def info(
       gonio info gold.json
       gonio info tables
     """
-    from ...catalog import operands
     from ...catalog.operands import Kind
+    from ...viewer.description import described
 
-    kind = operands.kind_of(path, {Kind.TABLE, Kind.DOCUMENT, Kind.TABLES}, "FILE")
-    if kind is Kind.DOCUMENT:
-        from ...catalog import documents, texts
+    kind, about = described(path, "FILE")
+    if as_json:
+        print(json.dumps(about))
+    elif kind is Kind.TABLES:
+        print_tables(about, Path(path), as_json=False)
+    else:
+        _print(kind is Kind.DOCUMENT, about)
 
-        notations = documents.described(path)
-        if as_json:
-            print(json.dumps({"path": path, "materials": notations}))
-            return
-        print(path)
-        table = listing("material", "")
-        for name, notation in notations.items():
-            table.add_row(name, texts.as_text(notation))
-        print_rich(table)
-        return
-    if kind is Kind.TABLE:
-        from ...measure import report
 
-        about = report.describe(path)
-        if as_json:
-            print(json.dumps(about))
-            return
-        print(about["path"])
-        table = listing("", "")
-        for row in report.lines(about):
-            table.add_row(*row)
-        print_rich(table)
-        return
-    from ...render import tables
+def _print(is_document: bool, about: dict[str, Any]) -> None:
+    """Print a table of the materials, or of the properties of measured values."""
+    from ...catalog import texts
+    from ...measure import report
 
-    print_tables(tables.describe(path), Path(path), as_json)
+    rows = (
+        [(name, texts.as_text(notation)) for name, notation in about["materials"].items()]
+        if is_document
+        else report.lines(about)
+    )
+    print(about["path"])
+    table = listing("material" if is_document else "", "")
+    for row in rows:
+        table.add_row(*row)
+    print_rich(table)

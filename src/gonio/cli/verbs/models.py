@@ -14,8 +14,8 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=4)
 def models(
-    quality: Annotated[bool, Option("--quality", help="How well each samples itself, at its defaults.")] = False,
-    library: Annotated[bool, Option("--library", help="The named materials, with the fits there are of each.")] = False,
+    quality: Annotated[bool, Option("--quality", help="Sampling quality of each material, at its defaults.")] = False,
+    library: Annotated[bool, Option("--library", help="The named materials, with the published fits of each.")] = False,
     as_json: Json = False,
 ) -> None:
     """List the materials.
@@ -60,9 +60,9 @@ def _library(as_json: bool) -> None:
     for name, fit in published.items():
         table.add_row(name, fit.model, fit.source, str(len(fit.materials)))
     print_rich(table)
-    table = listing("material", "fits, the first of which is meant where none is named")
-    for name, found in rows.items():
-        left = sorted({fit.split("/")[0] for fit in published if fit not in found})
+    table = listing("material", "fits; the first is the default")
+    for name, fits_of in rows.items():
+        left = sorted({fit.split("/")[0] for fit in published if fit not in fits_of})
         table.add_row(name, f"all but those of {', '.join(left)}" if left else "all")
     print_rich(table)
 
@@ -70,12 +70,12 @@ def _library(as_json: bool) -> None:
 def _qualities(as_json: bool) -> None:
     from ...verify import quality
 
-    found = quality.of_models()
+    qualities = quality.of_models()
     if as_json:
-        print(json.dumps({name: one and {"of": title, **one.as_dict()} for name, (title, one) in found.items()}))
+        print(json.dumps({name: one and {"of": title, **one.as_dict()} for name, (title, one) in qualities.items()}))
         return
     table = listing("material", "judged as", "fails", "variance of the weight", "against cosine", "of the ideal")
-    for name, (title, one) in found.items():
+    for name, (title, one) in qualities.items():
         texts = one.texts if one else ("no light",) * 4
         words = (" fail", "variance ", " cosine sampling", " of the ideal")
         table.add_row(name, title, *(text.replace(word, "") or "-" for text, word in zip(texts, words, strict=True)))

@@ -9,10 +9,10 @@ from pathlib import Path
 from string import Template
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Argument
 
 from ...errors import InputError, did_you_mean
-from ..options import Json
+from ..options import Json, output_option
 from .base import MATERIALS, verb
 
 TEMPLATES = Path(__file__).parents[1] / "templates"  # a folder for each kind, with $file and $title to fill in
@@ -24,12 +24,12 @@ def _kinds() -> list[str]:
 
 @verb(MATERIALS, place=9)
 def new(
-    kind: Annotated[str, Argument(metavar="material", help="What to begin.", autocompletion=_kinds)],
+    kind: Annotated[str, Argument(metavar="material", help="What to create.", autocompletion=_kinds)],
     name: Annotated[str, Argument(metavar="NAME", help="Its name, such as velvet or crushed-velvet.")],
-    output: Annotated[Path, Option("-o", "--output", metavar="DIR", help="Folder to write to.")] = Path(),
+    output: Annotated[Path, output_option("DIR", "Folder of the two files.")] = Path(),
     as_json: Json = False,
 ) -> None:
-    """Begin a material of your own: NAME.py, which works, and test_NAME.py, which passes.
+    """Create a material of your own: NAME.py, which works, and test_NAME.py, which passes.
 
     \b
     Examples:

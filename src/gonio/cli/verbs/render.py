@@ -6,13 +6,13 @@ import json
 import os
 import shlex
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from ..options import Checkpoint, Crew, Json, Material, Rendering, SceneFile
+from ..options import Checkpoint, Executor, Json, Material, Rendering, SceneFile, Timeout, output_option
 from ..output import Bar, print_warnings
 from ..signals import exit_code, words
 from .base import PICTURES, verb
@@ -23,55 +23,60 @@ if TYPE_CHECKING:
     from ...render.request import Request
 
 
+@dataclass(frozen=True)
+class Until:
+    """When a render stops, and where it is stored meanwhile."""
+
+    timeout: Timeout = None
+    until_error: Annotated[
+        float | None,
+        Option(metavar="E", help="Stop when the estimated relMSE is below E, or after --spp; 65536 by default."),
+    ] = None
+    checkpoint: Checkpoint = None
+
+
 @verb(PICTURES, place=1)
 def render(
     scene: SceneFile,
     *,
-    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".exr, .hdr, .png or .npz.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "The picture: .exr, .hdr, .png or .npz.")] = None,
     made: Material,
     how: Rendering,
-    timeout: Annotated[
-        float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
-    ] = None,
-    until_error: Annotated[
-        float | None,
-        Option(metavar="E", help="Stop when relMSE is estimated to be below E; --spp is then the most, else 65536."),
-    ] = None,
-    checkpoint: Checkpoint = None,
-    crew: Crew,
+    until: Until,
+    executor: Executor,
     as_json: Json = False,
 ) -> None:
     """Render a scene, or a material on a ball, to a picture.
 
-    Without -o the picture gets the name that the scene gives it, in the current folder.
-    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once. So do
-    SIGTERM and SIGHUP, which batch systems and closing terminals send. A render of over a minute has a checkpoint
-    beside the picture, from which `gonio resume`, or the same command again, goes on.
+    Without -o the picture is written to the current folder under the name that the scene gives it.
+    Ctrl-C ends after the current pass (about half a second) and writes the picture so far; a second one ends at once.
+    SIGTERM and SIGHUP do the same. A render of over a minute has a checkpoint next to the picture, from which `gonio
+    resume`, or the same command again, continues.
 
     \b
     Examples:
       gonio render examples/phong
       gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render examples/phong -o phong.png --exposure auto
-      gonio render ward.py:Ward -p alpha=.1,.4 -o ward.png
-      gonio render kulla-conty -p base=conductor -p base.alpha=.35 -o rough.png
+      gonio render ward.py:Ward -p alpha=0.1,0.4 -o ward.png
+      gonio render kulla-conty -p base=conductor -p base.alpha=0.35 -o rough.png
       gonio render gold.json -o fitted.png
-      gonio render examples/phong --until-error .001 -o quiet.exr
+      gonio render examples/phong --until-error 0.001 -o quiet.exr
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
     from ...catalog import notation
 
     named = made.instead_of(scene, how.allow_code)
-    request = how.request(scene, output, timeout, named and notation.build(named), checkpoint)
-    request = replace(request, until_error=until_error)
-    carry_out(request, Path(scene).name, as_json, crew)
+    request = how.request(scene, output, until.timeout, named and notation.build(named), until.checkpoint)
+    request = replace(request, until_error=until.until_error)
+    carry_out(request, Path(scene).name, as_json, executor)
 
 
-def carry_out(request: Request, title: str, as_json: bool, crew: Crew) -> None:
-    """Render with a bar, and say what came of it."""
+def carry_out(request: Request, title: str, as_json: bool, executor: Executor) -> None:
+    """Render with a progress bar, and print the result."""
     from ...render.finish import render_to_file
 
-    with Bar(title) as bar, crew.working():
+    with Bar(title) as bar, executor.running():
         result = render_to_file(request, report=bar.update, notice=bar.stopping, tell=bar.tell)
     try:
         if as_json:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Argument
 
-from ..options import Code, Crew, Json
+from ..options import Code, Executor, Json, Spp, Threads, Timeout, output_option
+from ..output import print_warnings
 from .base import PICTURES, verb
 from .render import carry_out
 
@@ -16,22 +17,19 @@ from .render import carry_out
 def resume(
     checkpoint: Annotated[Path, Argument(metavar="FILE", help="A checkpoint of `gonio render`.")],
     *,
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="Another picture than was asked for.")
-    ] = None,
-    spp: Annotated[int | None, Option(metavar="N", help="Samples per pixel in all.")] = None,
-    timeout: Annotated[
-        float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
-    ] = None,
-    threads: Annotated[int | None, Option(metavar="N", help="CPU cores to use; all if not given.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "The picture; the render's own by default.")] = None,
+    spp: Spp = None,
+    timeout: Timeout = None,
+    threads: Threads = None,
     allow_code: Code = False,
-    crew: Crew,
+    executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Go on with a render that was stopped, or that shall have more samples, from its checkpoint.
+    """Continue a render from its checkpoint, after it was stopped or to add samples.
 
-    The picture is that of a render which was never stopped, to the bit. A checkpoint whose scene, files, settings,
-    device or version have changed is refused.
+    The picture is bit-identical to that of an uninterrupted render. --spp counts the samples in total. A checkpoint is
+    rejected if its scene, files, settings, device or version have changed. Without -o the picture is written where the
+    checkpoint says if that is in the checkpoint's folder, else next to the checkpoint.
 
     \b
     Examples:
@@ -43,4 +41,6 @@ def resume(
 
     change = Request(checkpoint, output=output, spp=spp, timeout=timeout, threads=threads)
     change.check()
-    carry_out(checkpoints.asked_again(checkpoint, change, allow_code), checkpoint.name, as_json, crew)
+    request, notice = checkpoints.asked_again(checkpoint, change, allow_code, writes=True)
+    print_warnings((notice,) if notice else ())
+    carry_out(request, checkpoint.name, as_json, executor)

@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Argument
 
 from ...errors import InputError, did_you_mean
+from ..options import output_option
 from .base import SUPPORT, verb
 
 KINDS = ("scene", "report")
@@ -17,12 +18,10 @@ KINDS = ("scene", "report")
 
 @verb(SUPPORT, place=1)
 def schema(
-    kind: Annotated[str, Argument(metavar="scene|report", help="Of scene files, or of reports.")] = "scene",
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="Where to write; else it is printed.")
-    ] = None,
+    kind: Annotated[str, Argument(metavar="scene|report", help="Schema of scene files, or of reports.")] = "scene",
+    output: Annotated[Path | None, output_option("FILE", "File to write; printed by default.")] = None,
 ) -> None:
-    """Print the JSON Schema of scene files or reports, by which editors complete and programs check them.
+    """Print the JSON Schema of scene files or reports, which editors use for completion and programs for validation.
 
     \b
     Examples:
@@ -31,6 +30,10 @@ def schema(
     """
     if kind not in KINDS:
         raise InputError(f"no schema of '{kind}'", "", did_you_mean(kind, KINDS))
+    if output is not None:
+        from ... import files
+
+        files.check_file(output)
     if kind == "report":
         from ...verify.ci import schema as report
 
@@ -42,7 +45,5 @@ def schema(
     if output is None:
         sys.stdout.write(text)
         return
-    from ... import files
-
     files.write_whole(output, text.encode())
     print(output)

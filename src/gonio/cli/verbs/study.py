@@ -9,7 +9,7 @@ from typing import Annotated
 
 from typer import Option
 
-from ..options import Crew, Json, Material, Rendering, SceneFile
+from ..options import Executor, Json, Material, Rendering, SceneFile, output_option
 from ..output import Bar, print_warnings
 from .base import PICTURES, verb
 
@@ -20,30 +20,28 @@ def study(
     *,
     vary: Annotated[
         list[str],
-        Option(metavar="PATH=V1,V2", help="A value and what it shall be, or P1,P2=(V,W),(V,W); repeatable."),
+        Option(metavar="NAME=V1,V2|A..B", help="A parameter or path and its values; repeatable."),
     ],
-    output: Annotated[Path, Option("-o", "--output", metavar="FILE", help="The sheet: .png, .pdf or .svg.")] = Path(
-        "study.png"
-    ),
+    output: Annotated[Path, output_option("FILE", "The sheet: .png, .pdf or .svg.")] = Path("study.png"),
     made: Material,
     how: Rendering,
-    crew: Crew,
+    executor: Executor,
     title: Annotated[str, Option(metavar="TEXT", help="Heading of the sheet.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Compare parameters: render a scene with each value and lay the pictures on one labelled sheet.
+    """Compare parameters: render a scene with each value and arrange the pictures on one labeled sheet.
 
     One --vary gives a row, two a grid (the first goes down, the second across), more give a grid each. A path leads
     into the scene; of a material it names a parameter, such as p or base.alpha. Several paths of one --vary change
-    together, such as values whose sum stays: kd,ks=(.2,.8),(.5,.5).
+    together, for instance with a constant sum: kd,ks=(0.2,0.8),(0.5,0.5).
 
     \b
     Examples:
       gonio study examples/phong --vary shapes.1.material.p=4,16,64
-      gonio study phong --vary p=4,16,64 --vary "kd,ks=(.2,.8),(.5,.5),(.8,.2)"
-      gonio study kulla-conty -p base=conductor --vary base.alpha=.1,.3,.5 --vary base.preset=Au,Cu
+      gonio study phong --vary p=4,16,64 --vary "kd,ks=(0.2,0.8),(0.5,0.5),(0.8,0.2)"
+      gonio study kulla-conty -p base=conductor --vary base.alpha=0.1,0.3,0.5 --vary base.preset=Au,Cu
       gonio study examples/phong-kd-p -o kd-p.png --size 200x200 \\
-        --vary "shapes.*.material.kd=[.1,.1,.1],[.5,.5,.5]" \\
+        --vary "shapes.*.material.kd=[0.1,0.1,0.1],[0.5,0.5,0.5]" \\
         --vary "shapes.*.material.p=4,16,64"
     """
     from ...viewer import contact_sheet
@@ -52,7 +50,7 @@ def study(
     request = replace(how.request(scene), scene=Path(named[0].name if named else scene))
 
     variations = [contact_sheet.parse_variation(text) for text in vary]
-    with Bar(request.scene.name) as bar, crew.working():
+    with Bar(request.scene.name) as bar, executor.running():
         sheet = contact_sheet.render_sheet(request, variations, output, title, named, report=bar.step, tell=bar.tell)
     if as_json:
         print(json.dumps(sheet.as_dict()))

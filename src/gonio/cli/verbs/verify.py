@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,32 +13,56 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from .. import completion
-from ..options import Crew, Json, Parameters
+from ..options import Executor, Json, Material, Seed, output_option
 from ..output import Bar
 from .base import MATERIALS, verb
 
 if TYPE_CHECKING:
+    from ...verify.isolation.child import Task
     from ...verify.report import Report
 
 
 @dataclass(frozen=True)
 class Files:
-    """Files for people, and for the machines of continuous integration."""
+    """Reports for people, and for continuous integration."""
 
-    report: Annotated[
-        Path | None, Option("--report", metavar="DIR", help="Write report.html and report.json there.")
-    ] = None
-    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write JUnit's XML.")] = None
-    sarif: Annotated[Path | None, Option("--sarif", metavar="FILE", help="Write SARIF 2.1.0.")] = None
+    output: Annotated[Path | None, output_option("DIR", "Write report.html and report.json there.")] = None
+    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
+    sarif: Annotated[Path | None, Option("--sarif", metavar="FILE", help="Write the failures as SARIF 2.1.0.")] = None
     github: Annotated[
-        bool, Option("--github", help="Print annotations for GitHub Actions; there they come by themselves.")
+        bool, Option("--github", help="Print annotations for GitHub Actions; the default on its runners.")
     ] = False
     baseline: Annotated[
-        Path | None, Option("--baseline", metavar="FILE", help="Fail only on what is not in it; a report.json will do.")
+        Path | None, Option("--baseline", metavar="FILE", help="Fail only on failures not listed there.")
     ] = None
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="Write what fails; it is known from then on.")
+        Path | None, Option("--write-baseline", metavar="FILE", help="List the failures there, as known from then on.")
     ] = None
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is judged, and how thoroughly."""
+
+    vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card for each value; a range has five.")] = ""
+    quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False
+    deep: Annotated[bool, Option("--deep", help="More samples, directions and roughnesses.")] = False
+    seed: Seed = None
+    law: Annotated[
+        list[str] | None,
+        Option("--law", metavar="NAME", help="Only this law; repeatable.", autocompletion=completion.laws),
+    ] = None
+    timeout: Annotated[float | None, Option(metavar="S", help="Stop a law after S seconds; 300 by default.")] = None
+    memory: Annotated[
+        float | None, Option(metavar="GB", help="Memory limit of a BSDF; half of the machine's by default.")
+    ] = None
+
+    def name(self) -> str:
+        from ...errors import InputError
+
+        if self.quick and self.deep:
+            raise InputError("quick and deep together", "--quick", "give one of them")
+        return "quick" if self.quick else "deep" if self.deep else "default"
 
 
 @verb(MATERIALS, place=2)
@@ -52,35 +77,23 @@ def verify(
     ],
     *,
     to: Files,
-    param: Parameters = None,
-    sweep: Annotated[
-        str, Option(metavar="NAME=A..B", help="A card for each of five values, or for NAME=V1,V2,...")
-    ] = "",
-    quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False,
-    deep: Annotated[bool, Option("--deep", help="More samples, more directions, more widths.")] = False,
-    seed: Annotated[int, Option(metavar="N", help="Of all random numbers.")] = 1,
-    law: Annotated[
-        list[str] | None,
-        Option("--law", metavar="NAME", help="Only this law; repeatable.", autocompletion=completion.laws),
-    ] = None,
+    made: Material,
+    how: Effort,
     at: Annotated[
-        str, Option(metavar="O/I", help="Only print both ways of one pair, theta,phi/theta,phi in degrees.")
+        str, Option(metavar="O/I", help="Only print both orders of one pair, theta,phi/theta,phi in degrees.")
     ] = "",
-    jobs: Annotated[int, Option("--jobs", "-j", metavar="N", help="Targets and settings at a time.")] = 1,
-    limit: Annotated[float | None, Option(metavar="SECONDS", help="Longest that a law may take; 300.")] = None,
-    memory: Annotated[float | None, Option(metavar="GB", help="Most that a BSDF may take; half of all.")] = None,
-    crew: Crew,
+    executor: Executor,
     as_json: Json = False,
 ) -> None:
     """Prove BSDFs: energy, reciprocity, sampling, gradients, precision.
 
-    Each is judged in a process of its own, which it may crash or keep for ever. Exit code 1 where a law is broken that
-    the material does not declare to break.
+    Each target is judged in a process of its own, which it may crash or block. The exit code is 1 if a target breaks a
+    law and does not declare that violation.
 
     \b
     Examples:
-      gonio verify conductor --param alpha=0.3 --report out
-      gonio verify dielectric --sweep alpha=0.01..1 --quick --jobs 4
+      gonio verify conductor --param alpha=0.3 -o report
+      gonio verify dielectric --vary alpha=0.01..1 --quick --workers 4
       gonio verify mitsuba:roughplastic
       gonio verify glass.py:Glass --law reciprocity
       gonio verify glass.py:Glass cloth.py:Cloth --junit laws.xml --sarif laws.sarif
@@ -88,65 +101,78 @@ def verify(
       gonio verify glass.py:Glass --baseline known.json
     """
     if at:
-        _show_pairs(target, param or [], sweep, at, as_json)
+        _show_pairs(target, made.settings(), how.vary, at, as_json)
         return
     # Nothing heavy before the first process has started: it takes as long as all else together.
-    from ...errors import InputError
     from ...verify.ci.outputs import Outputs
     from ...verify.isolation import child
 
-    if quick and deep:
-        raise InputError("quick and deep together", "--quick", "give one of them")
-    wanted = Outputs(**{name: value for name, value in vars(to).items() if name != "github"})
-    known = wanted.check()
-    items = [child.Item(one, tuple(param or ()), sweep) for one in target]
-    task = child.Task(items, "quick" if quick else "deep" if deep else "default", seed, law)
+    effort = how.name()
+    outputs = Outputs(to.output, to.junit, to.sarif, to.baseline, to.write_baseline)
+    known = outputs.check()
+    items = [child.Item(one, tuple(made.settings()), how.vary) for one in target]
+    task = child.Task(items, effort, 1 if how.seed is None else how.seed, how.law)
+    report = _judge(task, ", ".join(target), how, executor)
+    outputs.write(report, known)
+    _annotate(report, to.github, as_json)
+    if as_json:
+        print(json.dumps(report.as_dict()))
+    else:
+        from rich.console import Console
+
+        report.show(Console(emoji=False))
+        if to.output is not None:
+            print(to.output / "report.html")
+    if not report.passed:
+        raise Exit(report.exit_code)
+
+
+def _judge(task: Task, title: str, how: Effort, executor: Executor) -> Report:
+    """The report of a task, by the processes of `executor`, with a progress bar."""
+    from ...verify.isolation import child
+
+    with _progress(title) as progress:
+        # one target has nothing to resume, nor has a quick look: its cards are shared by processes without a cluster
+        if executor.cluster is None and (len(task.items) == 1 or task.effort == "quick"):
+            workers = 1 if executor.workers is None else executor.workers
+            return child.trial(task, jobs=workers, limit=how.timeout, memory=how.memory, progress=progress)
+        from ...verify import trials
+
+        with executor.running():
+            return trials.trial(task, limit=how.timeout, memory=how.memory, progress=progress)
+
+
+@contextlib.contextmanager
+def _progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar that is made when the first step is done: it loads Rich."""
     with contextlib.ExitStack() as stack:
         bars: list[Bar] = []
 
         def progress(done: int, total: int, state: str) -> None:
             if sys.stderr.isatty():
                 if not bars:
-                    bars.append(stack.enter_context(Bar(", ".join(target))))
+                    bars.append(stack.enter_context(Bar(title)))
                 bars[0].step(done, total, state)
 
-        if crew.workers is None and crew.cluster is None and len(items) == 1:
-            found = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
-        else:
-            from ...verify import trials
-
-            with crew.working():
-                found = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
-    wanted.write(found, known)
-    _annotate(found, to.github, as_json)
-    if as_json:
-        print(json.dumps(found.as_dict()))
-    else:
-        from rich.console import Console
-
-        found.show(Console(emoji=False))
-        if to.report is not None:
-            print(to.report / "report.html")
-    if not found.passed:
-        raise Exit(found.exit_code)
+        yield progress
 
 
-def _annotate(found: Report, wanted: bool, as_json: bool) -> None:
-    """Print annotations where they are wanted, or where a runner reads them: standard output and error alike."""
+def _annotate(report: Report, wanted: bool, as_json: bool) -> None:
+    """Print annotations if asked to, or if a runner reads them: standard output and error alike."""
     from ...verify.ci import github
 
     if wanted or github.wanted():
-        (sys.stderr if as_json else sys.stdout).write(github.text(found))
+        (sys.stderr if as_json else sys.stdout).write(github.text(report))
 
 
-def _show_pairs(target: list[str], param: list[str], sweep: str, at: str, as_json: bool) -> None:
-    """What each target says of one pair of directions, both ways round."""
+def _show_pairs(target: Sequence[str], settings: Sequence[str], vary: str, at: str, as_json: bool) -> None:
+    """Print what each target returns for one pair of directions, in both orders."""
     from rich.console import Console
 
     from ...verify import targets, terminal
     from ...verify.directions import parse
 
-    for subject in [subject for one in target for subject in targets.resolve(one, param, sweep)]:
+    for subject in [subject for one in target for subject in targets.resolve(one, settings, vary)]:
         if as_json:
             print(json.dumps(terminal.pair(subject, *parse(at))))
         else:

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Code, Device, Outside, Parameters
+from ..options import Code, Device, Json, Material, Outside
 from ..output import print_warnings
 from .base import PICTURES, verb
+
+if TYPE_CHECKING:
+    from ...viewer.stage import Stage
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where the page is served."""
+
+    host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1"
+    port: Annotated[int, Option(metavar="N", help="Port to listen at; 0 takes any free one.")] = 0
+    browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True
 
 
 @verb(PICTURES, place=4)
@@ -20,57 +35,66 @@ def view(
         list[str] | None,
         Argument(
             metavar="SCENE|MODEL",
-            help="A lab scene, or materials; none: Kulla-Conty and plain.",
+            help="A lab scene, or materials; by default metals with and without Kulla-Conty.",
             autocompletion=completion.materials,
         ),
     ] = None,
-    param: Parameters = None,
-    export: Annotated[
-        Path | None, Option("--export", metavar="FILE", help="Write the page as one .html and end.")
+    *,
+    made: Material,
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", "--export", metavar="FILE", help="Write the page as one .html and exit."),
     ] = None,
-    host: Annotated[str, Option(metavar="ADDRESS", help="Where to listen.")] = "127.0.0.1",
-    port: Annotated[int, Option(metavar="N", help="0 takes any that is free.")] = 0,
-    browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True,
-    device: Device = "auto",
+    address: Address,
+    device: Device = "cpu",
     allow_outside: Outside = False,
     allow_code: Code = False,
+    as_json: Json = False,
 ) -> None:
-    """Show materials live on shading balls, in a browser, beside a path-traced reference.
+    """Show materials live on shading balls, in a browser, next to a path-traced reference.
 
-    FILE.py:CLASS is watched: save the file, and the page shows the new picture, or what is wrong with it. With --export
-    the page is one file that needs no server and no network.
+    FILE.py:CLASS is watched: when the file is saved, the page shows the new picture, or the error in it. With -o the
+    page is one file that needs no server and no network.
 
     \b
     Examples:
       gonio view
-      gonio view conductor lambert --param alpha=.3
+      gonio view conductor lambert --param alpha=0.3
       gonio view "conductor(preset=Au)" "conductor(preset=Cu)"
       gonio view ward.py:Ward
       gonio view examples/shading-balls
-      gonio view --export page.html
+      gonio view -o page.html
     """
-    from ...catalog import operands
-    from ...viewer import page, stage
+    stage = _stage(target or (), made, allow_outside, allow_code)
+    print_warnings(stage.notes)
+    if output is not None:
+        from ...viewer import page
 
-    accepted = {*operands.MATERIALS, *([operands.Kind.SCENE] if len(target or ()) == 1 else [])}
-    kinds = [operands.kind_of(one, accepted, "MODEL") for one in target or ()]
-    if target and kinds == [operands.Kind.SCENE]:
-        from ...viewer import lab_scene
-
-        if param:
-            raise InputError("a scene takes no parameters here", "--param", "change the scene, or name a model")
-        shown = lab_scene.stage(Path(target[0]), allow_outside, allow_code)
-    elif target:
-        shown = stage.of_targets(target, param or [])
-    else:
-        if param:
-            raise InputError("parameters for no model", "--param", "name one: gonio view conductor --param alpha=.3")
-        shown = stage.homework()
-    print_warnings(shown.notes)
-    if export is not None:
-        path = page.export(shown, export)
-        print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
+        path = page.export(stage, output)
+        size = path.stat().st_size
+        print(json.dumps({"output": str(path), "size": size}) if as_json else f"{path}  {size / 1e6:.2f} MB")
         return
     from ...viewer import server
 
-    server.serve(shown, host, port, browser, device)
+    server.serve(stage, address.host, address.port, address.browser, device, as_json)
+
+
+def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_code: bool) -> Stage:
+    """The balls of a scene, of materials, or of the homework if nothing is named."""
+    from ...catalog import operands
+    from ...viewer import stage
+
+    accepted = {*operands.MATERIALS, *([operands.Kind.SCENE] if len(target) == 1 else [])}
+    kinds = [operands.kind_of(one, accepted, "MODEL") for one in target]
+    settings = made.settings()
+    if kinds == [operands.Kind.SCENE]:
+        from ...viewer import lab_scene
+
+        if settings:
+            raise InputError("a scene takes no parameters here", "--param", "change the scene, or name a model")
+        return lab_scene.stage(Path(target[0]), allow_outside, allow_code)
+    if target:
+        return stage.of_targets(target, settings)
+    if settings:
+        raise InputError("parameters for no model", "--param", "name one: gonio view conductor --param alpha=0.3")
+    return stage.homework()

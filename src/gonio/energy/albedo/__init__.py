@@ -1,4 +1,5 @@
-"""Directional albedo: of any material, by quadrature for microfacets, by sampling, and by walking among the facets."""
+"""Directional albedo: by quadrature for microfacets, by sampling for any material, and by random walks on the
+facets."""
 
 from .directional import Albedo, albedo, direction
 

@@ -1,9 +1,9 @@
-"""Integrals over the sphere of wi, for many wo at once, by cells that divide where the integrand asks for it.
+"""Integrals over the sphere of wi, for many wo at once, by adaptive cubature.
 
-A cell is a rectangle in (theta, phi), theta counted from the nearer pole, so no cell crosses the horizon. Cells are
-first divided where the model's own samples crowd and around the mirror direction, so that a lobe of a thousandth of a
-radian is not missed; then wherever a cell's Gauss-Legendre value and the sum over its quarters differ. The sum of
-those differences is the error that is stated: it is that of the coarser of the two, so it errs on the large side.
+A cell is a rectangle in (theta, phi), theta measured from the nearer pole, so no cell crosses the horizon. Cells are
+first divided where the model's samples are dense and around the mirror direction, so that a lobe of a thousandth of a
+radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters. The sum of these
+differences is the reported error; it is that of the coarser value and hence conservative.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 from ...ops import Direction, Scalar, backend
 from .cells import Nodes, Seen, product, rim, step_aside
 
-ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
+ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
-FIRST = (8, 16)  # cells a side of the surface, in theta and phi
-DEPTH = 21  # halvings of an eighth of a right angle, 1e-7: a width of 2e-4 is that narrow across at 89.9 degrees
+FIRST = (8, 16)  # cells per side of the surface, in theta and phi
+DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2e-4 is that narrow
 SEEDED = 17  # halvings around samples
-SAMPLES = 1024  # of each wo
-CROWD = 32  # of them in a cell that is divided before anything is known of the integrand
-AROUND = 3 * (CROWD + 4)  # points that stand for the mirror direction, wo and -wo
-UNSEEN = 0.01  # of the share of an integral that samples tell of: what is less was not seen at all
-MAX_CELLS = 600_000  # cells evaluated in one round, some 10 M directions
+SAMPLES = 1024  # per wo
+CROWD = 32  # samples in a cell for which it is divided before the integrand is evaluated
+AROUND = 3 * (CROWD + 4)  # points that mark the mirror direction, wo and -wo
+UNSEEN = 0.01  # below this fraction of the integral implied by the samples, a cell has missed its lobe
+MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
 _GAUSS, _FEWER, _RIM = product(ORDER), product(ORDER - 1), rim(1e-3)
 
 Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
-# (wo, u) of rows (N, 3) -> a Sample of arrays: where cells are divided first
+# (wo, u) of rows (N, 3) -> a Sample of arrays: determines where cells are divided first
 Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
 
 def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integrand:
-    """An integrand of a function of rows, (N, 3) and (N, 3) -> (N, channels): some ten times slower."""
+    """An integrand from a function of rows, (N, 3) and (N, 3) -> (N, channels); about ten times slower."""
     types = backend.types("float64")
 
     def integrand(wo: Direction, wi: Direction) -> list[Scalar]:
@@ -66,7 +66,7 @@ class _Cells(NamedTuple):
         return _Cells(*[part[which] for part in self])
 
     def quarters(self) -> _Cells:
-        """Four cells each, those of one cell next to each other."""
+        """The four quarters of each cell, adjacent in the result."""
         half = 0.5 * self.size
         corners = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
         low = (self.low[:, None, :] + half[:, None, :] * corners).reshape(-1, 2)
@@ -78,25 +78,25 @@ def integrate(
 ) -> Integral:
     """int integrand(wo, wi) dwi for each row of wo (N, 3).
 
-    sample     the model's own sampling, which shows where its lobes are
-    integrand  (wo, wi) -> a vector of one entry a channel, of Dr.Jit vectors of 64 bits; it runs inside a kernel
-    tolerance  absolute, of each integral; where cells run out the stated error is larger
+    sample     the model's sampling, which shows where its lobes are
+    integrand  (wo, wi) -> a vector with one entry per channel, of float64 Dr.Jit vectors; it runs inside a kernel
+    tolerance  absolute, per integral; if cells run out, the reported error is larger
     """
     cells, points = _seeded(sample, wo, seed)
     coarse = _values(integrand, wo, cells, _GAUSS).integral
     channels = coarse.shape[1]
     value, error = np.zeros((len(wo), channels)), np.zeros((len(wo), channels))
-    allowed = tolerance / 400.0  # some hundreds of cells carry an integral's error
+    allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
         fine_cells = cells.quarters()
         inner, other, rim = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
         fine = inner.integral.reshape(-1, 4, channels)
         difference = np.abs(coarse - fine.sum(1))
-        # a step that many cells share, such as the rim of a cone about the normal, may fool one rule by chance in all
+        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
-        difference += 0.02 * step_aside(inner, rim).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
+        difference += 0.02 * step_aside(inner, rim).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
         divide = difference.max(1) > allowed
-        # the foot of a narrow lobe in a cell that is wider than the lobe: samples lie there, and no node sees anything
+        # the tail of a narrow lobe in a cell wider than the lobe: it contains samples, but every node is 0
         level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
         share = np.bincount(points.cell, minlength=len(divide)) / SAMPLES
         divide |= fine.sum(1).max(1) < UNSEEN * share * level[cells.row]
@@ -114,13 +114,13 @@ def integrate(
 
 
 class _Points(NamedTuple):
-    """Samples in cells: the number of the cell, theta and phi."""
+    """Samples inside cells: the number of the cell, theta and phi."""
 
     cell: np.ndarray
     at: np.ndarray
 
     def within(self, cells: _Cells, divided: np.ndarray) -> _Points:
-        """Those in divided cells, by the numbers of these cells' quarters."""
+        """The points in divided cells, numbered by these cells' quarters."""
         inside = divided[self.cell]
         cell, at = self.cell[inside], self.at[inside]
         far = at >= cells.low[cell] + 0.5 * cells.size[cell]
@@ -128,8 +128,8 @@ class _Points(NamedTuple):
 
 
 def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
-    """A few cells a side, divided around what the model samples, around the mirror direction and around wo itself; and
-    the samples in them."""
+    """The initial cells, divided around the model's samples, the mirror direction and wo, and the samples inside
+    them."""
     n_theta, n_phi = FIRST
     step = np.array([0.5 * np.pi / n_theta, 2.0 * np.pi / n_phi])
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * step
@@ -147,9 +147,9 @@ def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points
     phi = np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)
     below = (likely[:, 2] < 0.0).astype(int)
     angles = np.stack([theta, phi], -1)
-    own = len(angles) - AROUND * len(wo)  # the rest are directions that no sample may have
+    own = len(angles) - AROUND * len(wo)  # the others are marker directions
     homes, first = np.full(own, -1), 0
-    # one integer says in which cell a point lies, at each level: row, side, and the cell's two coordinates
+    # one integer identifies a point's cell at each level: row, side, and the cell's two coordinates
     accepted: list[_Cells] = []
     for level in range(SEEDED):
         scale = 2**level

@@ -1,14 +1,14 @@
-"""Directional albedo: the share of the power arriving along one direction that a material gives back.
+"""Directional albedo: the fraction of the power arriving along one direction that a material scatters back.
 
     albedo(wo) = int f*(wo, wi) |cos theta_i| dwi        over both sides of the surface
 
 f* is the BSDF without the radiance factor (eta_o/eta_i)^2 (mode "importance"), so that reflected and transmitted power
-add up, and 1 is a surface that keeps nothing and adds nothing.
+add up; 1 means no absorption.
 
-Three ways, by falling trust:
-    closed form  what the material itself knows (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixes of them
-    quadrature   microfacets by `quadrature`; any other `eval` by `cubature`, which starts where `sample` goes
-    sampling     `sample`'s weights over shifted lattices, with the standard error of the shifts
+Three methods, in order of accuracy:
+    closed form  known to the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
+    quadrature   microfacets by `quadrature`; any other `eval` by `cubature`, guided by `sample`
+    sampling     mean weight of `sample` over shifted lattices, with the standard error over the shifts
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ METHODS = ("auto", "closed-form", "quadrature", "sampling")
 
 
 class Albedo(NamedTuple):
-    """value (N, channels); error, an estimate of its size (N, channels); method, how it was found."""
+    """value (N, channels); error, its estimated error (N, channels); method, the name of the method."""
 
     value: NDArray[np.float64]
     error: NDArray[np.float64]
@@ -61,11 +61,11 @@ def albedo(
 
     mu       cosine of wo, (N,) or a number in [-1, 1]; below 0 wo lies inside, for materials that transmit
     phi      azimuth of wo, radians
-    method   "auto" takes the first of "closed-form", "quadrature" and "sampling" that there is for the material
-    samples  for "sampling", in all, a direction
-    Returns value, error and method. The error of a quadrature is its difference to a finer or coarser one, that of
+    method   "auto" selects the first of "closed-form", "quadrature" and "sampling" that supports the material
+    samples  for "sampling", total per direction
+    Returns value, error and method. The error of a quadrature is its difference from a finer or coarser one, that of
     sampling one standard error.
-    Raises InputError where the method does not exist for the material, or a parameter has one value a ray.
+    Raises InputError if the method does not support the material, or a parameter has one value per ray.
     """
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "albedo")
@@ -101,23 +101,23 @@ def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
 
 
 def check_uniform(model: BSDF) -> None:
-    """Raise InputError where a parameter has one value a ray."""
+    """Raise InputError if a parameter has one value per ray."""
     for leaf in tree.leaves(model):
         if leaf.parameter.numeric and not backend.is_drjit(leaf.value) and leaf.parameter.rows(leaf.value) != 1:
             where = f"albedo: {type(leaf.owner).__name__}.{leaf.parameter.name}"
-            raise InputError("one value a ray given, one value expected", where)
+            raise InputError("one value per ray given, a single value expected", where)
 
 
-# --------------------------------------------------------------------------- what is known
+# --------------------------------------------------------------------------- closed forms and quadrature
 
-NODES, JUDGE = 64, 96  # of quadratures that a material makes itself
+NODES, JUDGE = 64, 96  # of quadratures that a material performs itself, and of those that estimate their error
 
 
 def _known(
     model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
 ) -> NDArray[np.float64] | None:
-    """What the material knows of its albedo, or what the quadrature of its microsurface gives; nodes None asks for
-    closed forms only."""
+    """The albedo known to the material itself, or by quadrature over its microsurface; nodes None requests closed forms
+    only."""
 
     def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
         return _known(material, mu, phi, nodes)
@@ -129,7 +129,7 @@ def _known(
 
 
 def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> NDArray[np.float64] | None:
-    """By quadrature over the facets' normals."""
+    """The albedo by quadrature over the facets' normals."""
     surface = model.microsurface
     if surface is None or min(widths(surface.alpha)) < SMOOTH:
         return None
@@ -153,7 +153,7 @@ def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> N
         x,
         np.where(mu >= 0.0, index, 1.0 / index),
         None if x == y else y,
-        # an o below the surface sees the facets turned about: the azimuth of -o
+        # for o below the surface the facets are rotated by 180 degrees: the azimuth of -o
         np.where(mu < 0.0, phi + np.pi, phi) - turn,
         nodes=quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES,
     )
@@ -188,7 +188,7 @@ SHIFTS = 16
 def _by_sampling(model: BSDF, mu: np.ndarray, phi: np.ndarray, samples: int, seed: int) -> Albedo:
     """Mean weight over SHIFTS randomly shifted lattices."""
     if samples < SHIFTS:
-        raise InputError(f"{samples} samples asked for", "albedo: samples", f"give {SHIFTS} or more")
+        raise InputError(f"{samples} samples given", "albedo: samples", f"give {SHIFTS} or more")
     count = samples // SHIFTS
     rng = np.random.default_rng(seed)
     u = (r_sequence(count, 3)[None] + rng.random((SHIFTS, 1, 3))).reshape(-1, 3) % 1.0

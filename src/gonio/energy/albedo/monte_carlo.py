@@ -1,9 +1,9 @@
-"""E(mu, alpha) by Monte Carlo: what students write, to be compared with the quadrature.
+"""E(mu, alpha) by Monte Carlo, as in student implementations, for comparison with the quadrature.
 
-cosine   wi = cosine-weighted; the weight is f pi. Unbiased, yet a narrow lobe is hardly ever hit: below roughness
-         0.3 most texels of 1024 samples come out far too small
-ggx, beckmann, ... (the distribution's own name)   normals by D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
-visible  normals as wo sees them; the weight is G / G1(o), at most 1 (Heitz2014b)
+cosine   cosine-weighted wi; the weight is f pi. Unbiased, but a narrow lobe is rarely hit: below roughness 0.3 most
+         texels of 1024 samples are far too small
+ggx, beckmann, ... (the distribution's own name)   normals with density D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
+visible  visible normals; the weight is G / G1(o), at most 1 (Heitz2014b)
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ...errors import InputError, did_you_mean
 from ...ops import Precision, backend
 from ...ops.backend import Array
 from ...optics import frame, masking, warp
-from ...optics.ndf import distribution
+from ...optics.ndf import NDF, distribution
 from .quadrature import known_masking
 
 POINTS = ("hammersley", "independent")
 
 
 class Estimate(NamedTuple):
-    """Mean over the samples, and its standard error as independent samples would have it."""
+    """Mean over the samples, and the standard error under the assumption of independent samples."""
 
     value: np.ndarray
     standard_error: np.ndarray
@@ -44,7 +44,7 @@ def hammersley(count: int) -> np.ndarray:
 
 
 def methods(ndf: str) -> tuple[str, ...]:
-    """The names of the ways to sample for a distribution."""
+    """The names of the sampling methods of a distribution."""
     return ("cosine", ndf, "visible")
 
 
@@ -63,17 +63,12 @@ def estimate(
 ) -> Estimate:
     """E at each (mu, alpha) from `spp` samples.
 
-    alpha_y, phi  the width along y, where it is another one, and the azimuth of wo
-    points  "hammersley": the same points at every texel, as the homework has it; "independent": new ones everywhere
+    alpha_y, phi  the width along y, if different, and the azimuth of wo
+    points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each
     Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
     """
     known_masking(masking_name)
-    if method not in methods(ndf):
-        raise InputError(f"unknown method '{method}'", "method", did_you_mean(method, [*methods(ndf), "quadrature"]))
-    if points not in POINTS:
-        raise InputError(f"unknown points '{points}'", "points", did_you_mean(points, list(POINTS)))
-    if spp < 1:
-        raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
+    _check(ndf, method, points, spp)
     dr = backend.drjit()
     kind = backend.types(precision)
     given = (mu, alpha, alpha if alpha_y is None else alpha_y, phi)
@@ -86,31 +81,13 @@ def estimate(
     first, second = [kind.float(c) for c in (hammersley(spp).T if points == "hammersley" else np.zeros((2, 1)))]
     generator = kind.module.PCG32(size=count, initstate=seed)
 
-    def weight(u1: Array, u2: Array) -> Array:
-        if method == "cosine":
-            wi = warp.square_to_cosine_hemisphere(u1, u2)
-            m = frame.half_vector(wo, wi)
-            g = masking.masking_shadowing(masking_name, chosen, wo, wi, m, widths)
-            return dr.select(wi.z > 0.0, chosen.D(m, widths) * g * ops.pi / (4.0 * mu_ * wi.z), 0.0)
-        visible = method == "visible"
-        m = chosen.sample_visible(wo, u1, u2, widths) if visible else chosen.sample(u1, u2, widths)
-        wi = frame.reflect(wo, m)
-        g = masking.masking_shadowing(masking_name, chosen, wo, wi, m, widths)
-        o_m = ops.dot(wo, m)
-        if visible:
-            density = chosen.pdf_visible(wo, m, widths)
-            value = ops.safe_div(chosen.D(m, widths) * g * o_m, mu_ * density)
-        else:
-            value = o_m * g / (mu_ * m.z)
-        return dr.select((wi.z > 0.0) & (o_m > 0.0), value, 0.0)
-
     def body(i: Array, total: Array, squares: Array, rng: Array) -> tuple[Array, Array, Array, Array]:
         if points == "hammersley":
             u1, u2 = dr.gather(kind.float, first, i), dr.gather(kind.float, second, i)
         else:
             double = precision == "float64"
             u1, u2 = [rng.next_float64() if double else rng.next_float32() for _ in range(2)]
-        w = weight(u1, u2)
+        w = _weight(chosen, masking_name, method, wo, widths, u1, u2)
         return i + 1, total + w, squares + w * w, rng
 
     zero = dr.zeros(kind.float, count)
@@ -123,3 +100,33 @@ def estimate(
     mean = np.asarray(total.numpy(), float) / spp
     variance = np.maximum(np.asarray(squares.numpy(), float) / spp - mean**2, 0.0)
     return Estimate(mean.reshape(shape), np.sqrt(variance / spp).reshape(shape))
+
+
+def _check(ndf: str, method: str, points: str, spp: int) -> None:
+    """Raise InputError for unknown names and spp < 1."""
+    if method not in methods(ndf):
+        raise InputError(f"unknown method '{method}'", "method", did_you_mean(method, [*methods(ndf), "quadrature"]))
+    if points not in POINTS:
+        raise InputError(f"unknown points '{points}'", "points", did_you_mean(points, list(POINTS)))
+    if spp < 1:
+        raise InputError(f"{spp} samples given", "--spp", "give 1 or more")
+
+
+def _weight(ndf: NDF, masking_name: str, method: str, wo: Array, widths: Array, u1: Array, u2: Array) -> Array:
+    """f cos / pdf of one sample at F = 1."""
+    dr = backend.drjit()
+    if method == "cosine":
+        wi = warp.square_to_cosine_hemisphere(u1, u2)
+        m = frame.half_vector(wo, wi)
+        g = masking.masking_shadowing(masking_name, ndf, wo, wi, m, widths)
+        return dr.select(wi.z > 0.0, ndf.D(m, widths) * g * ops.pi / (4.0 * wo.z * wi.z), 0.0)
+    visible = method == "visible"
+    m = ndf.sample_visible(wo, u1, u2, widths) if visible else ndf.sample(u1, u2, widths)
+    wi = frame.reflect(wo, m)
+    g = masking.masking_shadowing(masking_name, ndf, wo, wi, m, widths)
+    o_m = ops.dot(wo, m)
+    if visible:
+        value = ops.safe_div(ndf.D(m, widths) * g * o_m, wo.z * ndf.pdf_visible(wo, m, widths))
+    else:
+        value = o_m * g / (wo.z * m.z)
+    return dr.select((wi.z > 0.0) & (o_m > 0.0), value, 0.0)

@@ -2,33 +2,33 @@
 
 With F = 1 the albedo of a microfacet BRDF is an integral over normals (dwi = 4 (o.m) dm, Walter2007, eq. 14):
 
-    E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over the m whose i lies above the surface.
+    E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over the m for which i lies above the surface.
 
-**The boundary.** In the plane of n and m a reflection doubles angles. The projection of o on that plane stands at the
-angle delta = atan(tan(theta_o) cos(phi_m)) from n, phi_m counted from o, so that of i stands at 2 theta_m - delta, and
-i is above exactly where theta_m < pi/4 + delta / 2. Such an m has o.m > 0 as well. Inside the boundary the integrand is
-smooth, so Gauss-Legendre nodes that end on it converge geometrically.
+**The boundary.** In the plane of n and m a reflection doubles angles. The projection of o onto this plane makes the
+angle delta = atan(tan(theta_o) cos(phi_m)) with n, phi_m measured from o; that of i makes 2 theta_m - delta, so i is
+above the surface exactly for theta_m < pi/4 + delta / 2. Such an m has o.m > 0 as well. Inside the boundary the
+integrand is smooth, so Gauss-Legendre nodes that end on it converge geometrically.
 
-**The variables.** Normals are written by their stretched slopes, tan(theta_m) (cos phi_m, sin phi_m) =
+**The variables.** Normals are expressed by their stretched slopes, tan(theta_m) (cos phi_m, sin phi_m) =
 t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t dt db. Then
 
   - o.m / (mu cos(theta_m)) = 1 + (S / mu) t cos(b - b_o), with S = |(alpha_x o_x, alpha_y o_y)| and b_o its angle:
-    anisotropy is gone from everything but the boundary and G;
-  - t = sinh(x) spends the same number of nodes on each octave of slope, from the peak through GGX's long tail;
-  - across b - b_o = +-pi/2 the boundary leaps from theta_o's complement, small at grazing, to nearly pi/2, within an
-    angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, cot(theta_o) with one width. With
-    b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the leap takes as long in x as
-    everything else;
-  - where m's azimuth is o's the integrand has an edge at grazing. With one width that is b = b_o, the end of both half
-    turns anyway; with two it lies beside, and the half turns are made to end there.
+    anisotropy affects only the boundary and G;
+  - t = sinh(x) assigns the same number of nodes to each octave of slope, from the peak through GGX's long tail;
+  - across b - b_o = +-pi/2 the boundary jumps from theta_o's complement, small at grazing, to nearly pi/2, within an
+    angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, which is cot(theta_o) for one width. With
+    b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the jump takes as much of x as
+    the rest;
+  - where m's azimuth is o's, the integrand has an edge at grazing. For one width this is b = b_o, the end of both half
+    turns; for two widths it is nearby, and the half turns are made to end there.
 
-**Glass.** Reflection and transmission share the normals that o sees, theta_m < pi/2 + min(delta, 0). F has a root at
-the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so the root is met at
-theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu is the length of o's projection. The integral is cut
-there and at the boundary of reflection; the azimuths are cut where A = cos_c, beyond which nothing reflects totally.
-Each piece runs in s^2 (3 - 2 s), which makes a root at either end smooth.
+**Glass.** Reflection and transmission share the normals visible from o, theta_m < pi/2 + min(delta, 0). F has a
+square-root singularity at the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so
+it occurs at theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu is the length of o's projection. The
+integral is split there and at the boundary of reflection; the azimuths are split where A = cos_c, beyond which there is
+no total reflection. Each piece runs in s^2 (3 - 2 s), which makes a square root at either end smooth.
 
-**The error** of any figure is the same integral with other numbers of nodes.
+**The error** of any figure is estimated by the same integral with other numbers of nodes.
 """
 
 from __future__ import annotations
@@ -47,23 +47,23 @@ from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
 from ...optics.special import gauss
 
-# Gauss-Legendre nodes over (chi, x). Measured: the worst texel of a 128 x 128 table with roughness >= 0.05 is then met
-# to 2e-7, and to 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
+# Gauss-Legendre nodes over (chi, x). Measured errors of the worst texel of a 128 x 128 table with roughness >= 0.05:
+# 2e-7, and 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
 NODES = (40, 32)
-JUDGE = (60, 48)  # what NODES are judged by
-# The same for two widths: with a ratio down to .1, 1.2e-5; where they are all but equal, NODES would do
+JUDGE = (60, 48)  # the reference for NODES
+# The same for two widths: 1.2e-5 for ratios down to 0.1; NODES would suffice for nearly equal widths
 TURNED_NODES = (64, 32)
 TURNED_JUDGE = (96, 48)
 # Glass: over (each of three pieces of chi, each of five pieces of x)
 GLASS_NODES = (12, 10)
 GLASS_JUDGE = (24, 20)
 
-SMALLEST_MU = 1e-6  # the integrand holds 1 / mu: the limit mu -> 0 is taken here
+SMALLEST_MU = 1e-6  # the integrand contains 1 / mu: the limit mu -> 0 is evaluated here
 SMALLEST_ALPHA = 1e-5
-_LANES = 1 << 22  # points in flight at once: 32 MiB an array
+_LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 
 
-# (distribution, wo, normal m, o.m, widths, eta) -> what is integrated, without D
+# (distribution, wo, normal m, o.m, widths, eta) -> the integrands, without D
 Integrand: TypeAlias = Callable[[NDF, Direction, Direction, Scalar, Pair, Array], tuple[Scalar, ...]]
 
 
@@ -75,7 +75,7 @@ class Moments(NamedTuple):
 
 
 class TwoWays(NamedTuple):
-    """Power that glass reflects and that it transmits, at each point."""
+    """Power reflected and transmitted by glass, at each point."""
 
     reflected: np.ndarray
     transmitted: np.ndarray
@@ -83,7 +83,7 @@ class TwoWays(NamedTuple):
 
 @lru_cache
 def longest_slope(ndf: NDF) -> float:
-    """The stretched slope t beyond which a distribution holds less than about 1e-9 of its normals."""
+    """The stretched slope t beyond which a distribution has less than about 1e-9 of its normals."""
     t = np.logspace(-1, 8, 400)
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
@@ -95,7 +95,7 @@ def longest_slope(ndf: NDF) -> float:
 
 
 def known_masking(name: str) -> str:
-    """The name itself; InputError where no masking is called so."""
+    """The name itself; raises InputError if there is no masking term of that name."""
     return masking.term(name).name
 
 
@@ -113,7 +113,7 @@ def moments(
     mu              cosine of wo, an array or a number in [0, 1]
     alpha, alpha_y  widths along x and y; alpha_y None is isotropic
     phi             azimuth of wo, radians
-    nodes           Gauss-Legendre nodes in azimuth and slope; None is NODES, or TURNED_NODES with two widths
+    nodes           Gauss-Legendre nodes in azimuth and slope; None selects NODES, or TURNED_NODES for two widths
     Returns float64 arrays of the broadcast shape.
     """
     known_masking(masking_name)
@@ -130,7 +130,7 @@ def reflected(
     ndf: str, masking_name: str, reflectance: Callable[[Scalar], Spectrum], mu: ArrayLike, alpha: ArrayLike,
     alpha_y: ArrayLike | None = None, phi: ArrayLike = 0.0, nodes: tuple[int, int] | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Albedo of a microfacet BRDF with any Fresnel reflectance: a function of the facet's cosine to a spectrum.
+    """Albedo of a microfacet BRDF for any Fresnel reflectance, a function from the facet's cosine to a spectrum.
 
     Returns float64, the broadcast shape and channels last.
     """
@@ -180,17 +180,18 @@ def over_normals(
     ndf: str, terms: Integrand, channels: int, mu: ArrayLike, alpha: ArrayLike, alpha_y: ArrayLike | None,
     phi: ArrayLike, eta: ArrayLike | None = None, nodes: tuple[int, int] | None = None,
 ) -> list[np.ndarray]:  # fmt: skip
-    """int D(m) (o.m) / mu terms(...) dm over the normals that mirror o above the surface or, with eta, that o sees.
+    """int D(m) (o.m) / mu terms(...) dm over the normals that mirror o above the surface or, with eta, are visible from
+    o.
 
-    terms     (ndf, wo, m, o.m, alpha, eta) -> that many values, without D
-    Returns one array a channel, of the broadcast shape.
+    terms     (ndf, wo, m, o.m, alpha, eta) -> `channels` values, without D
+    Returns one array per channel, of the broadcast shape.
     """
     isotropic = alpha_y is None
     nodes = nodes or (NODES if isotropic else TURNED_NODES)
     given = [mu, alpha, alpha if isotropic else alpha_y, phi, 2.0 if eta is None else eta]
     arrays = np.broadcast_arrays(*[np.asarray(v, float) for v in given])
     shape, flat = arrays[0].shape, [a.ravel() for a in arrays]
-    sides = 1 if isotropic else 2  # without anisotropy both sides of the plane of incidence are alike
+    sides = 1 if isotropic else 2  # without anisotropy both sides of the plane of incidence are equal
     if eta is not None:
         nodes = (3 * nodes[0], nodes[1])
     rows = max(1, _LANES // (nodes[0] * sides))
@@ -205,7 +206,7 @@ def _over_azimuths(
     ndf: NDF, terms: Integrand, channels: int, points: list[np.ndarray], nodes: tuple[int, int],
     sides: int, through: bool,
 ) -> list[np.ndarray]:  # fmt: skip
-    """One entry of a wavefront is a point and a stretched azimuth; slopes are a loop inside the kernel."""
+    """One entry of a wavefront is a point and a stretched azimuth; the slopes are a loop inside the kernel."""
     dr = backend.drjit()
     kind = backend.types("float64")
     n_azimuth, n_slope = nodes
@@ -218,101 +219,143 @@ def _over_azimuths(
     rule = gauss(n_azimuth) if not through else _in_three(n_azimuth // 3)
     chi_node, chi_weight = [dr.gather(kind.float, kind.float(a), at) for a in rule]
     limit = dr.opaque(kind.float, longest_slope(ndf))
-    sums = _over_slopes(
-        ndf, terms, channels, mu, kind.vec2(ax, ay), phi, eta if through else None, chi_node, chi_weight, side, n_slope,
-        limit,
-    )  # fmt: skip
-    return [np.asarray((dr.block_sum(v, block) * (2.0 / sides)).numpy()) for v in sums]
+    view = _view(mu, kind.vec2(ax, ay), phi)
+    eta = eta if through else None
+    slope, weight = _azimuth(view, eta, chi_node, chi_weight, side)
+    sums = _over_slopes(ndf, terms, channels, view, eta, slope, _cuts(view, eta, slope, limit), n_slope)
+    factor = weight * view.alpha.x * view.alpha.y / view.mu
+    return [np.asarray((dr.block_sum(total * factor, block) * (2.0 / sides)).numpy()) for total in sums]
 
 
-def _over_slopes(
-    ndf: NDF, terms: Integrand, channels: int, mu: Array, alpha: Array, phi: Array, eta: Array | None,
-    chi: Array, chi_weight: Array, side: Array, n_slope: int, limit: Array,
-) -> list[Array]:  # fmt: skip
-    """The integral over slopes along one stretched azimuth, times the azimuth's weight."""
+class _View(NamedTuple):
+    """One direction o per lane.
+
+    sin_o         sine of its angle to the normal
+    cos_bo, sin_bo  the azimuth b_o of the stretched o
+    length        of the stretched o along the surface
+    """
+
+    mu: Array
+    alpha: Array
+    phi: Array
+    wo: Array
+    sin_o: Array
+    cos_bo: Array
+    sin_bo: Array
+    length: Array
+
+
+def _view(mu: Array, alpha: Array, phi: Array) -> _View:
     dr = backend.drjit()
-    Float = type(mu)
-    UInt = backend.types_like(Float).module.UInt32
     mu = dr.maximum(mu, SMALLEST_MU)
     alpha = type(alpha)(dr.maximum(alpha.x, SMALLEST_ALPHA), dr.maximum(alpha.y, SMALLEST_ALPHA))
     sin_o = dr.sqrt((1.0 - mu) * (1.0 + mu))
     wo = frame.spherical_direction(sin_o, mu, phi)
-
-    # the direction b_o of the stretched o
     stretched = ops.vec2(alpha.x * wo.x, alpha.y * wo.y)
     length = dr.norm(stretched)
     cos_bo = dr.select(length > 0.0, stretched.x / length, 1.0)
     sin_bo = dr.select(length > 0.0, stretched.y / length, 0.0)
+    return _View(mu, alpha, phi, wo, sin_o, cos_bo, sin_bo, length)
 
-    # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the leap's width is held below 1, where it is no leap
+
+def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side: Array) -> tuple[Array, Array]:
+    """(slope of the normals at t = 1, weight) of one stretched azimuth."""
+    dr = backend.drjit()
+    wo, alpha, cos_bo, sin_bo = view.wo, view.alpha, view.cos_bo, view.sin_bo
+    # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the jump's width is limited to 1, where there is no jump
     across = dr.norm(ops.vec2(alpha.x * sin_bo, alpha.y * cos_bo))
-    leap = dr.minimum(mu * across / dr.maximum(length, 1e-9 * across), 1.0)
+    leap = dr.minimum(view.mu * across / dr.maximum(view.length, 1e-9 * across), 1.0)
     a = _asinh(0.5 * ops.pi / leap)
-    # the edge where m's azimuth is o's lies off b_o by beta
+    # the edge where m's azimuth is o's is at the angle beta from b_o
     edge_x, edge_y = wo.x / alpha.x, wo.y / alpha.y
     beta = dr.atan2(edge_y * cos_bo - edge_x * sin_bo, edge_x * cos_bo + edge_y * sin_bo)
-    beta = dr.select(length > 0.0, beta, 0.0)
+    beta = dr.select(view.length > 0.0, beta, 0.0)
     top = _signed_asinh((0.5 * ops.pi - side * beta) / leap) / a
-    x = (top + 1.0) * chi - 1.0
-    stretch = 0.5 * (top + 1.0)
-    if eta is not None:
-        # where A = cos_c: cos(phi_m - phi_o) = +-q; two cuts in chi, or none
-        cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
-        q = dr.sqrt(dr.maximum(dr.square(cos_c) - dr.square(mu), 0.0)) / dr.maximum(sin_o, 1e-9)
-        cut = (cos_c > mu) & (q < 1.0)
-        turn = dr.acos(dr.minimum(q, 1.0))
-        ends = []
-        for psi, fallback in ((turn, top / 3.0), (ops.pi - turn, -1.0 / 3.0)):
-            s_, c_ = dr.sincos(phi + side * psi)
-            bx, by = c_ / alpha.x, s_ / alpha.y
-            relative = side * dr.atan2(by * cos_bo - bx * sin_bo, bx * cos_bo + by * sin_bo)
-            chi_cut = 0.5 * ops.pi - relative
-            ends.append(dr.select(cut, _signed_asinh(chi_cut / leap) / a, fallback))
-        # pieces [-1, low], [low, high], [high, top]; chi arrives as the piece's number plus the place in it
-        high, low = ends
-        piece = dr.floor(chi)
-        start = dr.select(piece < 0.5, -1.0, dr.select(piece < 1.5, low, high))
-        stop = dr.select(piece < 0.5, low, dr.select(piece < 1.5, high, top))
-        s_ = chi - piece
-        x = start + (stop - start) * s_ * s_ * (3.0 - 2.0 * s_)
-        stretch = 3.0 * s_ * (1.0 - s_) * (stop - start)  # of x over [0, 1]: half
+    if eta is None:
+        x, stretch = (top + 1.0) * chi - 1.0, 0.5 * (top + 1.0)
+    else:
+        x, stretch = _in_pieces(chi, top, *_glass_ends(view, eta, side, leap, a, top))
     grow = dr.exp(a * x)
     angle = 0.5 * leap * (grow - 1.0 / grow)
     weight = chi_weight * stretch * (leap * a) * (grow + 1.0 / grow)
-
-    # the unit vector of b = b_o + pi/2 - chi, stretched: the slope of the normals at t = 1
+    # the unit vector of b = b_o + pi/2 - chi, stretched
     sin_b, cos_b = side * dr.cos(angle), dr.sin(angle)
     slope = ops.vec2(alpha.x * (cos_b * cos_bo - sin_b * sin_bo), alpha.y * (sin_b * cos_bo + cos_b * sin_bo))
+    return slope, weight
+
+
+def _glass_ends(view: _View, eta: Array, side: Array, leap: Array, a: Array, top: Array) -> list[Array]:
+    """(high, low): x where A = cos_c, that is cos(phi_m - phi_o) = +-q; otherwise arbitrary cuts."""
+    dr = backend.drjit()
+    cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
+    q = dr.sqrt(dr.maximum(dr.square(cos_c) - dr.square(view.mu), 0.0)) / dr.maximum(view.sin_o, 1e-9)
+    cut = (cos_c > view.mu) & (q < 1.0)
+    turn = dr.acos(dr.minimum(q, 1.0))
+    ends = []
+    for psi, fallback in ((turn, top / 3.0), (ops.pi - turn, -1.0 / 3.0)):
+        s, c = dr.sincos(view.phi + side * psi)
+        bx, by = c / view.alpha.x, s / view.alpha.y
+        relative = side * dr.atan2(by * view.cos_bo - bx * view.sin_bo, bx * view.cos_bo + by * view.sin_bo)
+        chi_cut = 0.5 * ops.pi - relative
+        ends.append(dr.select(cut, _signed_asinh(chi_cut / leap) / a, fallback))
+    return ends
+
+
+def _in_pieces(chi: Array, top: Array, high: Array, low: Array) -> tuple[Array, Array]:
+    """(x, half its derivative) in the pieces [-1, low], [low, high], [high, top]; chi is the piece's number plus the
+    position in it."""
+    dr = backend.drjit()
+    piece = dr.floor(chi)
+    start = dr.select(piece < 0.5, -1.0, dr.select(piece < 1.5, low, high))
+    stop = dr.select(piece < 0.5, low, dr.select(piece < 1.5, high, top))
+    s = chi - piece
+    return start + (stop - start) * s * s * (3.0 - 2.0 * s), 3.0 * s * (1.0 - s) * (stop - start)
+
+
+def _cuts(view: _View, eta: Array | None, slope: Array, limit: Array) -> list[Array]:
+    """The ends of the pieces of x along one azimuth, in ascending order."""
+    dr = backend.drjit()
     spread = dr.norm(slope)
     # tan(delta) = tan(theta_o) cos(phi_m - phi_o)
-    delta = dr.atan((slope.x * wo.x + slope.y * wo.y) / (spread * mu))
+    delta = dr.atan((slope.x * view.wo.x + slope.y * view.wo.y) / (spread * view.mu))
 
     def x_at(theta: Array) -> Array:
-        """The variable at an angle of the normal; beyond the distribution's end, its end."""
+        """The variable at an angle of the normal, limited to the distribution's end."""
         inside = theta < 0.5 * ops.pi - 1e-9
         t = dr.select(inside, dr.tan(dr.select(inside, theta, 0.0)) / spread, limit)
         return _asinh(dr.clip(t, 0.0, limit))
 
     mirror_end = x_at(0.25 * ops.pi + 0.5 * delta)
+    zero = type(view.mu)(0.0)
     if eta is None:
-        cuts = [Float(0.0), mirror_end]
-    else:
-        end = x_at(0.5 * ops.pi + dr.minimum(delta, 0.0))
-        middle = dr.minimum(mirror_end, end)
-        reach = cos_c * dr.cos(delta) / mu  # cos_c / A, as A cos(delta) = mu
-        partly = (eta < 1.0) & (reach < 1.0)
-        half = dr.acos(dr.minimum(reach, 1.0))
-        low, high = [dr.minimum(x_at(dr.maximum(delta + s * half, 0.0)), end) for s in (-1.0, 1.0)]
-        low, high = dr.select(partly, low, 0.3 * end), dr.select(partly, high, 0.6 * end)
-        # where a narrow distribution has all but a tenth of its normals, t = 3
-        inner = dr.minimum(1.8, 0.5 * end)
-        cuts = []
-        for cut in (low, middle, high, inner):  # sort by insertion
-            for place, earlier in enumerate(cuts):
-                cuts[place], cut = dr.minimum(earlier, cut), dr.maximum(earlier, cut)
-            cuts.append(cut)
-        cuts = [Float(0.0), *cuts, end]
+        return [zero, mirror_end]
+    end = x_at(0.5 * ops.pi + dr.minimum(delta, 0.0))
+    middle = dr.minimum(mirror_end, end)
+    cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
+    reach = cos_c * dr.cos(delta) / view.mu  # cos_c / A, as A cos(delta) = mu
+    partly = (eta < 1.0) & (reach < 1.0)
+    half = dr.acos(dr.minimum(reach, 1.0))
+    low, high = [dr.minimum(x_at(dr.maximum(delta + s * half, 0.0)), end) for s in (-1.0, 1.0)]
+    low, high = dr.select(partly, low, 0.3 * end), dr.select(partly, high, 0.6 * end)
+    # a narrow distribution has 90 % of its normals within t = 3
+    inner = dr.minimum(1.8, 0.5 * end)
+    cuts: list[Array] = []
+    for cut in (low, middle, high, inner):  # insertion sort
+        for place, earlier in enumerate(cuts):
+            cuts[place], cut = dr.minimum(earlier, cut), dr.maximum(earlier, cut)
+        cuts.append(cut)
+    return [zero, *cuts, end]
 
+
+def _over_slopes(
+    ndf: NDF, terms: Integrand, channels: int, view: _View, eta: Array | None, slope: Array, cuts: list[Array],
+    n_slope: int,
+) -> list[Array]:  # fmt: skip
+    """The integral over slopes along one stretched azimuth."""
+    dr = backend.drjit()
+    Float = type(view.mu)
+    UInt = backend.types_like(Float).module.UInt32
+    wo, alpha = view.wo, view.alpha
     node, node_weight = [Float(v) for v in gauss(n_slope)]
 
     def body(i: Array, *sums: Array) -> tuple[Array, ...]:
@@ -337,12 +380,11 @@ def _over_slopes(
     zeros = tuple(Float(0.0) for _ in range(channels))
     labels = ("i", *(f"sum{c}" for c in range(channels)))
     _, *sums = dr.while_loop(state=(UInt(0), *zeros), cond=lambda i, *_: i < count, body=body, labels=labels)
-    factor = weight * alpha.x * alpha.y / mu
-    return [total * factor for total in sums]
+    return list(sums)
 
 
 def _in_three(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of three pieces, each as the piece's number plus the place in it."""
+    """Nodes of three pieces, each given as the piece's number plus the position in it."""
     x, w = gauss(count)
     return np.concatenate([x, 1.0 + x, 2.0 + x]), np.tile(w, 3)
 

@@ -1,15 +1,15 @@
-"""Light among the facets, followed one by one (Heitz2016): the referee of every compensation.
+"""Random walks on the facets (Heitz2016): the reference for every compensation.
 
-The microsurface is a random height field with GGX slopes, heights uniform in [-1, 1] (their distribution drops out of
-every result). A walker at height h going along w meets it again after a distance whose law is Smith's masking:
+The microsurface is a random height field with GGX slopes, heights uniform in [-1, 1] (their distribution has no effect
+on results). A walker at height h moving along w hits it after a distance whose distribution follows Smith's masking:
 
     it escapes upward with probability G1(w, h) = C(h)^Lambda(w),  C(h) = (h + 1) / 2,
-    else it stands at C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for directions up and down alike.
+    otherwise the next height is C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for upward and downward directions alike.
 
-There it meets a normal as -w sees them, and is reflected with the weight F (metal), or reflected or refracted with the
-chances F and 1 - F (glass). A refracted walker is followed in the mirrored frame, where its own medium is above. At
-each meeting the way straight out along the target direction is added, phase function times G1: that makes `value`
-unbiased.
+There it hits a facet with a normal visible from -w, and is reflected with weight F (metal), or reflected or refracted
+with probabilities F and 1 - F (glass). A refracted walker continues in the mirrored frame, in which its own medium is
+above. Each hit adds the direct contribution along the target direction, phase function times G1 (next-event
+estimation), so `value` is unbiased.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ...optics import frame, fresnel
 from ...optics.ndf import distribution
 from ...optics.roughness import widths
 
-MOST_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light is left after these
+MAX_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light remains after these
 FLAT = 1e-6  # below this |w.z| a walker stays at its height
 
 
@@ -36,20 +36,20 @@ def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
 
 
 def raised(base: Array, power: Scalar) -> Array:
-    """base^power; beyond e^-80 and e^80 those: Dr.Jit's own power of 64 bits is no number where it underflows."""
+    """base^power, its logarithm limited to +-80: Dr.Jit's float64 power is NaN where it underflows."""
     dr = backend.drjit()
     return dr.exp(dr.clip(power * dr.log(base), -80.0, 80.0))
 
 
 def escape(w: Direction, height: Array, alpha: Pair) -> Array:
-    """G1(w, h): the chance to leave from C(h) = height along w; 0 downward."""
+    """G1(w, h): the probability to escape from C(h) = height along w; 0 downward."""
     dr = backend.drjit()
     power = maximum(distribution("ggx").Lambda(w, alpha), 0.0)
     return where(w.z > 0.0, raised(dr.clip(height, 1e-12, 1.0), power), 0.0)
 
 
 def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Array]:
-    """(C(h') where it meets the surface next, whether it leaves)."""
+    """(C(h') at the next hit, whether the walker escapes)."""
     dr = backend.drjit()
     leaves = u > 1.0 - escape(w, height, alpha)
     bend = signed_lambda(w, alpha)
@@ -62,7 +62,7 @@ def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Arr
 
 
 def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
-    """Density of normals as v sees them, above or below the horizon: max(v.m, 0) D(m) / projected area (Heitz2016)."""
+    """Density of visible normals, for v above or below the horizon: max(v.m, 0) D(m) / projected area (Heitz2016)."""
     slant = sqrt(v.z * v.z + (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y))
     # v.z + slant cancels for v.z < 0; slant^2 - v.z^2 does not
     tangential = (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y)
@@ -71,60 +71,75 @@ def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
 
 
 class Left(NamedTuple):
-    """Where a walk ended: direction, weight (a spectrum), meetings."""
+    """The end of a walk: direction, weight (a spectrum), number of hits."""
 
     w: Array
     weight: Array
     bounces: Array
 
 
-def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
-    """Follow one walker a lane from wo; (light of two meetings or more that goes out along wi, where it went itself).
+class _Facets:
+    """The scattering of a walker by one facet of a bound base."""
 
-    base   a conductor or a dielectric, bound
-    wi     the target, or None
-    power  whether transmission is of power, or of radiance, which carries (eta_o / eta_i)^2
-    The value is times |cos theta_i|.
-    """
-    if isinstance(wo, Node):
-        raise RecordingError("a random walk cannot be recorded: it is no straight line", "RandomWalk")
-    dr = backend.drjit()
-    kind = backend.types_like(type(wo))
-    Float, Vector = kind.float, type(wo)
-    glass = base.transmits
-    metal = base.microsurface.eta is None
-    side = dr.select(wo.z >= 0.0, Float(1.0), Float(-1.0))  # +1: the walker's own medium is outside
-    w = Vector(-(vec3(wo.x, wo.y, wo.z) * side))
-    weight = dr.zeros(type(base.albedo * 1.0), 1) + ones_like(wo.z)
-    weight = type(base.albedo)(weight)
-    eta_of = (lambda s: dr.select(s > 0.0, base.eta, 1.0 / base.eta)) if not metal else (lambda s: Float(1.0))
+    def __init__(self, base: Any, alpha: Pair) -> None:
+        self.base, self.alpha = base, alpha
+        self.glass = base.transmits
+        self.metal = base.microsurface.eta is None
+        self.albedo = 1.0 if self.metal else base.albedo  # the reflectance of a metal includes it
 
-    def reflectance(cos: Array, eta: Array) -> Array:
-        if metal:
-            return base.reflectance(cos)  # a spectrum, albedo included
-        return base.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
+    def eta(self, side: Array) -> Array:
+        """Index on the far side over index in the walker's own medium."""
+        if self.metal:
+            return type(side)(1.0)
+        return backend.drjit().select(side > 0.0, self.base.eta, 1.0 / self.base.eta)
 
-    def uniform(generator: Array) -> Array:
-        return generator.next_float64() if kind.float is backend.types("float64").float else generator.next_float32()
+    def reflectance(self, cos: Array, eta: Array) -> Array:
+        if self.metal:
+            return self.base.reflectance(cos)
+        return self.base.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
 
-    def onward(v: Array, side: Array, height: Array) -> Array:
-        """Phase function from v to the target times the chance to leave along it; no albedo for glass."""
-        eta = eta_of(side)
+    def onward(self, v: Array, wi: Array, side: Array, height: Array) -> Array:
+        """Phase function from v to the target times the probability to escape along it; no albedo for glass."""
+        dr, alpha = backend.drjit(), self.alpha
+        eta = self.eta(side)
         target = vec3(wi.x, wi.y, wi.z) * side
         h = frame.half_vector(v, target)
-        f = reflectance(dr.abs(dot(v, h)), eta)
+        f = self.reflectance(dr.abs(dot(v, h)), eta)
         up = visible_density(v, h, alpha) / dr.maximum(4.0 * dr.abs(dot(v, h)), 1e-12)
         reflected = f * where(target.z > 0.0, up * escape(target, height, alpha), 0.0)
-        if not glass:
+        if not self.glass:
             return reflected
         m = v + target * eta
         m = m * (1.0 / dr.maximum(dr.norm(m), 1e-12))
         m = where(m.z < 0.0, -m, m)
         o_m, i_m = dot(v, m), dot(target, m)
         spread = dr.square(eta) * dr.maximum(-i_m, 0.0) / dr.maximum(dr.square(o_m + eta * i_m), 1e-20)
-        down = (1.0 - reflectance(dr.abs(o_m), eta)) * visible_density(v, m, alpha) * spread
+        down = (1.0 - self.reflectance(dr.abs(o_m), eta)) * visible_density(v, m, alpha) * spread
         below = vec3(-target.x, -target.y, -target.z)
         return reflected + where((target.z < 0.0) & (o_m > 0.0), down * escape(below, 1.0 - height, alpha), 0.0)
+
+
+def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
+    """Follow one walker per lane from wo; returns (light of two or more hits scattered along wi, the end of the walk).
+
+    base   a conductor or a dielectric, bound
+    wi     the target, or None
+    power  whether transmission is in power, or in radiance, which includes the factor (eta_o / eta_i)^2
+    The value includes |cos theta_i|.
+    """
+    if isinstance(wo, Node):
+        raise RecordingError("a random walk cannot be recorded: its number of steps depends on values", "RandomWalk")
+    dr = backend.drjit()
+    kind = backend.types_like(type(wo))
+    Float, Vector = kind.float, type(wo)
+    facets = _Facets(base, alpha)
+    side = dr.select(wo.z >= 0.0, Float(1.0), Float(-1.0))  # +1: the walker's own medium is outside
+    w = Vector(-(vec3(wo.x, wo.y, wo.z) * side))
+    weight = dr.zeros(type(base.albedo * 1.0), 1) + ones_like(wo.z)
+    weight = type(base.albedo)(weight)
+
+    def uniform(generator: Array) -> Array:
+        return generator.next_float64() if kind.float is backend.types("float64").float else generator.next_float32()
 
     def body(
         w: Array, height: Array, side: Array, weight: Array, total: Array, alive: Array, bounces: Array, rng: Array
@@ -134,16 +149,16 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
         v = vec3(-w.x, -w.y, -w.z)
         bounces = dr.select(alive, bounces + 1, bounces)
         if wi is not None:
-            light = onward(v, side, there) * weight * (1.0 if metal else base.albedo)
+            light = facets.onward(v, wi, side, there) * weight * facets.albedo
             total = total + where(alive & (bounces > 1), light, 0.0)
         u1, u2 = uniform(rng), uniform(rng)
         m = distribution("ggx").sample_visible(v, u1, u2, alpha)
         o_m = dr.maximum(dot(v, m), 0.0)
-        eta = eta_of(side)
-        f = reflectance(o_m, eta)
+        eta = facets.eta(side)
+        f = facets.reflectance(o_m, eta)
         mirrored = frame.reflect(v, m)
-        if not glass:
-            weight = where(alive, weight * f * (1.0 if metal else base.albedo), weight)
+        if not facets.glass:
+            weight = where(alive, weight * f * facets.albedo, weight)
             w = where(alive, mirrored, w)
             height = dr.select(alive, there, height)
         else:
@@ -153,30 +168,21 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
             w = where(alive, where(passes, -through, mirrored), w)
             height = dr.select(alive, dr.select(passes, 1.0 - there, there), height)
             side = dr.select(passes, -side, side)
-        alive = alive & (bounces < MOST_BOUNCES)
+        alive = alive & (bounces < MAX_BOUNCES)
         return Vector(w), height, side, weight, total, alive, bounces, rng
 
-    total = weight * 0.0
-    state = (
-        w,
-        Float(1.0) + zeros_like(w.z),
-        side,
-        weight,
-        total,
-        w.z < 0.0,
-        kind.module.UInt32(0) + dr.zeros(kind.module.UInt32, dr.width(w)),
-        rng,
-    )
+    bounces = kind.module.UInt32(0) + dr.zeros(kind.module.UInt32, dr.width(w))
+    state = (w, Float(1.0) + zeros_like(w.z), side, weight, weight * 0.0, w.z < 0.0, bounces, rng)
     names = ("w", "height", "side", "weight", "total", "alive", "bounces", "rng")
     w, _, end_side, weight, total, _, bounces, _ = dr.while_loop(state, cond=lambda *s: s[5], body=body, labels=names)
-    if glass and not power and wi is not None:
+    if facets.glass and not power and wi is not None:
         crosses = wo.z * wi.z < 0.0
-        total = total * where(crosses, 1.0 / dr.square(eta_of(side)), 1.0)
+        total = total * where(crosses, 1.0 / dr.square(facets.eta(side)), 1.0)
     return total, Left(w * end_side, weight, bounces)
 
 
 def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
-    """A generator a lane, seeded by the bits of both directions and the seed: new numbers for each pair."""
+    """One generator per lane, seeded by the bits of both directions and the seed: new numbers for each pair."""
     dr = backend.drjit()
     kind = backend.types_like(type(wo))
     UInt = kind.module.UInt32
@@ -187,14 +193,14 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
         state = (state ^ (state >> 15)) * UInt(0xC2B2AE35)
         state = state ^ (state >> 13)
     count = dr.width(state)
-    # equal pairs in one call differ by their lane
+    # equal pairs in one call are distinguished by their lane
     lane = dr.arange(UInt, count) * UInt(0x9E3779B1)
     state = (state ^ lane ^ (lane >> 16)) * UInt(0x85EBCA6B)
     return kind.module.PCG32(size=count, initstate=kind.module.UInt64(state ^ (state >> 13)))
 
 
 def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean weight with which walkers from cosine mu come back out, a spectrum, and its standard error.
+    """Mean weight, a spectrum, with which walkers from cosine mu leave the surface, and its standard error.
 
     base  a Conductor or Dielectric with ndf "ggx"; mu below 0 starts inside glass
     """

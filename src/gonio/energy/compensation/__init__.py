@@ -1,5 +1,5 @@
-"""What single scattering misses, and the lobes that give it back: what the compensated materials stand on.
+"""Energy lost by single-scattering models, and the lobes that return it, for the compensated materials.
 
-`missing.missing_energy(base)` answers with one of three: `reflecting.Reflecting` (metals, glass that only reflects),
-`glass.Glass` (both sides), `measured.Measured` (any other base that reflects). All speak the same words.
+`missing.missing_energy(base)` returns one of `reflecting.Reflecting` (metals, glass that only reflects), `glass.Glass`
+(both sides) and `measured.Measured` (any other base that reflects), all with the interface `lobe.MissingEnergy`.
 """

@@ -1,17 +1,17 @@
-"""What single scattering misses, M(mu) = 1 - E(mu), as one short polynomial a roughness.
+"""The energy lost by single scattering, M(mu) = 1 - E(mu), as one short polynomial per roughness.
 
-A compensated material needs M at both directions for every pair. Two bilinear lookups are eight gathers, dearer than
-the whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right
-variable makes one possible: z of `gonio.energy.bend`, in which M is smooth whatever the width. M all but vanishes
-toward the normal (z = 0), often toward grazing too, and a polynomial in powers of z would lose its digits there in
-float32. So it is kept in the basis of Bernstein, with no coefficient below 0:
+A compensated material needs M at both directions of every pair. Two bilinear lookups are eight gathers, more expensive
+than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of that. It is
+possible in the variable z of `gonio.energy.bend`, in which M is smooth at any width. M nearly vanishes toward the
+normal (z = 0), often toward grazing too, where a polynomial in powers of z would lose its digits in float32. Therefore
+it is expressed in the Bernstein basis with non-negative coefficients:
 
     M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
-Every term is positive and z / r is found without cancellation (`descent`): M keeps its digits where it is all but
-nothing. Rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, M_avg beside them;
-M_avg is the integral of the polynomial itself, so that what the table has, energy has exactly. Anisotropic widths add
-two axes, see `anisotropic`.
+Every term is positive, and z / r is computed without cancellation (`descent`), so M has full precision even where it is
+tiny. Rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, together with M_avg, which
+is the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Anisotropic
+widths add two axes, see `anisotropic`.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from .. import cache
 from ..albedo import quadrature
 from ..bend import DEGREE, Form, cosine, descent, form_of, numpy_knee, numpy_rise
 
-ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
-LOBE_NODES = 256  # the density between them is off by 1e-4; with 64 a furnace by sampling was 4e-4 short
+ROWS = 129  # roughness 0 to 1; linear interpolation between them has an error of 3e-5
+LOBE_NODES = 256  # the interpolated density has an error of 1e-4; with 64 a sampled furnace lost 4e-4
 NODES_OF_FIT = 64
 STEPS_OF_FIT = 8
 
 
 def bernstein(x: np.ndarray, degree: int) -> np.ndarray:
-    """x^k (1 - x)^(degree - k), without binomials, k = 0 to degree along the last axis."""
+    """x^k (1 - x)^(degree - k), without binomial factors, k = 0 to degree along the last axis."""
     k = np.arange(degree + 1)
     return x[..., None] ** k * (1.0 - x[..., None]) ** (degree - k)
 
 
 def fit(form: Form, bend: np.ndarray, missing: Callable[..., np.ndarray], nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """c_k >= 0 at each bend: nearly minimax, by non-negative least squares, reweighted.
+    """c_k >= 0 at each bend: nearly minimax, by reweighted non-negative least squares.
 
     missing  a function of mu (rows, nodes) to M
     Returns (rows, degree + 2); the last channel is M_avg.
@@ -63,13 +63,13 @@ def _nodes(count: int) -> np.ndarray:
 
 
 def _importance(mu: np.ndarray) -> np.ndarray:
-    """Below mu = .02 albedo hardly matters, and that of glass has a cusp."""
+    """The weight of the fit at mu: below mu = 0.02 albedo matters little, and that of glass has a cusp."""
     return np.minimum(mu / 0.02, 1.0) + 0.02
 
 
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
     """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
-    from scipy.optimize import nnls  # late: a picture whose tables are there shall not wait for it
+    from scipy.optimize import nnls  # imported late: not needed by renders whose tables exist
 
     weight, best, least = importance, np.zeros(basis.shape[1]), np.inf
     for _ in range(STEPS_OF_FIT):
@@ -82,7 +82,7 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
 
 
 def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
+    """M for rows of coefficients at mu (rows, nodes), as `missing` computes it."""
     fall = 1.0 - numpy_rise(form, mu, bend[:, None])
     return np.einsum("rnk,rk->rn", bernstein(fall, form.degree), coefficients)
 
@@ -106,7 +106,7 @@ def isotropic(ndf: str, masking: str) -> Table:
 
 @cache.of_members
 def lobe(ndf: str, masking: str) -> Table:
-    """mu^2 over (roughness, u): the inverse of the share of M mu below mu, to sample the lobe proportional to it."""
+    """mu^2 over (roughness, u): the inverse distribution function of the lobe proportional to M mu."""
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
     form = form_of(ndf, masking)
     bend = numpy_knee(form, masking, alpha)
@@ -114,10 +114,10 @@ def lobe(ndf: str, masking: str) -> Table:
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
 
 
-ASPECTS = 17  # sqrt(alpha_min / alpha_max), 0 to 1: a furnace errs by 1e-3 up to a ratio of 9, 1e-2 at 40
+ASPECTS = 17  # sqrt(alpha_min / alpha_max), 0 to 1: furnace error 1e-3 up to a ratio of 9, 1e-2 at 40
 ASPECT_ROWS = 33  # sqrt(alpha_max), 0 to 1
 HARMONICS = 7  # terms of a polynomial in y
-AZIMUTHS = 13  # nodes to fit them
+AZIMUTHS = 13  # nodes of their fit
 TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by terms in y, M_avg, padding
 
 
@@ -125,10 +125,10 @@ TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by 
 def anisotropic(ndf: str, masking: str) -> Table:
     """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) of a metal with two widths.
 
-    About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from
-    the axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 +
-    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(6 - j), Y = (1 + y) / 2, in c_k, none
-    below 0 either.
+    Over the azimuth M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi measured from
+    the axis of the larger width; the bend is that of the width along w, alpha_phi^2 = alpha_max^2 cos^2 +
+    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(6 - j), Y = (1 + y) / 2, in c_k; all are
+    non-negative.
     """
 
     def build() -> np.ndarray:
@@ -152,7 +152,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
         by_cell = (np.stack(part, axis=1).reshape(len(big), -1) for part in (target, importance))
         c = np.array([_nearly_minimax(basis, *cell) for cell in zip(*by_cell, strict=True)])
         c = c.reshape(len(big), DEGREE + 1, HARMONICS)
-        # M_avg: over azimuth and cosine, of the fit itself
+        # M_avg: over azimuth and cosine, of the fitted polynomial
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
         node, weight = gauss(64)
         average = np.zeros(len(big))
@@ -179,20 +179,20 @@ def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, 
     return cos2, 1.0 - cos2, np.sqrt(big**2 * cos2 + small**2 * (1.0 - cos2))
 
 
-GLASS_ETAS = 21  # at equal steps of the root of sqrt(F0) = (eta - 1) / (eta + 1): M changes fastest near eta = 1
+GLASS_ETAS = 21  # at equal steps of the root of sqrt(F0) = (eta - 1) / (eta + 1): M varies fastest near eta = 1
 GLASS_ROWS = 33
 GLASS_LOBE_NODES = 96
-LARGEST_ROOT = 2.0 / 3.0  # eta = 5
+MAX_ROOT = 2.0 / 3.0  # eta = 5
 SIDES = ("thin", "dense")
 
 
 @cache.of_members
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its thin and its dense side."""
+    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its less dense and denser side."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
-        roots = np.linspace(0.0, 1.0, GLASS_ETAS) ** 2 * LARGEST_ROOT
+        roots = np.linspace(0.0, 1.0, GLASS_ETAS) ** 2 * MAX_ROOT
         eta = np.maximum((1.0 + roots) / (1.0 - roots), 1.0 + 1e-4)
         alphas, etas = np.tile(alpha, GLASS_ETAS), np.repeat(eta, GLASS_ROWS)
         sides = []
@@ -213,23 +213,23 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 
 def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scalar]:
-    """The one width of which glass misses about as much as of two, seen along a direction, from the thin side and from
-    the dense one; root is sqrt(F0)."""
+    """The isotropic widths at which glass loses about as much as at two widths, along a direction, from the less dense
+    and from the denser side; root is sqrt(F0)."""
     thin2, dense2 = _squares(sqr(w.x), sqr(w.y), ops.abs(w.z), sqr(alpha.x), sqr(alpha.y), root)
     return sqrt(ops.clamp(thin2, 1e-8, 1.0)), sqrt(ops.clamp(dense2, 1e-8, 1.0))
 
 
 def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array, root: Array) -> tuple[Array, Array]:
-    """Those widths squared.
+    """The squares of `widths_along`.
 
-    Straight down it is about the root of their mean square. Where light grazes, masking by the width seen along it is
-    nearly all. With S and D sum and difference of the squared widths,
-    alpha^2 = S / 2 + o D sin^2 cos(2 phi) + e D^2 / S; o and e are fitted to where it gives M itself, at
+    At normal incidence the width is about the root of the mean square. At grazing incidence masking by the width along
+    the direction dominates. With S and D sum and difference of the squared widths,
+    alpha^2 = S / 2 + o D sin^2 cos(2 phi) + e D^2 / S; o and e are fitted to the width that yields M exactly, for
     indices 1.15, 1.5 and 2.2 and four pairs of widths.
     """
     S, D, difference, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
     bent, across, low2 = D * D / S, difference / (1.0 + cos), low * low
-    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near an index of 1 both sides are alike
+    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near index 1 both sides are equal
     thin = 0.5 * S + D * difference * (0.5 - 0.7 * root + 0.06 * low8) + bent * (0.35 * root * (1.0 - 0.6 * low8))
     dense = 0.5 * S + D * difference * (low2 * low2 - 0.1) + bent * low * (1.3 * across * across - 0.48)
     return thin, dense + (thin - dense) * (near * near)
@@ -237,8 +237,8 @@ def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array,
 
 @cache.of_members
 def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
-    """M_avg of glass of two widths on its thin and its dense side, over (root of sqrt(F0), sqrt(alpha_min / alpha_max),
-    sqrt(alpha_max)): the mean of M by `widths_along`."""
+    """M_avg of anisotropic glass on its less dense and denser side, over (root of sqrt(F0), sqrt(alpha_min /
+    alpha_max), sqrt(alpha_max)): the mean of M with `widths_along`."""
 
     def build() -> np.ndarray:
         tables = glass(ndf, masking, fresnel)
@@ -250,7 +250,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
         turns = (np.arange(8) + 0.5) / 8 * 0.5 * np.pi
         for phi, (e, t) in itertools.product(turns, enumerate(np.linspace(0.0, 1.0, GLASS_ETAS))):
             x2, y2 = (1.0 - mu**2) * np.cos(phi) ** 2, (1.0 - mu**2) * np.sin(phi) ** 2
-            both = _squares(x2, y2, mu, larger**2, smaller**2, t * t * LARGEST_ROOT)
+            both = _squares(x2, y2, mu, larger**2, smaller**2, t * t * MAX_ROOT)
             for n, (side, squares) in enumerate(zip(SIDES, both, strict=True)):
                 form, width = form_of(ndf, masking, side), np.sqrt(np.clip(squares, 1e-8, 1.0))
                 place = np.sqrt(width) * (GLASS_ROWS - 1)
@@ -277,7 +277,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 
 @cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """As `lobe`, over (the root of sqrt(F0), roughness, u), for either side."""
+    """`lobe` over (the root of sqrt(F0), roughness, u), for either side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
@@ -290,7 +290,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 
 def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.ndarray:
-    """mu^2 below which lie the shares 0 to 1 of M mu, for each row."""
+    """mu^2 at equal quantiles of the density M mu, for each row."""
     grid = np.linspace(0.0, 1.0, 2049)  # of mu^2, in which the density is M / M_avg
     density = evaluate(form, rows, bend, np.sqrt(np.maximum(grid, 1e-12))[None, :]) + 1e-9
     below = np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1)
@@ -341,7 +341,7 @@ def _weigh(factors: tuple[Array, ...], terms: tuple[Array, ...]) -> Array:
 def missing(form: Form, c: tuple[Array, ...], bend: Array, mu: Array) -> Array:
     """M(mu), not below 0.
 
-    found  from `coefficients`, the c_k first;  bend  `knee` at this width
+    c     from `coefficients`, the c_k first;  bend  `knee` at this width
     """
     ratio = descent(form, mu, bend)
     return _polynomial(c[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)

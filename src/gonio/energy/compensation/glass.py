@@ -1,15 +1,15 @@
-"""What rough glass misses, from both sides.
+"""The energy lost by single scattering in rough glass, from both sides.
 
-From side a a share T_a of what is missing goes to side b, the rest back to a (power, not radiance):
+From side a, a fraction T_a of the lost energy goes to side b, the rest back to a (power, not radiance):
 
     f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
 
-so that a's albedo is made whole whatever T_a is. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, asks for
-T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is met by
+so that a's albedo is completed for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
+T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is satisfied by
 T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
 
-Of two widths M is that of one which changes with the direction (`curves.widths_along`); the lobe is sampled as that of
-their mean.
+Anisotropic glass has the M of an isotropic width that depends on the direction (`curves.widths_along`); the lobe is
+sampled with the mean width.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from .reflecting import has_two_widths
 class Side(NamedTuple):
     """One side of the surface.
 
-    c         coefficients of M; of two widths, at their mean
-    bend      the cosine about which masking sets in
-    scale     1 / (pi M_avg) of that, 0 where nothing is missing
-    true_scale     1 / (pi M_avg) of M itself; the same with one width
-    through   T, the share of what is missing here that goes to the other side
+    c         coefficients of M; with two widths, at their mean
+    bend      the cosine at which masking sets in
+    scale     1 / (pi M_avg) of that polynomial, 0 if nothing is missing
+    true_scale     1 / (pi M_avg) of M itself; equal to `scale` with one width
+    through   T, the fraction of this side's lost energy that goes to the other side
     """
 
     c: tuple[Scalar, ...]
@@ -68,14 +68,14 @@ class TwoWidths(NamedTuple):
 
 
 class Glass(NamedTuple):
-    """Both sides; "thin" is that of the lower index.
+    """Both sides; "thin" is the less dense one.
 
     average  of M_avg over both sides
-    F_avg    the base's albedo: between them both lobes keep all but that
-    place    where the tables of the lobes' inverses are read: index, width
+    F_avg    the base's albedo; both lobes together preserve this fraction of the energy
+    place    coordinates in the tables of the lobes' inverses: index, width
     inside   index inside over index outside
     names    ndf, masking and Fresnel
-    two      of two widths that differ
+    two      the two widths if they differ
     """
 
     thin: Side
@@ -92,7 +92,7 @@ class Glass(NamedTuple):
         return 1.0
 
     def is_thin(self, w: Direction) -> Mask:
-        """Whether a direction lies on the side of the lower index."""
+        """Whether a direction lies on the less dense side."""
         below = w.z < 0.0
         return where(self.inside >= 1.0, ~below, below)
 
@@ -110,7 +110,7 @@ class Glass(NamedTuple):
         return self._missing(w, c, bends)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M of the width that stands for both: what is sampled."""
+        """M of the mean width, by which the lobe is sampled."""
         return self._missing(w, [self.thin.c, self.dense.c], [self.thin.bend, self.dense.bend])
 
     def _missing(self, w: Direction, coefficients: list[tuple[Scalar, ...]], bends: list[Scalar]) -> Scalar:
@@ -124,7 +124,7 @@ class Glass(NamedTuple):
         return where(self.is_thin(w), self.thin.true_scale, self.dense.true_scale)
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        """1 - T of wo's side in reflection, T in transmission; nothing leaves along the surface."""
+        """1 - T of wo's side in reflection, T in transmission; 0 along the surface."""
         sides = wo.z * wi.z
         through = self.through(wo)
         return where(sides != 0.0, where(sides > 0.0, 1.0 - through, through), 0.0)
@@ -142,12 +142,12 @@ class Glass(NamedTuple):
         return where(self.thin.scale > 0.0, self.of_mean_width(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg) of wi's side and the mean width, times the share of that side."""
+        """M(mu_i) mu_i / (pi M_avg) of wi's side and the mean width, times the fraction for that side."""
         scale = where(self.is_thin(wi), self.thin.scale, self.dense.scale)
         return self.of_mean_width(wi) * abs(wi.z) * scale * self.share(wo, wi)
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A side by u1, then a direction of that density."""
+        """A side by u1, then a direction with that density."""
         thin, passes = self.is_thin(wo), u.x < self.through(wo)
         tables = curves.glass_lobe(*self.names)
         at = inset(u.y, tables["thin"].shape[-1])
@@ -163,7 +163,7 @@ class Glass(NamedTuple):
 
 
 def glass(base: BSDF, surface: Microsurface) -> Glass:
-    """What a bound base that transmits misses."""
+    """The lost energy of a bound base that transmits."""
     index = surface.eta
     assert index is not None, "what transmits has an index"
     names = surface.ndf, surface.masking, surface.fresnel
@@ -172,7 +172,7 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     width = sqrt(0.5 * (sqr(alpha.x) + sqr(alpha.y))) if two else alpha.x
     eta = maximum(index, 1.0 / index)
     place = (
-        inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.LARGEST_ROOT)), curves.GLASS_ETAS),
+        inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.MAX_ROOT)), curves.GLASS_ETAS),
         inset(sqrt(width), curves.GLASS_ROWS),
     )
     tables = curves.glass(*names)

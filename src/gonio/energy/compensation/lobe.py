@@ -1,4 +1,4 @@
-"""The words that every account of missing energy speaks, and what the three have in common."""
+"""The interface of missing energy, and functions shared by its three implementations."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ... import ops
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, function, sincos, sqrt, vec3, where
 from ...ops.backend import Array
 
-NOTHING = 1e-5  # M_avg below this is all error of the fit: nothing is given back
+NOTHING = 1e-5  # smaller values of M_avg are errors of the fit and are not compensated
 
 
 class MissingEnergy(Protocol):
     """M(mu) = 1 - E(mu), E the directional albedo of a base at F = 1, and the broad lobe M(mu_i) mu_i that returns it.
 
     average  M_avg = 1 - E_avg = 2 int M mu dmu
-    F_avg    share of the light that one bounce keeps; colours accumulate by it
-    factor   what else stands before all light that leaves, once
+    F_avg    fraction of the light preserved by one bounce; colors become more saturated by it
+    factor   factor applied once to all light that leaves
     """
 
     @property
@@ -32,19 +32,19 @@ class MissingEnergy(Protocol):
         """M at a direction, from its own side of the surface."""
 
     def over_average(self, w: Direction) -> Scalar:
-        """1 / (pi M_avg) on w's side; 0 where nothing is missing."""
+        """1 / (pi M_avg) on w's side; 0 if nothing is missing."""
 
     def share(self, wo: Direction, wi: Direction) -> Scalar | float:
-        """The share of what is missing at wo that leaves on wi's side: all of it above a surface that only reflects."""
+        """The fraction of wo's lost energy that leaves on wi's side: all of it above a surface that only reflects."""
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> Scalar | float:
-        """(eta_o / eta_i)^2 where radiance passes to the other side, else 1."""
+        """(eta_o / eta_i)^2 for radiance that passes to the other side, else 1."""
 
     def given(self, wo: Direction) -> Scalar:
-        """M(mu_o) as the sampling of the lobe takes it: 0 where there is nothing to give back."""
+        """M(mu_o) as used for sampling the lobe: 0 if nothing is missing."""
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of `sample`: M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
+        """Density of `sample`: M(mu_i) mu_i / (pi M_avg) of wi's side, times the fraction for that side."""
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
         """A direction with that density."""
@@ -60,13 +60,13 @@ def above(wo: Direction, wi: Direction) -> Mask:
 
 @function
 def over_pi(average: Scalar) -> Scalar:
-    """1 / (pi M_avg), or 0 where nothing is missing."""
+    """1 / (pi M_avg), or 0 if nothing is missing."""
     some = average > NOTHING
     return where(some, ops.inv_pi / where(some, average, 1.0), 0.0)
 
 
 def from_square(mu2: Array, u: Scalar) -> Direction:
-    """The direction above the surface of squared cosine mu2 and azimuth 2 pi u."""
+    """The direction above the surface with squared cosine mu2 and azimuth 2 pi u."""
     mu2 = clamp(mu2, 1e-12, 1.0)
     sin_theta, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u)
     return vec3(sin_theta * c, sin_theta * s, sqrt(mu2))

@@ -1,15 +1,15 @@
-"""What any other base misses: E(mu) by drawing from its own `sample`, and the lobe that gives it back.
+"""The energy lost by any other base: E(mu) measured with its own `sample`, and the lobe that returns the difference.
 
-`KullaConty` takes any base that only reflects. What single scattering loses must be told from what the material absorbs
-by design, so E is that of the *white* base: F = 1, and 1 for every declared share (a spectrum whose range ends at 1,
-such as an albedo), in inner materials too. Then, over the colours,
+`KullaConty` accepts any base that only reflects. To separate the loss of single scattering from intended absorption, E
+is measured on the lossless variant of the base: F = 1, and 1 for every color that is a fraction of the light (a
+spectrum whose range ends at 1, such as an albedo), in inner materials too. Then, over the channels,
 
     M(mu) = 1 - max E_white(mu), at least 0,        F_avg = E_avg / max E_avg,white,
 
-so that F_avg is the colour with which one bounce leaves. A material that declares neither (Phong's kd and ks are
-factors, not shares) is its own white: what its brightest channel does not return counts as lost.
+so that F_avg is the color of light after one bounce. A material that declares neither (Phong's kd and ks are factors,
+not fractions) is its own lossless variant: the light that its brightest channel does not return counts as lost.
 
-Where a base returns more than it receives, nothing is missing and nothing is added: the gain stays the base's own.
+Where a base returns more than it receives, nothing is missing and nothing is added; the base's gain is not corrected.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from ...optics.lattice import r_sequence
 from ...optics.special import gauss
 from . import lobe
 
-# of M at equal steps of x, mu = sin^2(pi x / 2), linear between them: E bends like a root of mu at grazing, and, where
-# it depends on sin(theta) as Oren-Nayar's, like a root of 1 - mu at the normal
+# of M at equal steps of x, mu = sin^2(pi x / 2), linear between them: E behaves like a root of mu at grazing and, if it
+# depends on sin(theta) as Oren-Nayar's does, like a root of 1 - mu at the normal
 NODES = 65
-POINTS = 1 << 16  # drawn at each node. With both, furnaces of Phong and Oren-Nayar err by 1e-4, of mixes by 4e-4
+POINTS = 1 << 16  # samples per node. Furnace errors: 1e-4 for Phong and Oren-Nayar, 4e-4 for mixtures
 LOBE_NODES = 256  # as `curves.LOBE_NODES`
 SMALLEST_MU = 1e-4
 
@@ -54,10 +54,10 @@ class Measured(NamedTuple):
     """M at nodes, linear between them.
 
     missing  M at equal steps of x, mu = sin^2(pi x / 2)
-    inverse  mu^2 below which lie equal shares of M mu
-    scale    1 / (pi M_avg), 0 where nothing is missing
+    inverse  mu^2 at equal quantiles of the density M mu
+    scale    1 / (pi M_avg), 0 if nothing is missing
     average  M_avg
-    F_avg    the colour with which one bounce leaves
+    F_avg    the color of light after one bounce
     """
 
     missing: Scalar
@@ -93,7 +93,7 @@ class Measured(NamedTuple):
         return self.at(wi) * maximum(wi.z, 0.0) * self.scale
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
         return lobe.from_square(_read(self.inverse, u.y), u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
@@ -101,7 +101,7 @@ class Measured(NamedTuple):
 
 
 def measured(base: BSDF) -> Measured:
-    """What a bound base that only reflects misses, by measuring it and its white twin."""
+    """The lost energy of a bound base that only reflects, measured on it and its lossless variant."""
     base = _uniform(base)
     dr = backend.drjit()
     types = _types(base)
@@ -115,35 +115,35 @@ def measured(base: BSDF) -> Measured:
         inverse=types.float(_inverse(np.asarray(dr.detach(lost).numpy(), float))),
         scale=lobe.over_pi(average),
         average=average,
-        F_avg=clamp(mean_albedo / maximum(1.0 - average, 1e-6), 0.0, 1.0),  # a black base has none
+        F_avg=clamp(mean_albedo / maximum(1.0 - average, 1e-6), 0.0, 1.0),  # undefined for a black base
     )
 
 
 def _uniform(base: BSDF) -> BSDF:
-    """The bound base with one entry a value; raises where it cannot be measured: while it is recorded, inside a loop of
-    Dr.Jit's, or where its values differ from ray to ray."""
+    """The bound base with one entry per value. Raises an error if it cannot be measured: while it or a Dr.Jit loop is
+    recorded, or if its values vary from ray to ray."""
     _check_computed(*binding.values(base))
     dr = backend.drjit()
     name = type(base).__name__
-    hint = "give numbers and plain colours; a Conductor or a Dielectric inside takes textures and arrays"
+    hint = "give numbers and plain colors; a Conductor or a Dielectric inside accepts textures and arrays"
 
     def one(parameter: Parameter, value: Array) -> object:
         if value is None or dr.width(value) == 1:
             return value
         parts = list(value) if dr.is_vector_v(value) else [value]
         if any(not bool(dr.all(p == dr.gather(type(p), p, 0))[0]) for p in map(dr.detach, parts)):
-            what = f"{name}.{parameter.name} varies, yet its energy is measured once"
+            what = f"{name}.{parameter.name} varies, but its energy is measured once"
             raise InputError(what, "KullaConty.base", hint)
         return type(value)(*map(dr.mean, parts))
 
     if dr.flag(dr.JitFlag.SymbolicScope):
-        raise InputError(f"{name} has values that vary, yet its energy is measured once", "KullaConty.base", hint)
+        raise InputError(f"{name} has values that vary, but its energy is measured once", "KullaConty.base", hint)
     return binding.bind(base, one)
 
 
 def _check_computed(*values: object) -> None:
     if any(isinstance(value, Node) for value in values):
-        what = "a base whose energy is found by sampling cannot be recorded"
+        what = "a base whose energy is measured by sampling cannot be recorded"
         raise RecordingError(what, "KullaConty.base", "a Conductor or a Dielectric can")
 
 
@@ -154,10 +154,10 @@ def _types(base: BSDF) -> backend.Types:
 
 
 def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array]:
-    """E of the white base and of the base itself at each node, the mean over azimuth: spectra with NODES entries.
+    """E of the lossless base and of the base itself at each node, averaged over azimuth: spectra with NODES entries.
 
-    Directions come from `sample` with the same POINTS of a lattice at every node:
-    the error is smooth in mu. They and their density are held fixed where the values are differentiated.
+    Directions come from `sample` with the same POINTS of a lattice at every node, so the error is smooth in mu.
+    Directions and densities are held fixed where the values are differentiated.
     """
     dr = backend.drjit()
     UInt = kind.module.UInt32
@@ -195,7 +195,7 @@ def _averaging() -> np.ndarray:
 
 
 def _inverse(lost: np.ndarray) -> np.ndarray:
-    """mu^2 below which lie the shares 0 to 1 of M mu."""
+    """mu^2 at equal quantiles of the density M mu."""
     grid = np.linspace(0.0, 1.0, 4097)  # of mu^2, in which the density is M / M_avg
     x = np.arcsin(grid**0.25) * (2.0 / PI)
     density = np.interp(x, np.linspace(0.0, 1.0, NODES), lost) + 1e-9
@@ -204,7 +204,7 @@ def _inverse(lost: np.ndarray) -> np.ndarray:
 
 
 def _read(table: Array, x: Array) -> Array:
-    """A derived array with nodes at both ends of [0, 1], linear between them."""
+    """A derived array with nodes at both ends of [0, 1], interpolated linearly."""
     dr = backend.drjit()
     kind = backend.types_like(type(x))
     last = dr.width(table) - 1

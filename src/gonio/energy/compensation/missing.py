@@ -1,4 +1,4 @@
-"""Which account of missing energy a base has, and which bases can be compensated."""
+"""The missing energy of a base, and the check whether a base can be compensated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .reflecting import reflecting
 
 
 def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
-    """What single scattering in a bound base misses; `average` as `BSDF.mean_reflectance` takes it."""
+    """The energy lost by single scattering in a bound base; `average` as for `BSDF.mean_reflectance`."""
     surface = base.microsurface
     if surface is None:
         return measured(base)
@@ -19,10 +19,10 @@ def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
 
 
 def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = False) -> None:
-    """Raise InputError where a base cannot be compensated.
+    """Raise InputError if a base cannot be compensated.
 
     transmitting  whether a microsurface may transmit
-    any_base      whether bases that are no microsurface are taken: any that reflects by a finite lobe
+    any_base      whether bases other than microsurfaces are accepted: any that reflects by a finite lobe
     """
     name = type(base).__name__
     if base.microsurface is not None:
@@ -39,8 +39,8 @@ def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = F
     if base.delta != "never" or base.stochastic:
         why = "has a perfectly specular part" if base.delta != "never" else "is random"
         raise InputError(f"{name} {why}, a material with a finite lobe expected", location, hint)
-    if base.needs_uniform:  # each measurement would ask the one inside it at every point: seconds, then minutes
-        what = f"{name} holds a base whose energy is measured; it can be measured in one material, not again around it"
+    if base.needs_uniform:  # nested measurements would take minutes
+        what = f"{name} contains a base whose energy is measured; measurements cannot be nested"
         raise InputError(what, location, hint)
     if not base.isotropic:
-        raise InputError(f"{name} has two widths inside, one expected", location, hint)
+        raise InputError(f"{name} contains two widths, one expected", location, hint)

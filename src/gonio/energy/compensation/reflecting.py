@@ -1,4 +1,4 @@
-"""What a microfacet surface that only reflects misses: metals, and glass without transmission."""
+"""The energy lost by a microfacet surface that only reflects: metals, and glass without transmission."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from . import curves, lobe
 
 
 class Reflecting(NamedTuple):
-    """M as a polynomial of Bernstein a width; see `curves`.
+    """M as one Bernstein polynomial per width; see `curves`.
 
-    c             its coefficients; of two widths, at the width that stands for both
-    bend          the cosine about which masking sets in
-    scale         1 / (pi M_avg) of that polynomial: of the lobe that is sampled
-    true_scale         1 / (pi M_avg) of M itself; the same with one width
+    c             its coefficients; with two widths, at their mean width
+    bend          the cosine at which masking sets in
+    scale         1 / (pi M_avg) of that polynomial, i.e. of the sampled lobe
+    true_scale         1 / (pi M_avg) of M itself; equal to `scale` with one width
     average       M_avg
     F_avg         mean reflectance
     factor        the base's albedo
-    row           where the table of the lobe's inverse is read
-    two           of two widths that differ: `TwoWidths`
+    row           coordinate in the table of the lobe's inverse
+    two           `TwoWidths` if the widths differ
     ndf, masking  by name
     """
 
@@ -49,7 +49,7 @@ class Reflecting(NamedTuple):
         return self.two.at(w, self.ndf, self.masking)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M at a direction above the surface, of the width that stands for both: what is sampled."""
+        """M at a direction above the surface at the mean width, by which the lobe is sampled."""
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
@@ -65,11 +65,11 @@ class Reflecting(NamedTuple):
         return where((self.scale > 0.0) & (wo.z > 0.0), self.of_mean_width(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg); of the mean of two widths."""
+        """M(mu_i) mu_i / (pi M_avg), at the mean of two widths."""
         return self.of_mean_width(wi) * maximum(wi.z, 0.0) * self.scale
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
         (mu2,) = lookup(curves.lobe(self.ndf, self.masking), self.row, inset(u.y, curves.LOBE_NODES))
         return lobe.from_square(mu2, u.z)
 
@@ -78,7 +78,7 @@ class Reflecting(NamedTuple):
 
 
 class TwoWidths(NamedTuple):
-    """M of two widths, which depends on azimuth; see `curves.anisotropic`.
+    """M for two widths, which depends on azimuth; see `curves.anisotropic`.
 
     c_phi     coefficients in azimuth of each coefficient of M
     alpha     the widths
@@ -98,7 +98,7 @@ class TwoWidths(NamedTuple):
 
 
 def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
-    """What a bound base misses; `average` as `BSDF.mean_reflectance` takes it."""
+    """The lost energy of a bound base; `average` as for `BSDF.mean_reflectance`."""
     names = surface.ndf, surface.masking
     alpha, _ = widths(surface.alpha)
     two = has_two_widths(base.plain)
@@ -106,29 +106,29 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     *c, mean = curves.coefficients(*names, width)
     mean = maximum(mean, 0.0)
     F_avg: Array = base.mean_reflectance(average)
-    two_widths, true_mean = None, mean
+    anisotropic, true_mean = None, mean
     if two:
         larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
         place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
-        two_widths, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
+        anisotropic, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
     return Reflecting(
         c=tuple(c),
         bend=knee(form_of(*names), surface.masking, width),
         scale=(scale := lobe.over_pi(mean)),
-        true_scale=scale if two_widths is None else lobe.over_pi(true_mean),
+        true_scale=scale if anisotropic is None else lobe.over_pi(true_mean),
         average=true_mean,
         F_avg=F_avg,
         factor=surface.albedo,
         row=inset(sqrt(width), curves.ROWS),
-        two=two_widths,
+        two=anisotropic,
         ndf=surface.ndf,
         masking=surface.masking,
     )
 
 
 def has_two_widths(base: BSDF) -> bool:
-    """Whether a base, as it was made, has or may have two widths that differ; it shapes the code."""
+    """Whether an unbound base has or may have two different widths; it shapes the code."""
     surface = base.microsurface
     if surface is None:
         return False
@@ -139,7 +139,7 @@ def has_two_widths(base: BSDF) -> bool:
 
 
 class Azimuth(NamedTuple):
-    """Where a direction stands between the axes of the larger and the smaller width, and the width it sees."""
+    """The position of a direction between the axes of the larger and smaller width, and the width along it."""
 
     along: Scalar
     across: Scalar
@@ -148,7 +148,7 @@ class Azimuth(NamedTuple):
 
 @function
 def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
-    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi seen along w; at the normal itself any azimuth will do."""
+    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; at the normal the azimuth is arbitrary."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
     width = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))

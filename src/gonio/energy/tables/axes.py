@@ -1,12 +1,12 @@
-"""The axes of baked tables: where each node of each layout stands.
+"""The axes of baked tables: the position of each node in each layout.
 
-    linear     nodes at texel centres, (j + 1/2) / N of roughness, mu and, with two widths, phi over a quarter turn:
-               what shaders and the homework use
+    linear     nodes at texel centers, (j + 1/2) / N of roughness, mu and, with two widths, phi over a quarter turn:
+               the layout of shaders and the homework
     stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), see `stretch`, in which E is
-               smooth: bilinear interpolation then errs by a hundredth of what it does on a linear axis
+               smooth: the error of bilinear interpolation is a hundredth of that on a linear axis
 
 Two widths: the larger is roughness^2, and their ratio is the table's. E is even in phi about both axes of the surface,
-so a quarter turn is all, and a mirrored edge is exact.
+so a quarter turn suffices, and mirroring at its ends is exact.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LAYOUTS = ("linear", "stretched")
 
 
 class Points(NamedTuple):
-    """Where E is asked for, as `quadrature.moments` takes it."""
+    """Points at which E is evaluated, in the form of `quadrature.moments`."""
 
     mu: np.ndarray
     alpha: np.ndarray
@@ -39,7 +39,7 @@ class Axes:
 
     size      nodes of roughness and of mu
     aspect    alpha_y / alpha_x
-    azimuths  nodes of phi; 0 where there is one width and no such axis
+    azimuths  nodes of phi; 0 for one width, without such an axis
     """
 
     layout: str
@@ -60,7 +60,7 @@ class Axes:
         return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
 
     def at(self, *index: Any) -> Points:
-        """The points at indices, whole or between nodes, one array an axis; they broadcast."""
+        """The points at indices, integers or between nodes, one array per axis; they broadcast."""
         roughness = self.roughness(index[-2])
         if not self.azimuths:
             mu, alpha = np.broadcast_arrays(self.mu(index[-1], roughness), roughness**2)
@@ -82,7 +82,7 @@ class Axes:
         return turn if self.layout == "linear" else np.arctan2(np.sin(turn), self.aspect * np.cos(turn))
 
     def mu(self, index: Any, roughness: Any, phi: Any = 0.0) -> np.ndarray:
-        """Cosine at an index, of a row and slice."""
+        """Cosine at an index, for a row and slice."""
         x = self._unit(index, self.size)
         if self.layout == "linear":
             return x + 0.0 * roughness + 0.0 * phi
@@ -95,7 +95,7 @@ class Axes:
         return alpha * min(1.0, 1.0 / self.aspect), alpha * min(1.0, self.aspect)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The nodes of each axis by name; mu by row (and slice) where it is stretched."""
+        """The nodes of each axis by name; mu per row (and slice) in the stretched layout."""
         index = np.ix_(*map(np.arange, self.shape))
         nodes = self.at(*index)
         mu = nodes.mu if self.layout == "stretched" else nodes.mu[(0,) * (len(self.shape) - 1)]
@@ -103,7 +103,7 @@ class Axes:
         return {**ends, "phi": self.phi(np.arange(self.azimuths))} if self.azimuths else ends
 
     def texts(self) -> dict[str, str]:
-        """What a person needs to find a node again."""
+        """Descriptions of the axes for readers of a table."""
         if self.layout == "linear":
             text = {"roughness": "row j at (j + 1/2) / N", "mu": "column j at (j + 1/2) / N"}
             return {**text, "phi": "slice j at (j + 1/2) / N of 90 degrees from x"} if self.azimuths else text
@@ -121,7 +121,7 @@ class Axes:
 
 
 def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
-    """How the stretched axis bends mu into s, and the same in words."""
+    """The transform of mu into s on the stretched axis, and its description."""
     if not term(masking).smith:
         return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
     if distribution(ndf).falls_slowly:
@@ -130,7 +130,7 @@ def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
 
 
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The cosine at a place x in [0, 1] of the stretched axis of a width."""
+    """The cosine at a position x in [0, 1] of the stretched axis for a width."""
     form, _ = stretch(ndf, masking)
     knee = bend.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
     return bend.cosine(form, x, knee)

@@ -1,16 +1,15 @@
-"""Tables of E, E_avg, the split sum and rough glass as arrays with a manifest: what `gonio bake` writes.
+"""Tables of E, E_avg, the split sum and rough glass as arrays with a manifest, as written by `gonio bake`.
 
     baked = bake("ggx", masking="smith-separable", size=128)
     baked.arrays["E"]            # [roughness, mu]
     baked.manifest["error"]      # {"E": {"max": ..., "rms": ..., "interpolation": ...}, ...}
     bake("ggx", aspect=0.25)     # two widths: E[phi, roughness, mu]
 
-The axes are in `axes`, files and the homework's pictures in `baked`.
+The axes are defined in `axes`, files and the homework's pictures in `baked`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Callable
 from itertools import product
@@ -22,16 +21,16 @@ import numpy as np
 from ...errors import GonioWarning, InputError, did_you_mean
 from ...material import BSDF
 from ...material.parameters import pair_of
-from ...ops import backend
 from ...optics.ndf import distribution
-from ...work import crew, parts
+from ...work import parts
 from .. import cache
 from ..albedo import albedo, monte_carlo, quadrature
 from ..albedo.directional import check_uniform
 from ..cache import content_hash
 from . import baked
-from .axes import LAYOUTS, Axes, Points
+from .axes import LAYOUTS, Axes
 from .baked import Baked
+from .target import BLOCK, Target, blocks, describe, glass_power, together
 
 LUTS = {
     "E": "directional albedo with F = 1, or the model's own [phi,] [roughness, mu]",
@@ -41,105 +40,11 @@ LUTS = {
 }
 NAMES = {"E": ("E",), "Eavg": ("E_avg",), "dfg": ("dfg",), "glass": ("E_glass_thin", "E_glass_dense")}
 MAX_SIZE = 4096
-AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: linear between them errs by 1.2e-3
+AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: the error of linear interpolation is 1.2e-3
 LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
-LARGEST_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) of eta = 5
+MAX_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) for eta = 5
 SCHEMA = 2
-BLOCK = 1024  # points of a part: a tenth of a second or so, and a second where they are judged
-
-
-@dataclasses.dataclass(frozen=True)
-class _Target:
-    """What is baked over roughness: a distribution at F = 1 (model None), or a Conductor or Dielectric."""
-
-    model: Any
-    ndf: str
-    masking: str
-
-    def exact(self, points: Points, fine: bool = False) -> dict[str, np.ndarray]:
-        """E, and dfg of a distribution, by quadrature; `fine` judges the other. Done in parts."""
-        shape = np.shape(points.mu)
-        given = [np.broadcast_to(v, shape).ravel() if v is not None else None for v in points]
-        arguments = [(self, *(v if v is None else v[at : at + BLOCK] for v in given), fine) for at in _blocks(shape)]
-        tables = _together(_exact, arguments)
-        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in tables.items()}
-
-    def at(self, points: Points, fine: bool) -> dict[str, np.ndarray]:
-        """As `exact`, all at once."""
-        shape = {"mu": points.mu, "alpha": points.alpha, "alpha_y": points.alpha_y, "phi": points.phi}
-        judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
-        nodes = judge if fine else None
-        if self.model is None:
-            moments = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
-            return {"E": moments.white, "dfg": np.stack([moments.white - moments.schlick, moments.schlick], -1)}
-        surface = self.model.microsurface
-        if surface.eta is None:
-            reflectance = self.model.bind(backend.types("float64")).reflectance
-            return {"E": quadrature.reflected(self.ndf, self.masking, reflectance, **shape, nodes=nodes)}
-        glass_nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-        eta, fresnel = float(surface.eta), surface.fresnel
-        power = quadrature.glass(self.ndf, self.masking, fresnel, eta=eta, nodes=glass_nodes, **shape)
-        total = power.reflected + (power.transmitted if surface.transmits else 0.0)
-        return {"E": total[..., None] * np.broadcast_to(np.asarray(surface.albedo, float), 3)}
-
-    @property
-    def conducts(self) -> bool:
-        """Whether it is a metal: what does not has an index to sweep."""
-        return self.model is not None and self.model.microsurface.eta is None
-
-    def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:
-        """E_avg at rows of roughness: Gauss-Legendre in sqrt(mu), and even steps of azimuth over a quarter turn."""
-        x, w = quadrature.gauss(48 if fine else 32)
-        roughness = axes.roughness(rows)
-        if not axes.azimuths:
-            mu, alpha = np.broadcast_arrays(x**2, roughness[:, None] ** 2)
-            return np.einsum("rm...,m->r...", self.exact(Points(mu, alpha, None, 0.0), fine)["E"], 4.0 * w * x**3)
-        # steps of the azimuth halfway between that of directions and that of their slopes: neither end is left out
-        turn = (np.arange(count := 48 if fine else 24) + 0.5) / count * 0.5 * np.pi
-        k = np.sqrt(axes.aspect)
-        phi = np.arctan2(np.sin(turn), k * np.cos(turn))[:, None, None]
-        share = k / (np.sin(turn) ** 2 + (k * np.cos(turn)) ** 2) / count
-        along_x, along_y = axes.widths(roughness[:, None])
-        values = self.exact(Points(*np.broadcast_arrays(x**2, along_x, along_y, phi)), fine)["E"]
-        return np.einsum("prm...,m,p->r...", values, 4.0 * w * x**3, share)
-
-
-def _blocks(shape: tuple[int, ...]) -> range:
-    """Where the parts of so many points begin."""
-    return range(0, int(np.prod(shape)), BLOCK)
-
-
-def _exact(
-    asked: _Target, mu: np.ndarray, alpha: np.ndarray, alpha_y: np.ndarray | None, phi: np.ndarray, fine: bool
-) -> dict[str, np.ndarray]:
-    """A part of `_Target.exact`."""
-    return asked.at(Points(mu, alpha, alpha_y, phi), fine)
-
-
-def _power(
-    ndf: str, masking: str, fresnel: str, mu: np.ndarray, alpha: np.ndarray, eta: np.ndarray, fine: bool
-) -> dict[str, np.ndarray]:
-    """A part of `_glass`: reflected and transmitted power."""
-    nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-    return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, mu, alpha, eta, nodes=nodes), -1)}
-
-
-def _together(function: crew.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
-    """The results of parts, one behind the other."""
-    keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
-    done = {index: values for index, values in crew.each(function, arguments, keys) if index >= 0}
-    return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
-
-
-def _content(value: object) -> object:
-    if isinstance(value, np.ndarray):
-        return value.tobytes()
-    if isinstance(value, _Target):
-        names = (value.ndf, value.masking) + (value.model.microsurface[2:3] if value.model is not None else ())
-        model = None if value.model is None else _describe(value.model)
-        return repr((model, value.ndf, value.masking, cache.origin(*names)))
-    return value
 
 
 def bake(
@@ -157,22 +62,22 @@ def bake(
 ) -> Baked:
     """Tables of a distribution by name (F = 1), or of a material.
 
-    target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis. A Dielectric is seen from
-             outside. Of any other material E[mu] and E_avg as it stands
-    lut      which tables; None is E and Eavg, and dfg of a distribution
+    target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis; a Dielectric from outside.
+             For any other material E[mu] and E_avg with its own parameters
+    lut      the tables; None is E and Eavg, and dfg of a distribution
     method   "quadrature", "cosine", the distribution's name or "visible"; E_avg of a sampled table is integrated from
              its rows
-    masking  of a distribution, smith-correlated if not given; a model brings its own
+    masking  for a distribution, by default smith-correlated; a material has its own
     aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1 it adds the axis phi, a
-             quarter turn from x. A model brings its own, the ratio of its two widths; its rotation is left out
-    Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and what the target does not have.
+             quarter turn from x. A material has its own, the ratio of its two widths; its rotation is ignored
+    Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and tables that the target does not have.
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
     _check(lut, size, spp, points, layout)
     for name, given in (("masking", masking), ("aspect", aspect)):
         if material and given is not None:
-            raise InputError(f"{name} of a material given", f"--{name}", "a material brings its own, by its parameters")
+            raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
     if isinstance(target, BSDF) and target.microsurface is None:
         return _any_material(target, lut, size, method, layout)
     asked, axes = _resolved(target, masking, layout, size, aspect, azimuths)
@@ -198,32 +103,36 @@ def bake(
         arrays.update(glass)
         errors.update(figures)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
-    manifest = {
-        "target": _describe(target),
-        "ndf": asked.ndf,
-        "masking": asked.masking,
-        "method": method,
-        **({} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}),
-        "size": size,
-        "layout": layout,
-        "alpha": "roughness^2" + (", the larger of both" if axes.azimuths else ""),
-        **({"aspect": axes.aspect} if axes.azimuths else {}),
-        "axes": text,
-    }
+    sampling = {} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}
+    manifest = {"target": describe(target), **_described(asked, axes, method, sampling), "axes": text}
     return _sealed(arrays, nodes, dims, errors, manifest)
 
 
-def cached(target: str | BSDF, **options: Any) -> Baked:
-    """As `bake`, kept in the user's cache folder (`gonio.energy.cache`): what was baked before is only read.
+def _described(asked: Target, axes: Axes, method: str, sampling: dict[str, object]) -> dict[str, object]:
+    """The manifest's account of the target, the method and the axes."""
+    return {
+        "ndf": asked.ndf,
+        "masking": asked.masking,
+        "method": method,
+        **sampling,
+        "size": axes.size,
+        "layout": axes.layout,
+        "alpha": "roughness^2" + (", the larger of both" if axes.azimuths else ""),
+        **({"aspect": axes.aspect} if axes.azimuths else {}),
+    }
 
-    Kept are distributions and microsurfaces of Gonio's own; the formulas of other materials may stand anywhere.
+
+def cached(target: str | BSDF, **options: Any) -> Baked:
+    """`bake`, cached in the user's cache folder (`gonio.energy.cache`).
+
+    Only distributions and microsurfaces of Gonio are cached; the formulas of other materials may be in any file.
     """
     if isinstance(target, BSDF) and not tabulated(target):
         return bake(target, **options)
     widths_of = None if isinstance(target, str) else _aspect(target, 1.0)
     surface = None if isinstance(target, str) else target.microsurface
     names = (target, options.get("masking") or "smith-correlated") if surface is None else surface[:3]
-    key = ("baked", _describe(target), widths_of, cache.origin(*names), sorted(options.items()))
+    key = ("baked", describe(target), widths_of, cache.origin(*names), sorted(options.items()))
     text = repr(key)
 
     def write(made: Baked) -> bytes:
@@ -232,13 +141,13 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
     def read(path: Path) -> Baked:
         existing = baked.read(path)
         if existing.manifest.pop("asked", None) != text:
-            raise ValueError("not what was asked for")
+            raise ValueError("not the requested table")
         return existing
 
     def made() -> Baked:
         with parts.job("bake", text, cache.formulas()) as job:
             if job.found:
-                notice = f"goes on with a table that was begun: {job.found} parts of it are done"
+                notice = f"continues an unfinished table: {job.found} of its parts are done"
                 warnings.warn(notice, GonioWarning, stacklevel=5)
             return bake(target, **options)
 
@@ -261,36 +170,36 @@ def _sealed(
 
 
 def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, layout: str) -> None:
-    """Raise InputError for what no target has."""
+    """Raise InputError for options that no target supports."""
     for name in lut:
         if name not in LUTS:
             raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
     if not 1 <= size <= MAX_SIZE:
-        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {MAX_SIZE}")
+        raise InputError(f"a table of {size} x {size} asked for", "--resolution", f"give 1 to {MAX_SIZE}")
     if spp < 1:
-        raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
+        raise InputError(f"{spp} samples asked for", "--samples", "give 1 or more")
     if points not in monte_carlo.POINTS:
-        raise InputError(f"unknown points '{points}'", "--points", did_you_mean(points, list(monte_carlo.POINTS)))
+        raise InputError(f"unknown points '{points}'", "--sampler", did_you_mean(points, list(monte_carlo.POINTS)))
 
 
 def _resolved(
     target: str | BSDF, masking: str | None, layout: str, size: int, aspect: float | None, azimuths: int
-) -> tuple[_Target, Axes]:
-    """What is baked, over which axes."""
+) -> tuple[Target, Axes]:
+    """The target and its axes."""
     model = None if isinstance(target, str) else target
     surface = None if model is None else model.microsurface
     ndf = distribution(str(target) if surface is None else surface.ndf).name
     masking = quadrature.known_masking(masking or "smith-correlated" if surface is None else surface.masking)
     aspect = _aspect(model, 1.0 if aspect is None else aspect)
     if aspect != 1.0 and not 1 <= azimuths <= MAX_SIZE:
-        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {MAX_SIZE}")
-    return _Target(model, ndf, masking), Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
+        raise InputError(f"{azimuths} azimuths given", "--azimuths", f"give 1 to {MAX_SIZE}")
+    return Target(model, ndf, masking), Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
 
 
-def _check_target(asked: _Target, axes: Axes, lut: tuple[str, ...] | list[str], method: str) -> None:
-    """Raise InputError for what this target does not have."""
+def _check_target(asked: Target, axes: Axes, lut: tuple[str, ...] | list[str], method: str) -> None:
+    """Raise InputError for options that this target does not support."""
     kind = type(asked.model).__name__
     known = ["quadrature", *monte_carlo.methods(asked.ndf)]
     if method not in known:
@@ -298,15 +207,15 @@ def _check_target(asked: _Target, axes: Axes, lut: tuple[str, ...] | list[str], 
     if method != "quadrature" and asked.model is not None:
         raise InputError(f"{kind} by '{method}'", "--method", "a model is baked by quadrature: leave --method out")
     if "dfg" in lut and asked.model is not None:
-        hint = "bake its distribution, such as ggx: it is for any F0"
-        raise InputError("split sum of a material asked for", "--lut", hint)
+        hint = "bake its distribution, such as ggx: that table serves any F0"
+        raise InputError("split sum requested for a material", "--lut", hint)
     if "glass" in lut and (axes.azimuths or asked.conducts):
-        what = "glass with two widths asked for" if axes.azimuths else f"glass of a {kind} asked for"
-        raise InputError(what, "--lut", "this table is of a distribution or a Dielectric, with one width")
+        what = "glass with two widths requested" if axes.azimuths else f"glass requested for a {kind}"
+        raise InputError(what, "--lut", "this table exists for a distribution or a Dielectric, with one width")
 
 
 def _aspect(model: Any, given: float) -> float:
-    """alpha_y / alpha_x as given, or of a model's widths."""
+    """alpha_y / alpha_x as given, or from a material's widths."""
     if model is not None:
         check_uniform(model)
         x, y = map(float, pair_of(model.microsurface.alpha))
@@ -322,11 +231,11 @@ def _figures(difference: np.ndarray) -> dict[str, float]:
 
 
 def _directional(
-    asked: _Target, axes: Axes, method: str, spp: int, points: str, seed: int
+    asked: Target, axes: Axes, method: str, spp: int, points: str, seed: int
 ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
     exact = asked.exact(axes.nodes())
     if method == "quadrature":
-        # judged at the columns where it is hardest, next to grazing and next to the normal, and at every fourth
+        # compared at the most difficult columns, next to grazing and next to the normal, and at every fourth
         n = axes.size
         some = np.unique(np.concatenate([np.arange(min(4, n)), np.arange(0, n, 4), [n - 1]]))
         slices = [np.arange(0, axes.azimuths, 5)] if axes.azimuths else []
@@ -340,8 +249,8 @@ def _directional(
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 
-def _averaged(asked: _Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np.ndarray, dict[str, float]]:
-    """E_avg and its error: the quadrature judged by a finer one, or what was sampled judged by the quadrature."""
+def _averaged(asked: Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np.ndarray, dict[str, float]]:
+    """E_avg and its error: the quadrature compared with a finer one, or sampled values compared with the quadrature."""
     rows = np.arange(axes.size)
     exact = asked.average(axes, rows)
     if sampled is not None:
@@ -351,7 +260,7 @@ def _averaged(asked: _Target, axes: Axes, sampled: np.ndarray | None) -> tuple[n
 
 
 def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
-    """E_avg of a table as its nodes have it: each stands for the stretch halfway to its neighbours."""
+    """E_avg of a table from its nodes: each represents the interval halfway to its neighbors."""
     nodes = axes.nodes()
     weight = 2.0 * nodes.mu * (np.gradient(nodes.mu, axis=-1) if axes.size > 1 else 1.0)
     if axes.azimuths > 1:
@@ -361,9 +270,9 @@ def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
 
 
 def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> float:
-    """Largest error of linear interpolation for roughness >= 0.1: at the middles of cells and of their edges.
+    """Largest error of linear interpolation for roughness >= 0.1: at the midpoints of cells and of their edges.
 
-    value  E at indices, whole or half
+    value  E at indices, integers or halves
     extra  nodes of an axis before those of `axes`
     """
     shape = (*([extra] if extra else []), *axes.shape)
@@ -374,7 +283,7 @@ def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> fl
     rows = rows[:: max(1, len(rows) // (8 if deep else 24))]
     last = axes.size - 1
     count = 48 if deep else 128
-    # columns crowd toward grazing, where E bends most
+    # columns are denser toward grazing, where E varies most
     columns = np.arange(last) if last < count else np.unique(np.geomspace(1, last, count).astype(int) - 1)
     cells = [np.arange(max(n - 1, 1)) for n in shape[:-2]] + [rows, columns]
     free = [n > 1 for n in shape]
@@ -399,7 +308,7 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
     """Both sides over (sqrt_f0, roughness, mu): reflected and transmitted power; their sum is E."""
 
     def root(index: Any) -> Any:
-        return (index + 0.5) / GLASS_STEPS * LARGEST_ROOT
+        return (index + 0.5) / GLASS_STEPS * MAX_ROOT
 
     def power(dense: bool, fine: bool, step: Any, *index: Any) -> np.ndarray:
         at = axes.at(*index)
@@ -407,8 +316,8 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
         given = np.broadcast_arrays(at.mu, at.alpha, 1.0 / eta if dense else eta)
         shape, flat = given[0].shape, [values.ravel() for values in given]
         names = (axes.ndf, axes.masking, fresnel)
-        arguments = [(*names, *(values[at : at + BLOCK] for values in flat), fine) for at in _blocks(shape)]
-        return _together(_power, arguments)["power"].reshape(*shape, 2)
+        arguments = [(*names, *(values[at : at + BLOCK] for values in flat), fine) for at in blocks(shape)]
+        return together(glass_power, arguments)["power"].reshape(*shape, 2)
 
     arrays: dict[str, np.ndarray] = {"sqrt_f0": root(np.arange(GLASS_STEPS))}
     errors = {}
@@ -427,11 +336,11 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
 
 
 def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, method: str, layout: str) -> Baked:
-    """E[mu] and E_avg of a material without a roughness of its own, from above, by `gonio.energy.albedo`."""
+    """E[mu] and E_avg of a material without a roughness axis, from above, by `gonio.energy.albedo`."""
     kind = type(model).__name__
     if set(lut) - {"E", "Eavg"}:
         wrong = next(name for name in lut if name not in ("E", "Eavg"))
-        raise InputError(f"table '{wrong}' of {kind}", "--lut", "of this material E and Eavg: --lut E,Eavg")
+        raise InputError(f"table '{wrong}' of {kind}", "--lut", "this material has E and Eavg: --lut E,Eavg")
     if layout != "linear" or method != "quadrature":
         raise InputError(f"{kind} by {method}, {layout}", "bake", "this material is baked by quadrature, linear in mu")
     mu = (np.arange(size) + 0.5) / size
@@ -445,7 +354,7 @@ def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, meth
         arrays["E_avg"] = 4.0 * (w * x**3) @ value.value
         errors["E_avg"] = _figures(4.0 * (w * x**3) @ value.error)
     manifest = {
-        "target": _describe(model),
+        "target": describe(model),
         "ndf": getattr(model, "name", kind),
         "masking": "",
         "method": method,
@@ -456,21 +365,7 @@ def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, meth
     return _sealed(arrays, {"mu": mu}, dims, errors, manifest)
 
 
-def _describe(target: Any) -> Any:
-    """A target as the manifest names it; a width that is an axis is left out."""
-    if isinstance(target, str):
-        return target
-    surface = target.microsurface
-    swept = ("alpha", "rotation", "sampling") if surface is not None else ()
-    described: dict[str, Any] = {"model": target.name}
-    for name, parameter in target.parameters().items():
-        if name not in swept:
-            value = getattr(target, name)
-            described[name] = _describe(value) if parameter.inner else np.asarray(value).tolist()
-    return described
-
-
 def tabulated(model: BSDF) -> bool:
-    """Whether tables of a material are kept between runs: of a microsurface of Gonio's own; the formulas of others may
-    stand in any file and change."""
+    """Whether tables of a material are cached between runs: only those of Gonio's microsurfaces, since the formulas of
+    others may be in any file."""
     return model.microsurface is not None and type(model).__module__.startswith("gonio.")

@@ -1,5 +1,4 @@
-"""Baked tables as one thing: arrays with the manifest that describes them, to and from a file, and as the homework's
-pictures."""
+"""Baked tables: arrays with a manifest that describes them, their file, and the homework's pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ class Baked:
         return _html.table(rows(self.manifest), headings(self.manifest), title(self.manifest))
 
     def npz(self) -> bytes:
-        """tables.npz, the manifest and its hash inside it; the same bytes for the same content."""
+        """tables.npz, with the manifest and its hash inside; equal content gives equal bytes."""
         text = json.dumps(self.manifest)
         texts = {"manifest": np.array(text), "seal": np.array(_seal(text))}
         stream = io.BytesIO()
@@ -44,7 +43,7 @@ class Baked:
 
 
 def headings(manifest: Mapping[str, Any]) -> tuple[str, ...]:
-    """Of the columns that `rows` has."""
+    """The headings of the columns of `rows`."""
     return ("table", "shape", "max error", "rms", "between", *_more(manifest))
 
 
@@ -54,14 +53,14 @@ def _more(manifest: Mapping[str, Any]) -> list[str]:
 
 
 def title(manifest: Mapping[str, Any]) -> str:
-    """What was baked and how, in a line."""
+    """A one-line description of the tables and the method."""
     facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
     facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
     return ", ".join(filter(None, facts))
 
 
 def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Of each table its name, its shape along named axes and its errors, as `headings` calls them."""
+    """For each table its name, its shape along named axes and its errors, in the columns of `headings`."""
     tables, more = [], _more(manifest)
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
@@ -77,24 +76,25 @@ def _seal(text: str) -> str:
 
 
 def read(path: Path) -> Baked:
-    """The tables in a file. ValueError with the reason where it is damaged, altered or foreign."""
+    """The tables in a file. Raises ValueError with the reason if it is damaged, altered or foreign."""
     try:
         arrays = archives.read(path)
         text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
         manifest = json.loads(text)
         hashes = dict(manifest["hash"])
-    except Exception as error:  # of any content
+    except Exception as error:  # any content may raise any exception
         raise ValueError("damaged, or not written by gonio bake") from error
     altered = ["manifest"] if seal != _seal(text) else []
     altered += [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]
     altered += [name for name in arrays if name not in hashes]
     if altered:
-        raise ValueError(f"altered: '{altered[0]}' is not what was written")
+        raise ValueError(f"altered: '{altered[0]}' does not match the manifest")
     return Baked(arrays, manifest)
 
 
 def load(path: str | Path) -> Baked:
-    """The tables in a folder, or in a tables.npz. InputError where it is not one, or is damaged or altered."""
+    """The tables in a folder, or in a tables.npz. Raises InputError if there are none, or if they are damaged or
+    altered."""
     path = Path(path)
     file_path = path / "tables.npz" if path.is_dir() else path
     hint = "gonio bake ggx -o DIR writes one"
@@ -109,11 +109,11 @@ def load(path: str | Path) -> Baked:
 
 
 def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict[str, np.ndarray]:
-    """E, E_avg and dfg as the homework has them: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels,
+    """E, E_avg and dfg in the homework's form: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels,
     E_avg is constant along a row; dfg has A in red and B in green.
 
-    store  "E" or "1-E", of E and E_avg
-    flip   True: the bottom row is the lowest roughness; False: the top row is
+    store  "E" or "1-E", for E and E_avg
+    flip   True: the lowest roughness is the bottom row; False: the top row
     """
     if store not in ("E", "1-E"):
         raise InputError(f"unknown '{store}'", "--store", "E or 1-E")

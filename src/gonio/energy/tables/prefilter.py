@@ -1,16 +1,16 @@
-"""An environment blurred for rough mirrors: the prefiltered levels of the split sum (Karis2013).
+"""An environment prefiltered for rough mirrors: the levels of the split sum (Karis2013).
 
     light reflected at o ~ E(o) L_alpha(r),   L_alpha(r) = int L(i) k(r.i) di / int k(r.i) di,   r = o mirrored at n,
-    k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe seen straight on, o = n = r, weighed by i.n.
+    k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe at normal incidence, o = n = r, weighted by i.n.
 
-**The method.** The kernel depends on the angle between r and i alone. Between two circles of latitude it is therefore a
-convolution over the azimuth, a product of Fourier series; over the latitudes a plain sum is left. No texel is left out
-and nothing is sampled, so a small sun leaves neither noise nor blotches. Where a lobe is many texels wide the map is
-averaged in blocks first, where it is narrower than a few texels the map is read between them.
+**The method.** The kernel depends on the angle between r and i only. Between two circles of latitude it is therefore a
+convolution over the azimuth, a product of Fourier series; over the latitudes a plain sum remains. Every texel
+contributes and nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide,
+the map is averaged in blocks first; where it is narrower than a few texels, the map is interpolated.
 
-**Two errors.** That of the blur (each level against a sum over every texel of the map, finely divided) is far below
-what a screen shows. That of the split sum itself is not: it takes the lobe for round cut by the horizon, and
-masked alike all over. The manifest states both, for this environment.
+**Two errors.** The error of the blur (each level compared with a sum over every finely divided texel of the map) is
+invisible. The error of the split sum itself is not: it assumes a circular lobe, cut by the horizon, with uniform
+masking. The manifest states both for the environment.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ Array: TypeAlias = NDArray[np.float64]
 Environment: TypeAlias = NDArray[np.floating]
 
 LEVELS = 6
-MOST_LEVELS = 10  # narrower lobes than (1 / 9)^2 want grids of several thousand rows
-MIN_ROWS, MAX_ROWS = 4, 4096  # rows
-STEPS = 8.0  # rows of the map across a lobe's half width, and
-LEAST_ROWS = 128  # in all: the blur then errs by about 1e-3 at most
+MAX_LEVELS = 10  # lobes narrower than (1 / 9)^2 would need grids of several thousand rows
+MIN_ROWS, MAX_ROWS = 4, 4096  # rows of the map
+STEPS = 8.0  # rows of the grid per half width of a lobe, and
+MIN_GRID = 128  # in total: the error of the blur is then about 1e-3 at most
 JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
 COSINES = (1.0, 0.7, 0.3)  # n.o at which the split sum is judged
-_LANES = 1 << 22  # points in flight at once: 32 MiB an array
+_LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 SCHEMA = 2
 
 
@@ -57,10 +57,10 @@ def prefilter(
     """The levels of an environment, each half as large as the one before; the first is the map itself.
 
     environment  latitude-longitude radiance, (H, 2 H, channels), row 0 toward +z
-    where        what the environment is called in errors
-    Level l is for roughness l / (levels - 1), its texels in the same order as the map's.
-    Raises InputError for a map of another shape, with values that are negative or not finite, or too small for so many
-    levels, and for an unknown distribution.
+    location     the name of the environment in errors
+    Level l is for roughness l / (levels - 1), its texels in the order of the map's.
+    Raises InputError for a map of another shape, with negative or non-finite values, or too small for this many levels,
+    and for an unknown distribution.
     """
     source = _checked(environment, levels, location)
     lobe = distribution(ndf)
@@ -71,9 +71,10 @@ def bake(
     environment: Environment, ndf: str = "ggx", levels: int = LEVELS, masking: str = "smith-correlated",
     name: str = "environment",
 ) -> Baked:  # fmt: skip
-    """The levels as arrays level_0, level_1 ..., rounded as a picture holds them; the manifest states their errors.
+    """The levels as arrays level_0, level_1 ..., rounded to the precision of a picture; the manifest states their
+    errors.
 
-    masking  what the split sum is judged with
+    masking  for the error of the split sum
     name     of the environment, for the manifest
     """
     quadrature.known_masking(masking)
@@ -117,13 +118,13 @@ def _checked(environment: Environment, levels: int, location: str) -> Array:
     bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
     if bad:
         raise InputError(
-            f"{bad} values are negative or not finite", location, "radiance is 0 or more: mend the picture"
+            f"{bad} values are negative or not finite", location, "radiance is 0 or more: correct the picture"
         )
     height = source.shape[0]
     if not MIN_ROWS <= height <= MAX_ROWS:
         raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", location, "scale the picture")
-    if not 2 <= levels <= MOST_LEVELS:
-        raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MOST_LEVELS}")
+    if not 2 <= levels <= MAX_LEVELS:
+        raise InputError(f"{levels} levels given", "--levels", f"give 2 to {MAX_LEVELS}")
     if height >> (levels - 1) < 2:
         what = f"{levels} levels of a map of {height} rows, each half as large as the one before"
         raise InputError(what, location, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
@@ -134,7 +135,7 @@ def _checked(environment: Environment, levels: int, location: str) -> Array:
 
 
 def _half_width(alpha: float) -> float:
-    """The angle at which GGX's lobe has fallen to a quarter; other distributions are about as wide."""
+    """The angle at which GGX's lobe has fallen to a quarter; other distributions have a similar width."""
     return 2.0 * np.arctan(alpha)
 
 
@@ -155,14 +156,14 @@ def _root(x: Scalar) -> Scalar:
 def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
     """One level, by convolution over the azimuth and a sum over latitudes."""
     alpha = roughness_of(level, levels) ** 2
-    light = _resampled(source, max(STEPS * np.pi / _half_width(alpha), LEAST_ROWS))
+    light = _resampled(source, max(STEPS * np.pi / _half_width(alpha), MIN_GRID))
     (rows, columns), channels = light.shape[:2], light.shape[2]
     height, width = source.shape[0] >> level, 2 * (source.shape[0] >> level)
-    theta_i, theta_o = _centres(rows), _centres(height)
+    theta_i, theta_o = _centers(rows), _centers(height)
 
-    # c_m of every row, for azimuths counted from 0 although the first texel's centre stands half a texel further on,
-    # to be read where the level's texels stand; times solid angle. The north and south of the map are mirror images for
-    # the kernel: the southern half of the level is the northern one of the map turned over.
+    # c_m of every row, for azimuths starting at 0 although the first texel's center is half a texel further on; they
+    # are evaluated at the level's texels, times solid angle. North and south are mirror images for the kernel: the
+    # southern half of the level is the northern half for the flipped map.
     order = np.arange(columns // 2)
     turn = np.exp(1j * np.pi * order * (1.0 / width - 1.0 / columns))
     series = np.fft.rfft(light, axis=1)[:, :-1] * turn[:, None] * _bands(rows)[:, None, None]
@@ -178,21 +179,21 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
         kernel = dct(_kernel(lobe, alpha, z), type=1)[..., :-1]  # Fourier series of an even function
         mean = kernel[..., 0] @ _bands(rows)
         filtered = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
-        values = _at_centres(filtered, width) / columns
+        values = _at_centers(filtered, width) / columns
         result[start : start + len(theta)] = values[..., :channels]
         for row, mirrored in enumerate(values[..., channels:]):
             result[height - 1 - start - row] = mirrored
-    return np.maximum(result, 0.0)  # a rounding may lie below
+    return np.maximum(result, 0.0)  # rounding may give values below 0
 
 
-def _at_centres(series: NDArray[np.complex128], width: int) -> Array:
+def _at_centers(series: NDArray[np.complex128], width: int) -> Array:
     """A Fourier series over axis 1 at `width` even steps."""
     fold = max(1, -(-2 * series.shape[1] // width))
     return np.fft.irfft(series, fold * width, axis=1)[:, ::fold] * (fold * width)
 
 
 def _resampled(source: Array, wanted: float) -> Array:
-    """The map on a grid of about `wanted` rows or more: averaged in whole blocks, or read between its texels."""
+    """The map on a grid of about `wanted` rows or more: averaged in blocks, or interpolated between its texels."""
     height = source.shape[0]
     block = max((k for k in range(1, height // 4 + 1) if height % k == 0 and height / k >= wanted), default=1)
     if block > 1:
@@ -203,7 +204,7 @@ def _resampled(source: Array, wanted: float) -> Array:
 
 
 def _divided(source: Array, parts: int) -> Array:
-    """The map with every texel divided into parts x parts, read between the centres as renderers do."""
+    """The map with every texel divided into parts x parts, interpolated between the centers as in renderers."""
     if parts <= 1:
         return source
     height, width = source.shape[:2]
@@ -215,13 +216,13 @@ def _divided(source: Array, parts: int) -> Array:
 
 
 def _between(values: Array, at: Array, axis: int) -> Array:
-    """Linear interpolation along an axis at places counted in entries."""
+    """Linear interpolation along an axis at positions in units of entries."""
     low = np.minimum(at.astype(int), values.shape[axis] - 2)
     part = np.expand_dims(at - low, tuple(range(1, values.ndim - axis)))
     return np.take(values, low, axis) * (1.0 - part) + np.take(values, low + 1, axis) * part
 
 
-def _centres(rows: int) -> Array:
+def _centers(rows: int) -> Array:
     """Angles from the zenith."""
     return (np.arange(rows) + 0.5) / rows * np.pi
 
@@ -236,7 +237,7 @@ def _bands(rows: int) -> Array:
 
 
 def read(level: Array, directions: Array) -> Array:
-    """A level at directions (..., 3): linear between texels, the azimuth goes round, the poles hold."""
+    """A level at directions (..., 3): linear between texels, periodic in azimuth, constant at the poles."""
     height, width = level.shape[:2]
     y = np.clip(np.arccos(np.clip(directions[..., 2], -1.0, 1.0)) / np.pi * height - 0.5, 0.0, height - 1.0)
     x = np.arctan2(directions[..., 1], directions[..., 0]) / (2.0 * np.pi) * width - 0.5
@@ -252,10 +253,10 @@ def read(level: Array, directions: Array) -> Array:
 
 
 def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, float]]:
-    """By level: `max` and `rms` of the blur at texels; `interpolation`, the largest between texels and halfway to the
-    level before; `split sum`, rms. In units of the root mean square of what is right.
+    """Per level: `max` and `rms` error of the blur at texels; `interpolation`, the largest error between texels and
+    halfway to the previous level; `split sum`, rms. In units of the root mean square of the exact values.
 
-    Judged by sums over every texel of the map, in eight directions spread evenly and at the level's brightest texel.
+    Computed by sums over every texel of the map, in eight evenly spread directions and at the level's brightest texel.
     """
     lobe, source = distribution(ndf), levels[0]
     spread = _spread(8)
@@ -287,7 +288,7 @@ def _figures(difference: Array, right: Array) -> dict[str, float]:
 
 
 class EveryTexel:
-    """Every texel of a map, divided finely enough for a lobe: what levels are judged by. No Fourier series here."""
+    """Every texel of a map, divided finely enough for a lobe: the reference for levels, without Fourier series."""
 
     def __init__(self, source: Array, alpha: float, steps: float = JUDGE_STEPS) -> None:
         self.alpha = alpha
@@ -314,7 +315,7 @@ class EveryTexel:
             yield weight @ power, float(weight @ solid)
 
     def blurred(self, lobe: NDF, n: Array) -> Array:
-        """L_alpha(n), straight from its definition."""
+        """L_alpha(n), directly from its definition."""
 
         def value(i: Direction, alpha: Scalar) -> Scalar:
             m = normalize(vec3(i.x, i.y, i.z + 1.0))
@@ -324,7 +325,7 @@ class EveryTexel:
         return light / weight
 
     def reflected(self, lobe: NDF, masking: str, o: Array, n: Array) -> Array:
-        """int L(i) D G / (4 o.n) di: what the split sum stands for, at F = 1."""
+        """int L(i) D G / (4 o.n) di: the integral that the split sum approximates, at F = 1."""
         kind = backend.types("float64")
         wo = kind.vec3(*[backend.float_of(float(o @ axis), kind) for axis in _frame(n)])
 
@@ -348,21 +349,21 @@ def _frame(n: Array) -> Array:
 
 
 def _mirrored(r: Array, mu: float) -> tuple[Array, Array]:
-    """o and n whose mirrored direction is r, with o.n = mu; in any plane through r."""
+    """o and n with mirrored direction r and o.n = mu; in an arbitrary plane through r."""
     n = mu * r + np.sqrt(1.0 - mu * mu) * _frame(r)[0]
     return 2.0 * mu * n - r, n
 
 
 def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
-    """Directions of the texels' centres in rows start to stop, (N, 3)."""
+    """Directions of the texels' centers in rows start to stop, (N, 3)."""
     height, width = level.shape[:2]
-    theta, phi = _centres(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
+    theta, phi = _centers(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
     sine = np.sin(theta)
     return spherical_array(sine, np.cos(theta), phi).reshape(-1, 3)
 
 
 def _spread(count: int) -> Array:
-    """Directions spread evenly over the sphere, none at a pole: a spiral in golden steps."""
+    """Directions spread evenly over the sphere, none at a pole: a spiral in golden-angle steps."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     phi = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
     sine = np.sqrt(1.0 - z * z)

@@ -15,7 +15,7 @@ from ...optics.roughness import widths
 from .. import cache
 from ..albedo import quadrature
 
-SIZE = 128  # bilinear between them errs by 3e-4 for roughness >= .1
+SIZE = 128  # the error of bilinear interpolation is 3e-4 for roughness >= 0.1
 
 
 @cache.of_members
@@ -33,7 +33,7 @@ def schlick_table(ndf: str, masking: str) -> Table:
 def reflected(surface: Microsurface, f0: Spectrum, E: Scalar, wo: Direction) -> Spectrum:
     """F0 A + B at wo.
 
-    whole  E(mu) at F = 1, A + B
+    E      E(mu) at F = 1, A + B
     """
     alpha, _ = widths(surface.alpha)
     row, column = inset(sqrt(sqrt(alpha.x * alpha.y)), SIZE), inset(sqrt(maximum(wo.z, 1e-6)), SIZE)

@@ -58,7 +58,7 @@ def fitted(
     started = time.perf_counter()
     few = _some(chosen, FEW)
     plain, moving = tables.moving_of(model, fixed=fixed, free=free)
-    material = tables.fit(_data(scene, few), model, fixed=fixed, free=free).material
+    material = tables.fit(_data(scene, few), model, param=fixed, free=free).material
     faults = Faults.of(stated, scene)
 
     problem = Problem(material, moving, scene, few, faults)

@@ -77,7 +77,7 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
             decoded = formats.decode(path, content, kind)
         except formats.Unreadable as error:
             raise InputError(f"this photograph is damaged: {error}", where, "copy it again") from None
-        values, whole = decoded.values.astype(np.float64), decoded.whole
+        values, whole = decoded.values.astype(np.float64), decoded.integers
     values = values[..., :1].repeat(3, axis=2) if values.shape[2] < 3 else values[..., :3]
     height, width = values.shape[:2]
     if (width, height) != tuple(calibration.camera.size):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from ... import files
+from ...arguments import renamed
 from ...catalog import operands
 from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
 from ...material import BSDF
 from ...measure import format_of
+from ...measure.formats.base import Format
 from ...owner import public
 from . import advice, fitting, geometry, pixels, planning
 from . import calibration as calibrations
@@ -88,12 +91,11 @@ class Capture:
 
     def save(self, path: str | Path) -> Path:
         """Write the samples as a table (.gonio, .binary, .astm, ...), or all that was found as .json."""
-        target = check_output(Path(path))
-        if target.suffix.lower() == ".json":
+        if Path(path).suffix.lower() == ".json":
             text = json.dumps(self.as_dict(), indent=1)
-            return files.write_whole(target, (text + "\n").encode())
-        form = format_of(target)
-        return files.write_whole(target, form.write(form.resampled(self.samples.table)))
+            return files.write_whole(path, (text + "\n").encode())
+        form = _table_format(Path(path))
+        return files.write_whole(path, form.write(form.resampled(self.samples.table)))
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -131,12 +133,19 @@ class Capture:
 def check_output(path: Path) -> Path:
     """Raise InputError where the result cannot be written, before anything is computed."""
     if path.suffix.lower() != ".json":
-        form = format_of(path)
-        if not form.writes:
-            raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
+        _table_format(path)
     return files.check_file(path)
 
 
+def _table_format(path: Path) -> Format:
+    """The format of tables that the suffix names. Raises InputError where it cannot be written."""
+    form = format_of(path)
+    if not form.writes:
+        raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
+    return form
+
+
+@renamed(fixed="param")
 @public
 def capture(
     photographs: str | Path | Sequence[str],
@@ -144,7 +153,7 @@ def capture(
     *,
     calibration: str | Path | None = None,
     grazing: float = GRAZING,
-    fixed: Mapping[str, object] | None = None,
+    param: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
     progress: Callable[[str], None] = lambda text: None,
 ) -> Capture:
@@ -158,7 +167,7 @@ def capture(
     model        what is fitted, as `go.fit` takes it; None: samples alone
     calibration  the file that says what stood where; None: calibration.json beside the photographs
     grazing      degrees: pixels seen or lit from beyond are left out
-    fixed        path -> value of parameters that stay
+    param        path -> value of parameters that are held
     free         paths of parameters that move although they stay by themselves
     Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
     throughout, or that show no sample.
@@ -182,7 +191,7 @@ def capture(
     found = None
     if model is not None:
         progress("fits")
-        found = fitting.fitted(scene, chosen, model, uncertainty, fixed=fixed, free=free)
+        found = fitting.fitted(scene, chosen, model, uncertainty, fixed=param, free=free)
         scene = found.problem.corrected(found.numbers)
     gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     warnings = advice.on(scene, chosen, found)
@@ -205,7 +214,7 @@ def plan(
     model        what will be fitted, set to what the material may be like
     places       where the lamp can stand; None: anywhere at the distance of the calibration's lamps
     """
-    path = Path(calibration).expanduser()
+    path = Path(os.path.expanduser(calibration))
     stated = calibrations.read(path)
     kind: Kind = "ball" if stated.ball is not None else "flat"
     ball = None if stated.ball is None else geometry.placed(stated.ball, stated.camera, ())
@@ -235,15 +244,15 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
 def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
     """The calibration file that goes with photographs, or with their folder; or which itself is named."""
     if calibration is not None:
-        return Path(calibration).expanduser()
+        return Path(os.path.expanduser(calibration))
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
     if not several:
         raise InputError("no photographs given", "photographs", "name files, or a folder with a calibration.json")
-    first = Path(several[0]).expanduser()
-    kinds = [operands.kind_of(Path(one).expanduser(), PHOTOGRAPHS, "photographs") for one in several]
-    if kinds == [operands.Kind.CALIBRATION] and not first.is_dir():
+    first = Path(os.path.expanduser(several[0]))
+    kinds = [operands.kind_of(Path(os.path.expanduser(one)), PHOTOGRAPHS, "photographs") for one in several]
+    if kinds == [operands.Kind.CALIBRATION] and not os.path.isdir(first):
         return first
-    return (first if first.is_dir() else first.parent) / NAME
+    return (first if os.path.isdir(first) else first.parent) / NAME
 
 
 def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> bool:
@@ -257,10 +266,10 @@ def _calibration(named: str | Path | Sequence[str], calibration: str | Path | No
     path = calibration_of(named, calibration)
     whole = calibrations.read(path)
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
-    first = Path(several[0]).expanduser()
-    folder = first if first.is_dir() else first.parent
+    first = Path(os.path.expanduser(several[0]))
+    folder = first if os.path.isdir(first) else first.parent
     kept = whole.photographs
-    if not (len(several) == 1 and (first.is_dir() or first.suffix.lower() == ".json")):
+    if not (len(several) == 1 and (os.path.isdir(first) or first.suffix.lower() == ".json")):
         known = {Path(one.file).name for shot in whole.photographs for one in shot.pictures}
         wanted = {Path(one).name for one in several}
         for name in sorted(wanted - known):

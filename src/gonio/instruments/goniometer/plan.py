@@ -40,10 +40,10 @@ class Plan:
         own = self.file.writes
         kinds = ["angles", *sorted({one.writes for one in Format.family.all().values()} - {"", "any"})]
         if kind and kind not in kinds:
-            raise InputError(f"unknown kind of table '{kind}'", "--kind", did_you_mean(kind, kinds))
+            raise InputError(f"unknown kind of table '{kind}'", "--table", did_you_mean(kind, kinds))
         if kind and own not in ("any", kind):
             raise InputError(
-                f"{self.file.name} files hold tables of kind {own}", "--kind", "leave it out, or use .gonio"
+                f"{self.file.name} files hold tables of kind {own}", "--table", "leave it out, or use .gonio"
             )
         self.kind = kind or ("angles" if own == "any" else own)
         self._grid = grid

@@ -96,7 +96,7 @@ class Rough(Specimen):
         total, size = lights * each, 2 * lights * channels * squares
         if each > MOST_EACH or total >= 1 << 32:
             what = f"{each} rays on each patch, at each of {lights} angles of incidence"
-            raise InputError(what, "--rays", "give more patches, or fewer rays")
+            raise InputError(what, "--samples", "give more patches, or fewer rays")
         if 4 * size * (GROUPS + 3) > MOST_BYTES:
             what = f"maps of {lights} angles of incidence would take {4e-9 * size * (GROUPS + 3):.0f} GB"
             raise InputError(what, "--solid-angle", "give a larger one, or fewer angles")

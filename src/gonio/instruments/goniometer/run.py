@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import files
-from ...arguments import shown
+from ...arguments import renamed, shown
 from ...catalog import notation, outside
 from ...errors import InputError
 from ...material import BSDF, is_model
@@ -126,6 +126,7 @@ class _Scout(Measurement):
         return np.repeat(wi[:, 2:], 3, 1)
 
 
+@renamed(kind="table", rays="samples")
 @public
 def measure(
     material: BSDF | str | None = None,
@@ -133,7 +134,7 @@ def measure(
     *,
     surface: Surface | str | None = None,
     facet: BSDF | str = "mirror",
-    kind: str = "",
+    table: str = "",
     theta_i: Sequence[float] | None = None,
     theta_r: Sequence[float] | None = None,
     phi: Sequence[float] | None = None,
@@ -141,9 +142,9 @@ def measure(
     noise: float = 0.0,
     blocked: float = 0.0,
     bounces: str = "all",
-    rays: int = 1_000_000,
+    samples: int = 1_000_000,
     patches: int = 16,
-    seed: int = 0,
+    seed: int | None = None,
     device: str = "cpu",
     progress: Callable[[int, int], None] | None = None,
 ) -> Readout:
@@ -157,7 +158,7 @@ def measure(
     surface      gaussian, vgroove, spheres, with parameters behind a colon; a file of heights; or one of your own
     facet        what its facets are made of, as text or object: "mirror", "lambert:albedo=.8", "conductor:Au"; as text,
                  facets are smooth (alpha = 0) where nothing else is said
-    kind         of table in .gonio files: angles, half-difference, adaptive, specular, samples
+    table        in .gonio files: angles, half-difference, adaptive, specular, samples
     theta_i, theta_r, phi  angles of one's own, degrees (of light, of view, between them), for .gonio, .astm and .brdf
     solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, .006 for
                  surfaces
@@ -165,10 +166,10 @@ def measure(
     blocked      degrees about the lamp where the detector cannot stand. MERL's cells are invalid there, samples left
                  out; other tables hold the value at the rim
     bounces      of a surface: "all" light, that of the "first" bounce, or what "later" ones add
-    rays         sent at each angle of incidence
+    samples      rays at each angle of incidence
     patches      pieces of a random surface that are measured, rounded up to a multiple of 8; their spread is the
                  standard error, together with that of the rays
-    seed         same seed, same values
+    seed         0 if None; same seed, same values
     device       "cpu", "cuda" or "auto", for surfaces
     progress     called with rays sent and rays in all
 
@@ -180,6 +181,7 @@ def measure(
     Raises InputError for what is unknown, out of range or cannot be written, before anything is computed.
     """
     begun = time.perf_counter()
+    seed = 0 if seed is None else seed
     if bounces not in BOUNCES:
         raise InputError(f"'{bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
     for name, value, high in (("noise", noise, 1.0), ("blocked", blocked, MOST_BLOCKED)):
@@ -188,14 +190,14 @@ def measure(
     if solid_angle is not None and not 0.0 < solid_angle < np.pi:
         raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
     for name, count, low, most in (
-        ("rays", rays, 1000, 1 << 40),
+        ("samples", samples, 1000, 1 << 40),
         ("patches", patches, 1, 4096),
         ("seed", seed, 0, 1 << 31),
     ):
         if not low <= count <= most:
             raise InputError(f"{count} given, {low} to {most} expected", f"--{name}")
     target = None if output is None else files.check_file(output)
-    plan = Plan(None if output is None else Path(output), kind, grid_of(theta_i, theta_r, phi))
+    plan = Plan(None if output is None else Path(output), table, grid_of(theta_i, theta_r, phi))
     specimen: Specimen
     if surface is not None:
         if material is not None:
@@ -206,7 +208,7 @@ def measure(
             raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=.3"')
         made = facet_of(facet) if isinstance(facet, str) else facet
         specimen = rough = Rough(
-            built, made, detector, rays, patches, seed, device, progress, facet if isinstance(facet, str) else ""
+            built, made, detector, samples, patches, seed, device, progress, facet if isinstance(facet, str) else ""
         )
         scout = _Scout()
         plan.table(scout)
@@ -218,16 +220,16 @@ def measure(
             raise InputError(f"{bounces} bounces of a material asked for", "--bounces", "that is for --surface")
         named = notation.named(material)[0] if isinstance(material, str) else material
         specimen, rough = Model(named, solid_angle, material if isinstance(material, str) else ""), None
-    table, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
-    error = table.beside.get("error")
-    values = vars(table)["values"]
+    measured, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
+    error = measured.beside.get("error")
+    values = vars(measured)["values"]
     typical = None if error is None or not np.any(values > 0.0) else error[values > 0.0] / values[values > 0.0]
     if target is not None:
-        files.write_whole(target, plan.file.write(table))
+        files.write_whole(target, plan.file.write(measured))
         if error is not None and plan.file.writes != "any":
             notes.append(f"{plan.file.name} files have no place for standard errors; .gonio files keep them")
     return Readout(
-        table=table,
+        table=measured,
         path=None if output is None else Path(output),
         format="" if output is None else plan.file.name,
         cells=int(np.prod(values.shape)) // 3,

@@ -1,1 +1,1 @@
-"""Materials of materials: mix, sum, two-sided, normal-mapped and partly transparent ones."""
+"""Combinations of materials: mix, sum, two-sided, normal-mapped and partly transparent ones."""

@@ -1,4 +1,4 @@
-"""Two materials in one place."""
+"""A mixture of two materials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, safe_div, vec3, wher
 
 
 class Mix(BSDF):
-    """(1 - weight) a + weight b: the average of two materials' values, as of a surface finely patched with both."""
+    """(1 - weight) a + weight b: the average of two materials' values, as for a surface finely patched with both."""
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
@@ -32,7 +32,7 @@ class Mix(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks a material and is stretched to serve it again; a density sample is weighed against both."""
+        """u1 selects a material and is rescaled for it; a density sample is weighted against both."""
         w = self.weight
         pick_b = u.x < w
         u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
@@ -42,7 +42,7 @@ class Mix(BSDF):
         delta = where(pick_b, sb.delta, sa.delta)
         chosen_pdf = where(pick_b, sb.pdf * w, sa.pdf * (1.0 - w))
         valid = chosen_pdf > 0.0
-        # the share cancels in a delta lobe's weight: w f / (w p)
+        # the mixing weight cancels in a delta lobe's weight: w f / (w p)
         pdf = where(valid, where(delta, chosen_pdf, self.pdf(wo, wi)), 0.0)
         density_weight = self.eval(wo, wi, mode) * where(valid & ~delta, safe_div(1.0, pdf), 0.0)
         delta_weight = where(pick_b, sb.weight, sa.weight)

@@ -1,4 +1,4 @@
-"""A material with holes: what of the light goes straight on."""
+"""A material with holes, through which light passes unchanged."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from .mix import ALMOST_ONE
 
 
 class Opacity(BSDF):
-    """The base on a share `opacity` of the surface, and holes elsewhere: the rest of the light goes straight on, as a
-    delta lobe, unchanged, from either side. The mask of leaves and fences, as a texture of 0 and 1, or of what lies
-    between for a fabric too fine to be seen. A base that only reflects is black from below: give it as `two-sided`.
+    """The base on a fraction `opacity` of the surface, and holes elsewhere: the rest of the light passes straight
+    through, as a delta lobe, unchanged, from either side. Represents cutouts such as leaves and fences by a texture of
+    0 and 1, and fabrics with unresolved holes by values between. A base that only reflects is black from below: wrap it
+    in `two-sided`.
     """
 
     base: BSDF = bsdf("the material where there is one")
-    opacity: Number = number(default=0.5, doc="share of the surface that the base covers", low=0.0, high=1.0)
+    opacity: Number = number(default=0.5, doc="fraction of the surface that the base covers", low=0.0, high=1.0)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base's, times opacity; the holes are a delta lobe."""
+        """The base's value times opacity; the holes are a delta lobe."""
         return self.base.eval(wo, wi, mode) * self.opacity
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's, times opacity."""
+        """The base's density times opacity."""
         return self.base.pdf(wo, wi) * self.opacity
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks the base with probability `opacity`, which cancels in the weight, and is stretched to serve it."""
+        """u1 selects the base with probability `opacity`, which cancels in the weight, and is rescaled for it."""
         covered = u.x < self.opacity
         s = self.base.sample(wo, vec3(minimum(safe_div(u.x, self.opacity), ALMOST_ONE), u.y, u.z), mode)
         through = 1.0 - self.opacity
@@ -44,7 +45,7 @@ class Opacity(BSDF):
         return Sample(where(covered, s.wi, -wo), weight, pdf, s.delta | ~covered, eta)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's, and white for the holes."""
+        """The base's tint, and white for the holes."""
         return self.base.tint(wo) * self.opacity + (1.0 - self.opacity)
 
     @property
@@ -61,6 +62,6 @@ class Opacity(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's times opacity, and the holes."""
+        """The base's albedo times opacity, and the holes."""
         of_base, opacity = inner(self.base, mu, phi), float(self.opacity)  # type: ignore[arg-type]
         return None if of_base is None else of_base * opacity + (1.0 - opacity)

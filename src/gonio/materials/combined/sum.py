@@ -1,4 +1,4 @@
-"""Two materials on top of each other."""
+"""The sum of two materials."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ...ops import Direction, Mask, Mode, Spectrum
 
 
 class Sum(BSDF):
-    """a + b: both materials' light together, as fits to measurements write it: "lambert+conductor" (Ngan2005).
+    """a + b: the light of both materials added, as in fits to measurements: "lambert+conductor" (Ngan2005).
 
-    Nothing is kept in balance: what both reflect may be more than arrives. It is sampled by a guide. A delta lobe has
-    no value to add, and is refused.
+    Energy is not balanced: together the two may reflect more than they receive. It is sampled by a guide. A delta lobe
+    has no value to add, and is rejected.
     """
 
     a: BSDF = bsdf("the one material")
     b: BSDF = bsdf("the other")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": KnownViolation("what two materials reflect may add up to more than arrives", 1e3, certain=False)
+        "energy": KnownViolation("together the two materials may reflect more than they receive", 1e3, certain=False)
     }
 
     def __post_init__(self) -> None:
@@ -32,7 +32,7 @@ class Sum(BSDF):
         for name, part in (("a", self.a), ("b", self.b)):
             if part.delta == "always":
                 what = f"{type(part).__name__} is a delta lobe, which has no value to add"
-                raise InputError(what, f"Sum.{name}", "give it a width, or take mix")
+                raise InputError(what, f"Sum.{name}", "give it a width, or use mix")
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:

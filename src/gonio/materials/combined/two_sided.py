@@ -15,7 +15,7 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, function, vec3, wher
 
 
 class TwoSided(BSDF):
-    """The base material on both sides: from behind it looks as from the front. The base must not transmit."""
+    """The base material on both sides: it looks the same from behind as from the front. The base must not transmit."""
 
     base: BSDF = bsdf("the material, which must not transmit")
 
@@ -30,28 +30,28 @@ class TwoSided(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base's value, with both directions turned to wo's side."""
-        return self.base.eval(_turned(wo, wo), _turned(wi, wo), mode)
+        """The base's value, with both directions mirrored to wo's side."""
+        return self.base.eval(_toward_front(wo, wo), _toward_front(wi, wo), mode)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The base's density, likewise."""
-        return self.base.pdf(_turned(wo, wo), _turned(wi, wo))
+        return self.base.pdf(_toward_front(wo, wo), _toward_front(wi, wo))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """The base's sample, turned back."""
-        s = self.base.sample(_turned(wo, wo), u, mode)
-        return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
+        """The base's sample, mirrored back."""
+        s = self.base.sample(_toward_front(wo, wo), u, mode)
+        return Sample(_toward_front(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The base's, turned back."""
-        parts = self.base.polarized(_turned(wo, wo), _turned(wi, wo), delta, mode)
-        return tuple(part._replace(normal=_turned(part.normal, wo)) for part in parts)
+        """The base's parts, mirrored back."""
+        parts = self.base.polarized(_toward_front(wo, wo), _toward_front(wi, wo), delta, mode)
+        return tuple(part._replace(normal=_toward_front(part.normal, wo)) for part in parts)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base's tint."""
-        return self.base.tint(_turned(wo, wo))
+        return self.base.tint(_toward_front(wo, wo))
 
     @property
     def delta(self) -> Delta:
@@ -74,6 +74,6 @@ class TwoSided(BSDF):
 
 
 @function
-def _turned(w: Direction, wo: Direction) -> Direction:
-    """w with its z mirrored where wo is below the surface."""
+def _toward_front(w: Direction, wo: Direction) -> Direction:
+    """w with its z mirrored if wo is below the surface."""
     return vec3(w.x, w.y, where(wo.z < 0.0, -w.z, w.z))

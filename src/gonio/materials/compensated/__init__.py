@@ -1,1 +1,1 @@
-"""Materials with the energy restored that single scattering loses."""
+"""Materials with compensation of the energy lost by single scattering."""

@@ -1,4 +1,4 @@
-"""A base and what single scattering in it misses, given back by a broad lobe: what the compensated materials share."""
+"""The base of the compensated materials: a base material plus a broad lobe that returns the energy it loses."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ...ops.backend import Array
 from ...optics import frame
 from ...optics.special import gauss
 
-ALMOST_ONE = 0.99999994  # the largest float32 under 1
+ALMOST_ONE = 0.99999994  # the largest float32 below 1
 
 
 class Parts(NamedTuple):
-    """What a compensated material is the sum of, both times |cos theta_i|.
+    """The two parts of a compensated material, both times |cos theta_i|.
 
-    single  the base alone: light scattered once
-    multi   what is added: light scattered more than once
+    single  the base: light scattered once
+    multi   the compensation: light scattered more than once
     """
 
     single: Spectrum
@@ -43,11 +43,11 @@ class AllParts(NamedTuple):
 
 
 class _OnBase(BSDF):
-    """A material that compensates another, and is otherwise as that is."""
+    """A material that compensates another and otherwise shares its properties."""
 
     base: BSDF = bsdf("the material to be compensated")
     _takes_glass: ClassVar[bool] = True  # whether the base may transmit
-    _takes_any: ClassVar[bool] = False  # whether it may be another than a microsurface
+    _takes_any: ClassVar[bool] = False  # whether it may be something other than a microsurface
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -69,7 +69,7 @@ class _OnBase(BSDF):
         return self.base.delta
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The base's: light that was scattered once. What is given back has lost its polarization among the facets."""
+        """The parts of the base: light scattered once. Compensation is unpolarized."""
         return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -78,15 +78,15 @@ class _OnBase(BSDF):
 
 
 class _Compensated(_OnBase):
-    """base + what it misses, sampled by a mixture of the base and of the lobe that is missing.
+    """base + its lost energy, sampled by a mixture of the base and of a lobe proportional to that energy.
 
-    A subclass writes `derive`, which gives `missing` and `ratio` among others, `compensation`, and `eval` with it.
+    A subclass defines `derive`, with fields `missing` and `ratio` among others, `compensation`, and `eval` with it.
     """
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's, plus lobes that are alike all around the normal."""
+        """The base's albedo plus that of the lobes, which are rotationally symmetric."""
         of_base = None if nodes is None or self.stochastic or self.anisotropic else inner(self.base, mu, phi)
         if nodes is None or of_base is None:
             return None
@@ -104,28 +104,28 @@ class _Compensated(_OnBase):
     # ------------------------------------------------------------------ formulas
 
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """What is added to the base, times |cos theta_i|."""
+        """The term added to the base, times |cos theta_i|."""
         raise NotImplementedError
 
     @function
     def M(self, w: Direction) -> Scalar:
-        """1 - E(mu), what single scattering misses at a direction, from its own side; E of the base at F = 1."""
+        """1 - E(mu), the energy lost by single scattering at a direction, from its own side; E of the base at F = 1."""
         return self.derived.missing.at(w)
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
-        """`Parts`, with D, G and F of the base where it has them."""
+        """`Parts`, with D, G and F if the base has them."""
         return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.compensation(wo, wi, "radiance"))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density and that of a lobe as (1 - E(mu_i)) mu_i, mixed by the energy that each carries."""
+        """The densities of the base and of a lobe proportional to (1 - E(mu_i)) mu_i, mixed by their energies."""
         share = self._share(wo)
         return self.base.pdf(wo, wi) * (1.0 - share) + self._lobe_pdf(wo, wi) * share
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks the base or the lobe, and is stretched to serve again."""
+        """u1 selects the base or the lobe, and is rescaled."""
         share = self._share(wo)
         broad = u.x < share
         u_remapped = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
@@ -133,7 +133,7 @@ class _Compensated(_OnBase):
         s = self.base.sample(wo, u, mode)
         wi = where(broad, self._lobe_sample(wo, u), s.wi)
         delta = s.delta & ~broad
-        # what the base knows of its own sample is more exact than what its direction, once rounded, tells
+        # the base knows the pdf of its own sample more precisely than its rounded direction determines it
         base_pdf = where(broad, self.base.pdf(wo, wi), s.pdf)
         base_value = where(broad, self.base.eval(wo, wi, mode), s.weight * s.pdf)
         density = base_pdf * (1.0 - share) + self._lobe_pdf(wo, wi) * share
@@ -141,7 +141,7 @@ class _Compensated(_OnBase):
         value = base_value + self.compensation(wo, wi, mode)
         value = value * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
         eta = where(broad, self.derived.missing.eta(wo, wi), s.eta)
-        # a smooth base misses nothing: share = 0
+        # a smooth base loses nothing: share = 0
         return Sample(wi, where(delta, s.weight * safe_div(1.0, 1.0 - share), value), pdf, delta, eta)
 
     @function
@@ -151,19 +151,19 @@ class _Compensated(_OnBase):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
         return self.derived.missing.sample(wo, u)
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the broad lobe: the power it carries over all the power, at the mean colour."""
+        """Probability of the broad lobe: its power over the total power, for the mean color."""
         lost = self.derived.missing.given(wo)
         given = lost * self.derived.ratio
         return safe_div(given, given + maximum(1.0 - lost, 0.0))
 
 
 def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi: Spectrum) -> Parts | AllParts:
-    """The parts, with D, G and F where the base has them."""
+    """The parts, with D, G and F if the base has them."""
     if not base.has_terms:
         return Parts(single, multi)
     d, g, f = base.terms(wo, wi)
@@ -172,7 +172,7 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
 
 @function
 def lobe_ratio(f_add: Spectrum, lost: MissingEnergy) -> Scalar:
-    """Mean colour of what is given back over that of single scattering."""
+    """Mean color of the compensation over that of single scattering."""
     return safe_div(mean(f_add), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 

@@ -1,4 +1,4 @@
-"""The compensations side by side: what each loses, how far it is from the random walk, what it breaks and costs."""
+"""Comparison of the compensations: remaining loss, distance to the random walk, violated laws and cost."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from .kulla_conty import KullaConty
 from .random_walk import RandomWalk
 from .turquin import Turquin
 
-Method = Callable[[BSDF], "BSDF | None"]  # the base under it, None where it does not take the base
-Base = Callable[[float], BSDF]  # of a width alpha
+Method = Callable[[BSDF], "BSDF | None"]  # the compensated base, None if the method does not support the base
+Base = Callable[[float], BSDF]  # from a width alpha
 
 
 def _for_metals(compensate: Callable[[BSDF], BSDF]) -> Method:
-    """A method that does not take glass, or is the same as another there: glass has one colour, and albedo 1."""
+    """A method that does not support glass, or is redundant for it: glass has one color, and albedo 1."""
     return lambda base: None if base.transmits else compensate(base)
 
 
 METHODS: dict[str, Method] = {
     "plain": lambda base: base,
-    "kulla-conty sheet": _for_metals(lambda base: KullaConty(base, color="sheet")),  # the homework's colour
+    "kulla-conty sheet": _for_metals(lambda base: KullaConty(base, color="sheet")),  # the homework's color
     "kulla-conty bounce": lambda base: KullaConty(base, color="bounce"),  # second and later bounces
     "turquin": _for_metals(Turquin),
     "fdez-aguera": _for_metals(FdezAguera),
-    "random walk": RandomWalk,  # Heitz2016: the referee
+    "random walk": RandomWalk,  # Heitz2016: the reference
 }
 BASES: dict[str, Base] = {
     "white": lambda alpha: Conductor(alpha=alpha, fresnel="one"),
@@ -47,13 +47,13 @@ BASES: dict[str, Base] = {
 
 
 def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
-    """The methods and bases, and the user's own: what has a base is a method, anything else is a base."""
+    """The methods and bases with the user's own: a material with a base is a method, any other is a base."""
     methods, bases = dict(METHODS), dict(BASES)
     for material in own:
         if "base" in tree.children(material):
             methods[material.name] = functools.partial(_under, material)
         else:
-            KullaConty(material)  # raises where it cannot be compensated at all
+            KullaConty(material)  # raises if it cannot be compensated
             bases[material.name] = functools.partial(_of_width, material)
     return methods, bases
 
@@ -63,12 +63,12 @@ def _under(method: BSDF, base: BSDF) -> BSDF | None:
 
 
 def _of_width(material: BSDF, alpha: float) -> BSDF:
-    """The material at a width; as it stands where it has none."""
+    """The material at a width; unchanged if it has none."""
     return tree.replace(material, {"alpha": alpha}) if "alpha" in material.parameters() else material
 
 
-def _taken(method: Method, base: BSDF) -> BSDF | None:
-    """The base under a method, None where the method does not take it."""
+def _model_of(method: Method, base: BSDF) -> BSDF | None:
+    """The compensated base; None if the method does not support it."""
     try:
         return method(base)
     except InputError:
@@ -83,14 +83,14 @@ def compare(
     seed: int = 0,
     own: Sequence[BSDF] = (),
 ) -> dict[str, Any]:
-    """Albedos of every base under every method over roughness x mu, and what follows from them.
+    """Albedos of every base with every method over roughness x mu, and derived figures.
 
-    own  materials of the user's: one with a base is compared as a method, another as a base; without microfacets it
-         has no random walk to be compared with
+    own  user materials: one with a base is compared as a method, another as a base; without microfacets it has no
+         random walk for reference
 
-    Returns a dict that JSON can hold: axes; `albedo` [material][method] (roughness, mu, 3); `rms` to the walk;
-    `furnace`, the largest |1 - albedo| of what should be 1; `reciprocity`, the largest relative breach on gold;
-    `cost`, time of one evaluation over that of the plain metal.
+    Returns a dict that can be stored as JSON: axes; `albedo` [material][method] (roughness, mu, 3); `rms` relative to
+    the walk; `furnace`, the largest |1 - albedo| where 1 is exact; `reciprocity`, the largest relative violation on
+    gold; `cost`, time of one evaluation over that of the uncompensated metal.
     """
     if walks < 1000 or pairs < 1024:
         raise InputError(f"{walks} walks, {pairs} pairs", "compensation", "give 1000 walks and 1024 pairs or more")
@@ -102,7 +102,7 @@ def compare(
             rows: list[Any] = []
             for r in roughness:
                 base = base_of(r * r)
-                model = _taken(under, base)
+                model = _model_of(under, base)
                 if model is not None and method == "random walk":
                     rows.append([walk.albedo(base, float(m), walks, seed)[0] for m in mu])
                 elif model is not None:
@@ -132,7 +132,7 @@ def compare(
 
 
 def breach(method: Method, seed: int) -> float:
-    """Largest |f(o, i) - f(i, o)| over the larger of the two, gold of roughness .7, 2000 pairs."""
+    """Largest |f(o, i) - f(i, o)| over the larger of the two, gold of roughness 0.7, 2000 pairs."""
     model = _on_gold(method, 0.49)
     rng = np.random.default_rng(seed)
     o, i = (direction(rng.uniform(0.02, 1.0, 2000), rng.uniform(0, 2 * np.pi, 2000)) for _ in range(2))
@@ -143,12 +143,13 @@ def breach(method: Method, seed: int) -> float:
 def _on_gold(method: Method, alpha: float) -> BSDF:
     model = method(BASES["gold"](alpha))
     if model is None:
-        raise InputError("a method that does not take gold cannot be compared", "compensation")
+        raise InputError("a method that does not support gold cannot be compared", "compensation")
     return model
 
 
 def _costs(methods: Mapping[str, Method], pairs: int) -> dict[str, float]:
-    """Time of `eval` over that of the plain metal: gold of alpha .36, pairs above the surface, best of many turns."""
+    """Time of `eval` over that of the uncompensated metal: gold of alpha 0.36, pairs above the surface, best of
+    many."""
     dr = backend.drjit()
     kind = backend.types("float32")
     rng = np.random.default_rng(1)

@@ -19,12 +19,12 @@ from .kulla_conty import f_add
 
 
 class Derived(NamedTuple):
-    """What does not depend on directions.
+    """Values that do not depend on directions.
 
     missing  1 - Ess
     f0       reflectance at normal incidence
     f_avg    F_avg of Schlick's curve
-    ratio    mean colour of what is given back over that of single scattering, for sampling
+    ratio    mean color of the compensation over that of single scattering, for sampling
     """
 
     missing: Reflecting
@@ -37,12 +37,13 @@ class FdezAguera(_Compensated):
     """f_base + F_ms E_ms / pi: multiple scattering as light from a diffuse surface (FdezAguera2019).
 
     With the split sum FssEss = F0 A(mu_o) + B(mu_o), Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
-    F_ms = FssEss F_avg / (1 - E_ms F_avg). Made for prefiltered lighting, FssEss * radiance + F_ms E_ms * irradiance;
-    as a BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
+    F_ms = FssEss F_avg / (1 - E_ms F_avg). Designed for prefiltered lighting, FssEss * radiance + F_ms E_ms *
+    irradiance; as a BSDF the second term is a diffuse lobe that depends on wo only: not reciprocal. It assumes
+    Schlick's Fresnel.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
+        "reciprocity": KnownViolation("the diffuse part depends on the viewer's direction only", 4.0, certain=False)
     }
     lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
@@ -57,8 +58,8 @@ class FdezAguera(_Compensated):
         _, f0, f_avg, _ = self.derived
         E_ms = self.M(wo)
         surface = self.base.microsurface
-        assert surface is not None, "checked when it was made"
-        _, smooth = widths(surface.alpha)  # a mirror loses nothing; the polynomials of E_ms end near 0, not at it
+        assert surface is not None, "checked on construction"
+        _, smooth = widths(surface.alpha)  # a mirror loses nothing; the polynomials of E_ms end near 0, not at 0
         FssEss = split_sum.reflected(surface, f0, 1.0 - E_ms, wo)
         F_ms = FssEss * f_avg / maximum(1.0 - f_avg * E_ms, 1e-6)
         return F_ms * where(lobe.above(wo, wi) & ~smooth, E_ms * abs(wi.z) * ops.inv_pi, 0.0)
@@ -67,5 +68,5 @@ class FdezAguera(_Compensated):
         """E_ms by its polynomial, F0 and F_avg = F0 + (1 - F0) / 21."""
         lost = missing_energy(self.base)
         f0 = self.base.normal_reflectance()
-        assert isinstance(lost, Reflecting) and f0 is not None, "checked when it was made"
+        assert isinstance(lost, Reflecting) and f0 is not None, "checked on construction"
         return Derived(lost, f0, schlick_average(f0), lobe_ratio(f_add(lost, "bounce"), lost))

@@ -1,4 +1,4 @@
-"""A material that keeps what it receives (Kulla2017)."""
+"""Energy-conserving compensation by a broad lobe (Kulla2017)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ...optics.fresnel.artist import AVERAGES
 from ._compensated import _Compensated, lobe_ratio
 
 COLORS = {
-    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), the homework's and the talk's",
-    "bounce": "F_avg^2 E_avg / (1 - F_avg (1 - E_avg)): light that is reflected twice or more, and no other",
+    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in the homework and the talk",
+    "bounce": "F_avg^2 E_avg / (1 - F_avg (1 - E_avg)): only light that is reflected twice or more",
 }
 
 
 class Derived(NamedTuple):
-    """What does not depend on directions.
+    """Values that do not depend on directions.
 
     missing  1 - E and 1 - E_avg of the base at F = 1
-    f_add    colour of the compensation
+    f_add    color of the compensation
     ratio    its mean over that of single scattering, for sampling
     """
 
@@ -42,27 +42,28 @@ def f_add(lost: MissingEnergy, color: str) -> Spectrum:
 
 
 class KullaConty(_Compensated):
-    """f_base + f_add f_ms: the light that single scattering forgets, given back as a broad lobe (Kulla2017).
+    """f_base + f_add f_ms: the light lost by single scattering, returned as a broad lobe (Kulla2017).
 
     With E(mu) the albedo of the base at F = 1, E_avg = 2 int E mu dmu and F_avg likewise:
     f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o), and f_add by `color`. At F = 1
     nothing is lost. Reciprocal. As alpha -> 0 the term vanishes, (1 - E)^2 faster than 1 - E_avg.
 
-    Of a conductor or a dielectric E is a short polynomial met to 1e-4 (`compensation.curves`), taken at any alpha, by
-    textures and gradients too. A dielectric that transmits gets a reflected and a transmitted lobe on each side, of
-    1 - E with E the power reflected and transmitted; the shares are those that reciprocity asks for (Kulla2017, p. 30).
+    For a conductor or a dielectric E is a short polynomial accurate to 1e-4 (`compensation.curves`), valid at any
+    alpha, including textures and gradients. A dielectric that transmits gets a reflected and a transmitted lobe on each
+    side, of 1 - E with E the power reflected and transmitted; their ratio follows from reciprocity (Kulla2017, p. 30).
 
     Any other base that only reflects, by a finite isotropic lobe, is measured once (`compensation.measured`): E is its
-    albedo with F = 1 and every declared share 1, F_avg the ratio of its own to that. Lambert misses nothing; Oren-Nayar
-    the interreflections; a material without a declared share (Phong) whatever its brightest channel does not return.
-    What a base gains stays its own. Its values must not vary over the surface, and it has no shader code.
+    albedo with F = 1 and every color that is a fraction of the light set to 1, F_avg the ratio of its own albedo to
+    that. Lambert loses nothing; Oren-Nayar the interreflections; a material without such colors (Phong) all light that
+    its brightest channel does not return. A gain of the base is not corrected. Its values must not vary over the
+    surface, and it has no shader code.
 
-    Of masking schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = .835 at roughness .05): compensation then
-    lays a false bright rim on smooth surfaces.
+    With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05):
+    compensation then adds a false bright rim to smooth surfaces.
     """
 
-    color: str = choice(default="bounce", doc="colour of the light that is given back", choices=COLORS)
-    average: str = choice(default="exact", doc="how F_avg of a conductor or dielectric is found", choices=AVERAGES)
+    color: str = choice(default="bounce", doc="color of the light that is given back", choices=COLORS)
+    average: str = choice(default="exact", doc="how F_avg of a conductor or dielectric is computed", choices=AVERAGES)
     _takes_any = True
 
     @method
@@ -73,34 +74,34 @@ class KullaConty(_Compensated):
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017).
 
-        M is 1 - E, found without that difference, and `over_average` 1 / (pi (1 - E_avg)). Glass splits the lobe
-        between both sides by `share` (p. 30).
+        M is 1 - E, computed without that difference, and `over_average` 1 / (pi (1 - E_avg)). For glass `share` splits
+        the lobe between both sides (p. 30).
         """
         lost = self.derived.missing
         f_ms = self.M(wo) * self.M(wi) * lost.over_average(wi) * lost.share(wo, wi)
         return self.derived.f_add * (f_ms * lost.radiance(wo, wi, mode) * abs(wi.z))
 
     def derive(self) -> Derived:
-        """What single scattering misses, and the colour of what is given back."""
+        """The energy lost by single scattering, and the color of the compensation."""
         lost = missing_energy(self.base, self.average)
         color = f_add(lost, self.color)
         return Derived(lost, color, lobe_ratio(color, lost))
 
     @property
     def needs_uniform(self) -> bool:
-        """A base without tables is measured, once for all rays."""
+        """Whether the base has no tables and is measured, once for all rays."""
         return self.base.microsurface is None
 
-    # ------------------------------------------------------------------ measured bounds
+    # ------------------------------------------------------------------ measured error bounds
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "a measured base is drawn from anew for each value, and samples that change lobes shift E by 1e-4",
+            "a measured base is sampled again for each value, and samples that change lobes shift E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "a measured base is drawn from anew in each precision",
+            "a measured base is sampled again in each precision",
             lambda model: 0.01 if model.needs_uniform else 0.0,
             certain=False,
         ),
@@ -113,7 +114,7 @@ class KullaConty(_Compensated):
 
     @property
     def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """What a white furnace may miss: the error of polynomials or of the measurement, see docs/energy.md."""
+        """The allowed loss in a white furnace: the error of polynomials or of the measurement, see docs/energy.md."""
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:
@@ -128,7 +129,7 @@ def _furnace_error(model: KullaConty) -> float:
     if not model.base.transmits:
         return 0.008 if model.anisotropic else 0.0
     if model.anisotropic:
-        return 0.15  # .02 seen from outside where one width is up to four times the other
+        return 0.15  # 0.02 from outside if one width is up to four times the other
     surface = model.base.microsurface
     near = (
         surface is not None

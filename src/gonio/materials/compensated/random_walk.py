@@ -1,4 +1,4 @@
-"""Multiple scattering by a random walk among the facets (Heitz2016)."""
+"""Multiple scattering by a random walk on the facets (Heitz2016)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .kulla_conty import Derived, f_add
 
 
 class RandomWalk(_Compensated):
-    """f_base + the light of two and more bounces, estimated by one walk a call (Heitz2016).
+    """f_base + the light of two or more bounces, estimated by one walk per call (Heitz2016).
 
-    The exact multiple scattering of a Smith microsurface, in the mean: `eval` and the weight are random numbers, whose
-    source is a hash of both directions and `seed`. A renderer asks for new directions at each sample and need not care;
-    who asks for one pair many times gives `seed` an array. Needs ndf "ggx" and masking "smith-correlated". Slow and
-    noisy: it is here to judge the others. It cannot be recorded, so there is no shader code of it.
+    The expectation is the exact multiple scattering of a Smith microsurface: `eval` and the weight are random numbers,
+    generated from a hash of both directions and `seed`. A renderer uses new directions for each sample and needs no
+    seed; repeated calls for one pair of directions need an array as `seed`. Requires ndf "ggx" and masking
+    "smith-correlated". Slow and noisy: intended as a reference. It cannot be recorded, so there is no shader code.
     """
 
     stochastic: ClassVar[bool] = True
@@ -33,17 +33,17 @@ class RandomWalk(_Compensated):
         surface = self.base.microsurface
         if surface is None or (surface.ndf, surface.masking) != ("ggx", "smith-correlated"):
             what = f"{surface and f'{surface.ndf} with {surface.masking}'} given, ggx with smith-correlated expected"
-            raise InputError(what, "RandomWalk.base", "the walk's first bounce is exactly that")
+            raise InputError(what, "RandomWalk.base", "the first bounce of the walk is exactly this material")
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base, plus an estimate of the light of two and more bounces."""
+        """The base, plus an estimate of the light of two or more bounces."""
         return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """One walk's light of two and more bounces along wi, times |cos theta_i|."""
+        """One walk's light of two or more bounces along wi, times |cos theta_i|."""
         surface = self.base.microsurface
-        assert surface is not None, "checked when it was made"
+        assert surface is not None, "checked on construction"
         alpha, smooth = widths(surface.alpha)
         wo, wi = frame.rotate(wo, surface.rotation), frame.rotate(wi, surface.rotation)
         rng = walk.generator(wo, wi, self.seed)
@@ -52,7 +52,7 @@ class RandomWalk(_Compensated):
         return where(live & ~smooth, value, 0.0)
 
     def derive(self) -> Derived:
-        """Kulla-Conty's lobe, which is what is sampled."""
+        """Kulla-Conty's lobe, by which it is sampled."""
         lost = missing_energy(self.base)
         color = f_add(lost, "bounce")
         return Derived(lost, color, lobe_ratio(color, lost))

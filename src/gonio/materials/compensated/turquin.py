@@ -19,7 +19,7 @@ from ._compensated import AllParts, Parts, _OnBase, with_terms
 
 
 class Derived(NamedTuple):
-    """What does not depend on directions: 1 - E of the base at F = 1, and F0."""
+    """Values that do not depend on directions: 1 - E of the base at F = 1, and F0."""
 
     missing: MissingEnergy
     f0: Spectrum
@@ -29,12 +29,12 @@ class Turquin(_OnBase):
     """f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the lobe of single scattering, scaled up (Turquin2019, eq. 16).
 
     E(mu) is the albedo of the base at F = 1 and F0 the reflectance at normal incidence. At F = 1 nothing is lost; the
-    returned light keeps the lobe's shape, so nothing new is to be sampled. The factor sees wo alone: not reciprocal.
+    compensation has the lobe's shape, so sampling is unchanged. The factor depends on wo only: not reciprocal.
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the factor depends on the viewer's direction alone", 4.0, certain=False)
+        "reciprocity": KnownViolation("the factor depends on the viewer's direction only", 4.0, certain=False)
     }
     lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
@@ -42,7 +42,7 @@ class Turquin(_OnBase):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's, times the factor."""
+        """The base's albedo times the factor."""
         of_base = None if nodes is None or self.anisotropic else inner(self.base, mu, phi)
         if of_base is None:
             return None
@@ -54,11 +54,11 @@ class Turquin(_OnBase):
     def derive(self) -> Derived:
         """E by its polynomial, and F0."""
         f0 = self.base.normal_reflectance()
-        assert f0 is not None, "checked when it was made"
+        assert f0 is not None, "checked on construction"
         return Derived(missing_energy(self.base), f0)
 
     def _factor(self, wo: Direction) -> Spectrum:
-        """1 + F0 (1 - E(mu_o)) / E(mu_o), E held above .05."""
+        """1 + F0 (1 - E(mu_o)) / E(mu_o), E clamped to >= 0.05."""
         lost, F0 = self.derived
         one_minus_E = ops.minimum(lost.at(wo), 0.95)
         return 1.0 + F0 * (one_minus_E / maximum(1.0 - one_minus_E, 0.05))
@@ -70,17 +70,17 @@ class Turquin(_OnBase):
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
-        """The base, and what the factor adds to it; D, G and F of the base."""
+        """The base, and the increase by the factor; D, G and F of the base."""
         single = self.base.eval(wo, wi)
         return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density: the factor leaves the shape of the lobe."""
+        """The base's density: the factor preserves the shape of the lobe."""
         return self.base.pdf(wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """The base's, with the weight times the factor."""
+        """The base's sample, with the weight times the factor."""
         s = self.base.sample(wo, u, mode)
         return Sample(s.wi, s.weight * self._factor(wo), s.pdf, s.delta, s.eta)

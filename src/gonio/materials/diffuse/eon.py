@@ -29,30 +29,30 @@ FORMS = {
 
 
 class Eon(BSDF):
-    """Energy-preserving Oren-Nayar: Fujii's single scattering and what it loses, given back (Portsmouth2025).
+    """Energy-preserving Oren-Nayar: Fujii's single scattering plus compensation of its loss (Portsmouth2025).
 
     f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg)
     s = wo.wi - mu_o mu_i,  t = max(mu_o, mu_i) where s > 0, else 1,  A = 1 / (1 + (1/2 - 2 / (3 pi)) r)
     E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1, in closed form, E_avg its mean with the cosine
-    rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the colour of light that bounces twice or more
+    rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
-    Unlike `oren-nayar` it keeps all light at rho = 1, at any roughness and angle, has no dark ring where light grazes,
-    and colours get richer as it roughens. Reciprocal. Sampled by a clipped linearly transformed cosine and a share of
-    uniform directions (their sec. 4).
+    Unlike `oren-nayar` it conserves all light at rho = 1, at any roughness and angle, has no dark ring at grazing
+    angles, and its color becomes more saturated with roughness. Reciprocal. Sampled by a clipped linearly transformed
+    cosine and a fraction of uniform directions (their sec. 4).
     """
 
-    albedo: Colour = spectrum(default=0.5, doc="rho, the share of light that one bounce keeps", low=0.0, high=1.0)
+    albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light that a bounce preserves", low=0.0, high=1.0)
     roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
     energy: str = choice("exact", "how E is found", FORMS)
 
-    lossless_tolerance: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
+    lossless_tolerance: ClassVar[float | None] = 1e-3  # the error of the fit; "exact" has none
 
     @function
     def _lost(self, w: Direction) -> Scalar:
-        """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi: no difference of albedos, and 0 at grazing angles.
+        """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi, without a difference of albedos; 0 at grazing angles.
 
-        G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin); 1 - sin^3 over cos is taken by 1 - sin = cos^2 / (1 +
-        sin).
+        G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin); 1 - sin^3 over cos is computed with
+        1 - sin = cos^2 / (1 + sin).
         """
         mu = w.z
         if self.energy == "fit":
@@ -71,7 +71,7 @@ class Eon(BSDF):
         return 1.0 / (1.0 + GRAZING * self.roughness)
 
     @function
-    def _again(self) -> Spectrum:
+    def _interreflected(self) -> Spectrum:
         """rho_ms, the color of multiple scattering."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
         return sqr(self.albedo) * E_avg / (1.0 - self.albedo * (1.0 - E_avg))
@@ -81,9 +81,9 @@ class Eon(BSDF):
         """f cos theta_i above the surface; (1 - E)^2 / (1 - E_avg) is A r times a ratio of numbers."""
         A, r = self._single(), self.roughness
         s = wo.x * wi.x + wo.y * wi.y
-        t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both vanish only where this is masked
+        t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both are 0 only where the result is masked
         once = self.albedo * (A * (1.0 + r * s / t))
-        multiple = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
+        multiple = self._interreflected() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
         return (once + multiple) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method
@@ -96,7 +96,7 @@ class Eon(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks the uniform hemisphere or the clipped lobe."""
+        """u1 selects the uniform hemisphere or the clipped lobe."""
         r = self.roughness
         lobe = rotate_back(_Clipped(*_coefficients(wo, r)).draw(u.y, u.z), frame.azimuth(wo))
         phi = (2.0 * ops.pi) * u.z
@@ -110,12 +110,12 @@ class Eon(BSDF):
     def tint(self, wo: Direction) -> Spectrum:
         """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
-        return self.albedo * E_avg + self._again() * (1.0 - E_avg)
+        return self.albedo * E_avg + self._interreflected() * (1.0 - E_avg)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """rho E + rho_ms (1 - E), from above; of the fit, only nearly."""
+        """rho E + rho_ms (1 - E), from above; approximate for the fit."""
         if self.energy != "exact":
             return None
         r, rho = float(self.roughness), np.asarray(self.albedo, float)  # type: ignore[arg-type]
@@ -139,9 +139,10 @@ def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
 
 @function
 def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that takes a cosine to the lobe: their fit.
+    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that maps a cosine to the lobe: their fit.
 
-    Theirs is in mu; near the normal b and d are differences of near numbers, so here they stand in 1 - mu.
+    The published fit is in mu; near the normal b and d are differences of nearly equal numbers, so here it is in 1 -
+    mu.
     """
     mu = wo.z
     low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu
@@ -154,17 +155,17 @@ def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Sca
 
 
 class _Clipped:
-    """The cosine under that matrix, of which only the part is drawn that ends above the surface.
+    """The cosine transformed by that matrix, restricted to directions that end above the surface.
 
-    A direction h ends above where d h_x + h_z > 0: the disk of (h_x, h_y) is cut by half an ellipse, whose area is
-    v / 2 of it with v = 1 / sqrt(1 + d^2). x is squeezed into what is left, so that no sample is lost.
+    A direction h ends above where d h_x + h_z > 0: half an ellipse is cut from the disk of (h_x, h_y), and the
+    remainder is v / 2 + 1/2 of it with v = 1 / sqrt(1 + d^2). x is compressed accordingly, so that no sample is lost.
     """
 
     def __init__(self, a: Scalar, b: Scalar, c: Scalar, d: Scalar) -> None:
         self.a, self.b, self.c, self.d = a, b, c, d
 
-    def _kept(self) -> Scalar:
-        """The share of the disk that is kept."""
+    def _acceptance(self) -> Scalar:
+        """The fraction of the disk that remains."""
         return 0.5 * (1.0 + ops.rsqrt(self.d * self.d + 1.0))
 
     def draw(self, u1: Scalar, u2: Scalar) -> Direction:
@@ -172,15 +173,15 @@ class _Clipped:
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
-        share = self._kept()
+        share = self._acceptance()
         x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - share) + radius * cos * share)
         z = ops.safe_sqrt(1.0 - (x * x + y * y))
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
 
     def pdf(self, w: Direction) -> Scalar:
-        """cos(h) / (pi kept) |det| / |adj(M) w|^4, with h along the adjugate's adj(M) w."""
+        """cos(h) / (pi acceptance) |det| / |adj(M) w|^4, with h along the adjugate's adj(M) w."""
         across = self.a - self.b * self.d
         height = self.c * (self.a * w.z - self.d * w.x)
         h = vec3(self.c * (w.x - self.b * w.z), across * w.y, height)
         size = self.c * across
-        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._kept()
+        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._acceptance()

@@ -21,9 +21,9 @@ class OrenNayar(BSDF):
     A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
 
     No trigonometry: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and the sines times the
-    cosine of the azimuth are the scalar product of the tangential parts. Not valid beyond small sigma (about 0.5 rad);
-    the formula is used as it stands. It loses energy as sigma grows; interreflections are left out. At grazing its
-    albedo tends to albedo (A + B / 2), which is over 1 for albedo = 1 and sigma < 0.33.
+    cosine of the azimuth are the dot product of the tangential parts. Not valid beyond small sigma (about 0.5 rad); the
+    formula is used unchanged. It loses energy as sigma grows; interreflections are omitted. At grazing angles its
+    albedo tends to albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
     """
 
     albedo: Colour = spectrum(
@@ -35,7 +35,7 @@ class OrenNayar(BSDF):
         "energy": KnownViolation(
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
-            certain=False,  # below sigma = 0.04 it is under a thousandth
+            certain=False,  # below sigma = 0.04 the violation is under a thousandth
         )
     }
 
@@ -46,7 +46,7 @@ class OrenNayar(BSDF):
         a = 1.0 - 0.5 * s2 / (s2 + 0.33)
         b = 0.45 * s2 / (s2 + 0.09)
         tangential = maximum(wo.x * wi.x + wo.y * wi.y, 0.0)
-        # both cosines vanish together only where the caller masks the result
+        # both cosines are 0 only where the caller masks the result
         return a + b * tangential / maximum(maximum(wo.z, wi.z), 1e-7)
 
     @method
@@ -57,7 +57,7 @@ class OrenNayar(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """cos theta_i / pi above the surface: B's part is small and as smooth."""
+        """cos theta_i / pi above the surface: B's part is small and equally smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method

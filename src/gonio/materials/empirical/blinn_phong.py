@@ -18,18 +18,18 @@ from .phong import _Empirical
 class BlinnPhong(_Empirical):
     """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
 
-    n.h never turns negative where light and viewer are above the surface, so the highlight has no cut-off edge. For a
-    highlight as wide as Phong's take about four times the exponent. Neither reciprocal nor energy conserving.
+    n.h is never negative for light and viewer above the surface, so the highlight has no cut-off edge. A highlight as
+    wide as Phong's needs about four times the exponent. Neither reciprocal nor energy conserving.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         **_Empirical.known_violations,
-        # the bound below is not met: close under it nothing need be gained
+        # the bound below is not tight: just below it there need be no violation
         "energy": _Empirical.known_violations["energy"]._replace(certain=False),
     }
 
     def _highlight_power(self) -> np.ndarray:
-        """Below int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and below the hemisphere's 2 pi."""
+        """At most int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and at most the hemisphere's 2 pi."""
         return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
 
     @function

@@ -1,4 +1,4 @@
-"""Phong's model as Lafortune and Willems normalized it."""
+"""Phong's model as normalized by Lafortune and Willems."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from ..historic.glossy import lit
 
 
 class ModifiedPhong(BSDF):
-    """Phong's lobe as a BRDF that is reciprocal and keeps the energy: f = kd / pi + ks (p + 2) / (2 pi) (v.r)^p.
+    """Phong's lobe as a reciprocal, energy-conserving BRDF: f = kd / pi + ks (p + 2) / (2 pi) (v.r)^p.
 
-    r is the light mirrored at the normal, the base of the power is cut at 0 (Lafortune1994). The factor makes ks the
-    lobe's albedo seen from the normal; toward grazing views a part of the lobe lies below the surface and is lost. So
-    kd + ks <= 1 keeps the energy. `phong` is the model as Phong wrote it, `lafortune` what became of this one.
+    r is the light mirrored at the normal, the base of the power is clamped at 0 (Lafortune1994). The factor makes ks
+    the lobe's albedo at normal incidence; toward grazing views a part of the lobe lies below the surface and is lost.
+    Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, `lafortune` the successor of this one.
     """
 
     kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse part", low=0.0, high=1.0, soft_high=True)
@@ -36,15 +36,15 @@ class ModifiedPhong(BSDF):
         "energy": KnownViolation(
             "kd + ks is over 1",
             lambda model: max(float(np.max(np.asarray(model.kd) + np.asarray(model.ks))) - 1.0, 0.0),
-            certain=False,  # met at the normal alone, which not every check looks along
+            certain=False,  # reached at the normal only, which not every check includes
         )
     }
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the lobe: ks against kd, less of a lobe as wide as the cosine, and of one cut by the horizon.
+        """Probability of the lobe: ks against kd, reduced for a lobe as wide as the cosine or cut by the horizon.
 
-        With r = (p + 1) / 2, the density of light at the peak against the cosine's, ((r - 1/2) / (r + 1/2))^2.
+        With r = (p + 1) / 2, the peak density of the lobe over the cosine's, the factor is ((r - 1/2) / (r + 1/2))^2.
         """
         lobe = mean(self.ks) * sqr(self.p / (self.p + 2.0)) * clamp(wo.z, 0.1, 1.0)
         return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MAX_LOBE_SHARE)
@@ -66,7 +66,7 @@ class ModifiedPhong(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        """u1 selects a lobe; a direction below the surface is a failed sample."""
         lobe = to_frame(mirror(wo), square_to_power_lobe(u.y, u.z, self.p))
         wi = where(u.x < self._share(wo), lobe, square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
@@ -74,7 +74,7 @@ class ModifiedPhong(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: no two albedos whose sum is 1 return all light."""
+        """Itself: no two albedos with the sum 1 return all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -82,4 +82,4 @@ class ModifiedPhong(BSDF):
         return self.kd + self.ks
 
 
-MAX_LOBE_SHARE = 0.95  # of samples: where the cosine alone finds light, weights stay bounded
+MAX_LOBE_SHARE = 0.95  # of samples: the cosine keeps weights bounded

@@ -19,10 +19,10 @@ from ...optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, sq
 
 
 class _Empirical(BSDF):
-    """Ambient, diffuse and specular part: kd (n.l) + ks (highlight)^p, as Phong1975 wrote it down.
+    """Ambient, diffuse and specular part: kd (n.l) + ks (highlight)^p, as published (Phong1975).
 
-    No 1/pi, no normalization, no cosine on the specular term, so f = eval / cos theta_i grows without bound at
-    grazing light. Shared by the two highlights.
+    Without 1/pi, normalization, or a cosine in the specular term, so f = eval / cos theta_i grows without bound at
+    grazing light. Base of both highlights.
     """
 
     kd: Colour = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
@@ -33,7 +33,7 @@ class _Empirical(BSDF):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the specular term has no cosine, so f divides it by cos theta_i alone",
+            "the specular term has no cosine, so f divides it by cos theta_i",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
         "energy": KnownViolation(
@@ -55,15 +55,15 @@ class _Empirical(BSDF):
 
     @property
     def _exponent(self) -> Scalar:
-        """p; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        """p; mypy does not treat an inherited field of a subclass as a declared parameter."""
         return self.p
 
     def _highlight_power(self) -> np.ndarray:
-        """The most that int (highlight)^p dwi comes to."""
+        """The maximum of int (highlight)^p dwi."""
         raise NotImplementedError
 
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """Base of the power, the cosine that peaks in the highlight."""
+        """Base of the power: the cosine that is largest in the highlight."""
         raise NotImplementedError
 
     def _peak(self, wo: Direction, wi: Direction) -> Scalar:
@@ -78,7 +78,7 @@ class _Empirical(BSDF):
 
     @function
     def _specular_share(self, wo: Direction) -> Scalar:
-        """Probability of the specular lobe: its power against that of the diffuse lobe, ks 2 pi / (p + 1) : kd pi."""
+        """Probability of the specular lobe: its power over the total, ks 2 pi / (p + 1) : kd pi."""
         specular = mean(self.ks) * 2.0 / (self.p + 1.0)
         both = specular + mean(self.kd)
         return ops.safe_div(specular, both)
@@ -98,7 +98,7 @@ class _Empirical(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        """u1 selects a lobe; a direction below the surface is a failed sample."""
         diffuse = square_to_cosine_hemisphere(u.y, u.z)
         specular = self._highlight_sample(wo, u.y, u.z)
         wi = where(u.x < self._specular_share(wo), specular, diffuse)
@@ -107,7 +107,7 @@ class _Empirical(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The diffuse part's colour."""
+        """The diffuse part's color."""
         return self.kd
 
     @property
@@ -119,13 +119,13 @@ class _Empirical(BSDF):
 class Phong(_Empirical):
     """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
 
-    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p, exactly that: the light's 1 / r^2 is the renderer's. The base of
-    the power is cut at 0, or an even p would light the wrong side, and light below the surface gives nothing.
+    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p; the light's 1 / r^2 is the renderer's task. The base of the power
+    is clamped at 0, since an even p would light the wrong side, and light below the surface contributes nothing.
     Neither reciprocal nor energy conserving.
     """
 
     def _highlight_power(self) -> np.ndarray:
-        """2 pi / (p + 1), met at normal incidence."""
+        """2 pi / (p + 1), reached at normal incidence."""
         return 2.0 * np.pi / (np.asarray(self.p) + 1.0)
 
     @function

@@ -1,1 +1,1 @@
-"""Published models of 1982 to 2012 that measured materials were fitted with."""
+"""Published models of 1982 to 2012, used in fits to measured materials."""

@@ -22,8 +22,8 @@ class AshikhminShirley(_Glossy):
     """Anisotropic Phong: f = diffuse part + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
     p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
-    F is Schlick's in the paper, of an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or
-    coupled to the lobe as in the paper: what F0 reflects is missing from it, and it fades toward grazing light.
+    F is Schlick's as in the paper, for an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or
+    coupled to the lobe as in the paper: it excludes the light that F0 reflects, and fades toward grazing light.
     Reciprocal.
     """
 
@@ -32,7 +32,7 @@ class AshikhminShirley(_Glossy):
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
-    coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
+    coupled: bool = flag(default=False, doc="the paper's diffuse part, which is reduced by the lobe")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
@@ -41,7 +41,7 @@ class AshikhminShirley(_Glossy):
         return np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
-        """F by name at a facet seen under cos_theta."""
+        """F, by name, at a facet seen at cos_theta."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -83,11 +83,11 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector of density p."""
+        """wo mirrored at a half vector with density p."""
         return frame.reflect(wo, frame.rotate_back(_half_vector(u.y, u.z, self.exponent), self.rotation))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F: of a narrow lobe."""
+        """specular F, the albedo of a narrow lobe."""
         return self.specular * self.reflectance(wo.z)
 
 

@@ -18,13 +18,13 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class CookTorrance(_Glossy):
-    """Rough metal or varnish as of 1982: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
+    """Rough metal or varnish in the original form: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
 
-    D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), Beckmann's without its 1 / pi, and G that of V-grooves: as printed.
-    Today D has the 1 / pi and the denominator a 4 (`conductor`), so this lobe is four times as bright as its facets;
-    hence specular = 1/4 for a real surface. Ngan2005 divides by pi once more. F is that of an index eta without
-    absorption, which stands for a metal of reflectance F0 by eta = (1 + sqrt F0) / (1 - sqrt F0). Reciprocal. Sampled
-    by visible normals of Beckmann's D with Smith's masking.
+    D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), Beckmann's without its 1 / pi, and G that of V-grooves, as published.
+    Today D includes the 1 / pi and the denominator a 4 (`conductor`), so this lobe is four times as bright as its
+    facets; specular = 1/4 corresponds to a real surface. Ngan2005 divides by pi once more. F is that of an index eta
+    without absorption; for a metal of reflectance F0 use eta = (1 + sqrt F0) / (1 - sqrt F0). Reciprocal. Sampled by
+    visible normals of Beckmann's D with Smith's masking.
     """
 
     specular: Colour = spectrum(default=0.25, doc="factor of the lobe; 1/4 is that of a real surface", low=0.0)
@@ -38,11 +38,11 @@ class CookTorrance(_Glossy):
     }
 
     def _most(self) -> np.ndarray:
-        """4 specular: no more is reflected than by facets of F = 1, four times."""
+        """4 specular: at most four times the reflection by facets of F = 1."""
         return 4.0 * np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F by name at a facet seen under cos_theta."""
+        """F, by name, at a facet seen at cos_theta."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, zeros_like(self.eta))
 
     @function
@@ -67,5 +67,5 @@ class CookTorrance(_Glossy):
         return frame.rotate_back(frame.reflect(wo_local, h), self.rotation)
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """4 specular F: of a narrow lobe."""
+        """4 specular F, the albedo of a narrow lobe."""
         return self.specular * self.reflectance(wo.z) * 4.0

@@ -1,4 +1,4 @@
-"""What the historic models share: Lambert's reflection plus a glossy lobe, simply added."""
+"""The base of the historic models: the sum of Lambert's reflection and a glossy lobe."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function
 from ...optics.frame import TINY, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 
-# Of all samples at most so many follow the lobe: where it comes out larger than its density says, as at grazing light,
+# Maximum fraction of samples that follow the lobe: where the lobe exceeds its sampling density, as at grazing light,
 # the cosine keeps the weight bounded.
 MAX_LOBE_SHARE = 0.95
 
 
 class _Glossy(BSDF):
-    """f = diffuse / pi + a lobe. A member gives the lobe, its density and sampling, and an estimate of its albedo.
+    """f = diffuse / pi + a lobe. A member defines the lobe, its density and sampling, and an estimate of its albedo.
 
-    The lobe is asked of two directions above the surface only: where one is not, for the normal in its place.
+    The lobe is evaluated for two directions above the surface only; a direction below is replaced by the normal.
     """
 
     overridable: ClassVar[bool] = True
@@ -40,11 +40,11 @@ class _Glossy(BSDF):
 
     @property
     def _lambert(self) -> Spectrum:
-        """`diffuse`; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        """`diffuse`; mypy does not treat an inherited field of a subclass as a declared parameter."""
         return self.diffuse
 
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f |cos theta_i| of the lobe alone."""
+        """f |cos theta_i| of the lobe."""
         raise NotImplementedError
 
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -52,15 +52,15 @@ class _Glossy(BSDF):
         raise NotImplementedError
 
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of the lobe, on either side of the surface; u.x is spread over [0, 1) again."""
+        """A direction of the lobe, on either side of the surface; u.x has been rescaled to [0, 1)."""
         raise NotImplementedError
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """The lobe's albedo, about: it decides how many samples follow it."""
+        """The approximate albedo of the lobe, which determines the fraction of its samples."""
         raise NotImplementedError
 
     def _focus(self) -> Scalar | float:
-        """How much narrower than the cosine the lobe is, 0 to 1: what it does not need, the cosine samples better."""
+        """How much narrower than the cosine the lobe is, 0 to 1: a wide lobe is sampled better by the cosine."""
         return 1.0
 
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -68,12 +68,12 @@ class _Glossy(BSDF):
         return self._lambert * (wi.z * inv_pi)
 
     def _most(self) -> float | np.ndarray:
-        """What the lobe's albedo stays below at every angle."""
+        """An upper bound of the lobe's albedo over all angles."""
         return math.inf
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the lobe: its albedo against that of the diffuse part, less where it is as wide as that."""
+        """Probability of the lobe: its albedo over the total, reduced for a lobe as wide as the cosine."""
         lobe = maximum(mean(self._lobe_albedo(wo)), 0.0)
         both = lobe + mean(self._lambert)
         return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MAX_LOBE_SHARE)
@@ -93,7 +93,7 @@ class _Glossy(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        """u1 selects a lobe; a direction below the surface is a failed sample."""
         o = where(wo.z > 0.0, wo, normal_like(wo))
         share = self._share(o)
         pick = u.x < share
@@ -104,7 +104,7 @@ class _Glossy(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: the two parts are simply added, so no values of theirs return all light without any loss."""
+        """Itself: the two parts are added, so no values of theirs return all light without loss."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -113,11 +113,11 @@ class _Glossy(BSDF):
 
 
 def sum_breach(more: str = "") -> KnownViolation:
-    """The breach of energy that adding two lobes is, with what makes the lobe itself gain energy."""
+    """The violation of energy conservation by a sum of two lobes, with the reason for a gain of the lobe itself."""
     return KnownViolation(
         f"{more}the two parts are added, and nothing keeps their sum below 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
-        certain=False,  # the bound need not be met
+        certain=False,  # the bound need not be reached
     )
 
 
@@ -136,7 +136,7 @@ class _Lit(NamedTuple):
 
 
 def lit(wo: Direction, wi: Direction) -> _Lit:
-    """(whether both are above the surface, both, with the normal in their place where they are not): what is masked
-    anyway must not bring an infinity or a root of a negative number into a gradient."""
+    """(whether both are above the surface, both directions, with the normal in place of one below): masked values must
+    not bring infinity or the root of a negative number into a gradient."""
     above = (wo.z > 0.0) & (wi.z > 0.0)
     return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

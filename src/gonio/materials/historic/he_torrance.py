@@ -34,24 +34,24 @@ from ...optics.special import exprel
 from ..microfacet import microfacet
 from .glossy import _Glossy, facet, sum_breach
 
-TERMS = 64  # of the series: its largest term stands at m = g, so they do up to g = 40
-ROUGH = 18.0  # g from which on, in all channels, the series' limit takes over, blended in over 1 (Westin's program)
+TERMS = 64  # of the series: its largest term is that of m = g, so they suffice up to g = 40
+ROUGH = 18.0  # g from which on, in all channels, the limit of the series is used, blended over 1 (Westin's program)
 
 
 class HeTorrance(_Glossy):
-    """Wave optics of a Gaussian rough surface, its directional-diffuse part: f = diffuse / pi + specular F S G D / (pi
+    """Wave optics of a Gaussian rough surface, the directional-diffuse part: f = diffuse / pi + specular F S G D / (pi
     (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
 
     D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), v = o + i along the surface,
-    g = (2 pi s / lambda (n.o + n.i))^2 with the roughness s = sigma / sqrt(1 + w) of what lies in no shadow, where
+    g = (2 pi s / lambda (n.o + n.i))^2 with the roughness s = sigma / sqrt(1 + w) of the unshadowed part, where
     w e^w = x^2, x = sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi). G, of the vectors of polarization, is
     4 (o.h)^2 / (n.h)^2 for any pair: those of eq. 76 are orthonormal, and the rest cancels. S is Smith's masking of
-    Beckmann's slopes, of width 2 sigma / tau, times (1 + erf(cot / width)) / 2 for either direction, with the
-    exponential that eq. 25 lost in print (Holzschuch2017).
+    Beckmann's slopes, of width 2 sigma / tau, times (1 + erf(cot / width)) / 2 for each direction, with the exponential
+    that is missing from the printed eq. 25 (Holzschuch2017).
 
-    As Ngan2005 used it: F of a real index, unpolarized; no coherent part (a mirror's), which no measured table holds.
+    As used by Ngan2005: F of a real index, unpolarized; no coherent (mirror) part, which no measured table contains.
     From g = 18 on D is the limit of the series, exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal.
-    Lengths in nm; only their ratios count. Sampled by visible normals of GGX, as wide as the series is at its peak.
+    Lengths are in nm; only their ratios matter. Sampled by visible normals of GGX, as wide as the series at its peak.
     """
 
     specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
@@ -80,21 +80,21 @@ class HeTorrance(_Glossy):
         return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
 
     @function
-    def _seen(self, v: Direction) -> Scalar:
+    def _shadowing(self, v: Direction) -> Scalar:
         """S of one direction (He1991, eq. 24 and 25, with the exponential)."""
         width = self._width()
         return distribution("beckmann").G1(v, vec2(width, width)) * (0.5 + 0.5 * erf(_cot(v) / width))
 
     @function
     def _shadowed(self, v: Direction) -> Scalar:
-        """tan erfc(cot / width) / sqrt(8 pi): what v adds to the equation for s."""
+        """tan erfc(cot / width) / sqrt(8 pi): the contribution of v to the equation for s."""
         cot = _cot(v)
         return (1.0 - erf(cot / self._width())) / cot * (8.0 * ops.pi) ** -0.5
 
     @function
     def _roughness2(self, x: Scalar) -> Scalar:
         """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82): a guess within a few percent, then Newton's
-        steps on w = x^2 e^-w, which end at rounding."""
+        steps for w = x^2 e^-w, accurate to rounding."""
         x2 = sqr(x)
         log_x = log(1.0 + x2)
         w = log_x * (1.0 - log(1.0 + log_x) / (2.0 + log_x))
@@ -108,7 +108,7 @@ class HeTorrance(_Glossy):
         """sum_m g^m e^-g / (m m!) exp(-spread / m), and its limit exp(-spread / g) / g where all g are large."""
         limit = exp(-spread / maximum(g, 1.0)) / maximum(g, 1.0)
         blend = clamp(-max_component(-g) - ROUGH, 0.0, 1.0)
-        g = minimum(g, 60.0)  # beyond, the limit alone counts, and the powers would leave float32
+        g = minimum(g, 60.0)  # beyond, only the limit counts, and the powers would overflow float32
         term = g * exp(-g)
         total = term * exp(-spread)
         for m in range(2, TERMS + 1):
@@ -126,14 +126,14 @@ class HeTorrance(_Glossy):
         correlation = sqr(waves * (ops.pi * self.tau))
         spread = correlation * (sqr(wo.x + wi.x) + sqr(wo.y + wi.y))
         d = correlation * 0.25 * self._series(g, spread)
-        geometry = sqr(2.0 * cos / h.z) * self._seen(wo) * self._seen(wi)
+        geometry = sqr(2.0 * cos / h.z) * self._shadowing(wo) * self._shadowing(wi)
         return self.specular * d * (self.reflectance(cos) * geometry * inv_pi / wo.z)
 
     @function
     def _peak(self, wo: Direction) -> tuple[Pair, Scalar]:
         """(width of the lobe in half vectors about the mirrored wo, g there), of the mean wavelength.
 
-        The terms about m = 1 + g count: exp(-(pi tau v / lambda)^2 / m), and v = 2 (n.o) tan h.
+        The terms about m = 1 + g dominate: exp(-(pi tau v / lambda)^2 / m), and v = 2 (n.o) tan h.
         """
         waves = 1.0 / mean(self.wavelength)
         g = sqr(4.0 * ops.pi * wo.z * waves) * self._roughness2(2.0 * self._shadowed(wo))
@@ -156,12 +156,12 @@ class HeTorrance(_Glossy):
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F (1 - e^-g): what is not reflected as by a mirror."""
+        """specular F (1 - e^-g): excludes the mirror part."""
         _, g = self._peak(wo)
         return self.specular * (self.reflectance(wo.z) * g * exprel(-g))
 
 
 @function
 def _cot(v: Direction) -> Scalar:
-    """cos over sin, held where both stay in float32."""
+    """cos over sin, clamped so that both remain within float32."""
     return clamp(v.z, 1e-6, 1.0) / sqrt(maximum(frame.sin2(v), 1e-12))

@@ -16,16 +16,16 @@ from ...optics.special import logrel
 from ...optics.warp import power_about, square_to_power_lobe, to_frame
 from .glossy import _Glossy, sum_breach
 
-SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which there is no lobe to speak of
+SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which the lobe is negligible
 
 
 class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
-    The three C are cx, cy, cz, n is `exponent`, the base is cut at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is Phong's
-    lobe about the mirror direction, normalized (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans
-    it toward the horizon, and where cx and cy are positive, light is thrown back. The largest C should have size 1, as
-    in Ngan2005's normalization: what is less goes into the lobe's strength, to the n-th power. Reciprocal. Sampled by a
+    The three C are cx, cy, cz, n is `exponent`, the base is clamped at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is
+    Phong's lobe about the mirror direction, normalized (Lafortune1994), called Blinn-Phong in Ngan2005; a smaller cz
+    tilts it toward the horizon, and positive cx and cy cause retro-reflection. The largest C should have size 1, as in
+    Ngan2005's normalization: a smaller one reduces the lobe's strength, to the n-th power. Reciprocal. Sampled by a
     power lobe about (C o_x, C o_y, C o_z).
     """
 
@@ -39,20 +39,20 @@ class Lafortune(_Glossy):
 
     @property
     def isotropic(self) -> bool:
-        """Whether x and y count alike; never of a recording, whose values are yet to come."""
+        """Whether x and y have equal factors; False for a recording, whose values are unknown."""
         if isinstance(self.cx, Node):
             return False
         return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
 
     def _most(self) -> np.ndarray:
-        """(n + 2) / (n + 1): the lobe's integral, cosine left out."""
+        """(n + 2) / (n + 1): the lobe's integral without the cosine."""
         n = np.asarray(self.exponent, float)
         return np.max(np.asarray(self.specular)) * np.max((n + 2.0) / (n + 1.0))
 
     @function
     def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
-        """(unit axis of the lobe, its length to the n-th power): the length from what is missing to 1, as a length so
-        near 1 has no digits left for a large n."""
+        """(unit axis of the lobe, its length to the n-th power): the length is computed from its difference to 1, since
+        a length close to 1 has no digits left for a large n."""
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)
@@ -61,7 +61,7 @@ class Lafortune(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the density of light at the peak against the cosine's."""
+        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the peak density of the lobe over the cosine's."""
         return sqr(self.exponent / (self.exponent + 2.0))
 
     @function
@@ -85,7 +85,7 @@ class Lafortune(_Glossy):
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular |C o|^n times the axis's cosine: of a narrow lobe."""
+        """specular |C o|^n times the axis's cosine: the albedo of a narrow lobe."""
         axis, strength = self._axis(wo)
         return self.specular * (strength * ops.clamp(axis.z, 0.1, 1.0))
 

@@ -19,7 +19,7 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class LowMicrofacet(_Glossy):
-    """Microfacets whose normals fall off as a power law: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
+    """Microfacets with a power-law distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
     D = (1 + b (1 - n.h))^-c, not normalized, so that `specular` is the height of the distribution; G is that of
     V-grooves, and the 1 / pi that of Cook1982. Reciprocal. Sampled by D's own power law.
@@ -34,7 +34,7 @@ class LowMicrofacet(_Glossy):
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """16 specular int D d(n.h): a sample weighs 8 specular F G (o.h) / (n.o) of it, and G (o.h) <= 2 (n.o)."""
+        """16 specular int D d(n.h): the weight of a sample is 8 specular F G (o.h) / (n.o), and G (o.h) <= 2 (n.o)."""
         b, c = np.asarray(self.b, float), np.asarray(self.c, float)
         log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
         return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
@@ -60,7 +60,7 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^3 of r = 1 / (8 int D), the density of light at the peak against the cosine's."""
+        """(r / (1 + r))^3 of r = 1 / (8 int D), the peak density of the lobe over the cosine's."""
         narrower = 1.0 / (1.0 + 8.0 * self._mass())
         return narrower * sqr(narrower)
 
@@ -79,7 +79,7 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector of density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
+        """wo mirrored at a half vector with density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
         q = 1.0 - self.c
         log_t = power_quantile(u.y * power_integral(self._log_end(), q), q)
         versine = log_t * exprel(log_t) / self.b
@@ -88,5 +88,5 @@ class LowMicrofacet(_Glossy):
         return frame.reflect(wo, vec3(sin * c, sin * s, 1.0 - versine))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """8 specular F int D: of a narrow lobe."""
+        """8 specular F int D, the albedo of a narrow lobe."""
         return self.specular * self.reflectance(wo.z) * (8.0 * self._mass())

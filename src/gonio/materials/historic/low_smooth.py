@@ -30,18 +30,18 @@ from ...optics.special import exprel, logrel, power_integral, power_quantile
 from ..microfacet import microfacet
 from .glossy import _Glossy, sum_breach
 
-# How far a step may always go: seen flat, half of the azimuths have their rim so close that all steps in them would end
-# in a sliver along the horizon, whose density no float32 direction resolves.
+# Minimum length of the largest step: at grazing views half of the azimuths have their rim so close that all their steps
+# would end in a sliver along the horizon, whose density no float32 direction resolves.
 RIM = 0.25
 
 
 class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
-    Dp = o + i along the surface, how far the pair is from a mirror's, after the power spectrum of polished surfaces
-    (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the surface: the facet's own angle
-    for a mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, no albedo. Sampled by its own power
-    law, cut near the rim of the disk of directions.
+    Dp = o + i along the surface is the deviation of the pair from mirror reflection; the lobe follows the power
+    spectrum of polished surfaces (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the
+    surface: the facet's angle for a mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, not an
+    albedo. Sampled by its own power law, truncated near the rim of the disk of directions.
     """
 
     specular: Colour = spectrum(default=10.0, doc="height of the peak over F, 1/sr", low=0.0)
@@ -50,10 +50,10 @@ class LowSmooth(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
-    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("the lobe is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """specular times the lobe's integral over a disk of radius 2, the farthest that |Dp| gets."""
+        """specular times the lobe's integral over a disk of radius 2, the maximum of |Dp|."""
         return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
@@ -74,13 +74,14 @@ class LowSmooth(_Glossy):
 
     @function
     def _log_fall(self, r2: Scalar) -> Scalar:
-        """log(1 + b r^2), which keeps its digits for a small b r^2."""
+        """log(1 + b r^2), accurate for a small b r^2."""
         x = self.b * r2
         return x * logrel(x)
 
     @function
     def _focus(self) -> Scalar:
-        """(1 - 1 / r)^2, r = 1 / (2 mass) the density at the peak against the cosine's, which is flat on the disk."""
+        """(1 - 1 / r)^2, r = 1 / (2 mass) the peak density of the lobe over the cosine's, which is uniform on the
+        disk."""
         mass = self._mass(ops.ones_like(self.b))
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
@@ -95,8 +96,8 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, ending at its rim or
-        at `RIM`; beyond the rim it has failed."""
+        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, up to the rim or to
+        `RIM`; a step beyond the rim is a failed sample."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c
@@ -109,7 +110,7 @@ class LowSmooth(_Glossy):
         return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F times the lobe's integral over a disk of radius 1, about the whole of it seen from the normal."""
+        """specular F times the lobe's integral over a disk of radius 1, about its full integral at normal incidence."""
         return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(ops.ones_like(wo.z)))
 
 
@@ -120,7 +121,7 @@ class Rim(NamedTuple):
 
 @function
 def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
-    """How far the rim of the unit disk is from the mirrored wo, ahead in the azimuth (c, s) and behind.
+    """Distance of the rim of the unit disk from the mirrored wo, ahead in the azimuth (c, s) and behind.
 
     The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2.
     """
@@ -133,7 +134,7 @@ def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
 
 @function
 def _deviation2(wo: Direction, wi: Direction) -> Scalar:
-    """|Dp|^2, squared length of o + i along the surface."""
+    """|Dp|^2, the squared length of o + i along the surface."""
     return sqr(wo.x + wi.x) + sqr(wo.y + wi.y)
 
 

@@ -31,39 +31,39 @@ from ...optics.fresnel.schlick import schlick
 from ...optics.special import exprel, power_integral, power_quantile
 from .glossy import _Glossy, facet, sum_breach
 
-# G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
-# one's own lead, two negative G1 would multiply to a positive light without bound.
+# Lower limit of G1. The paper's fits reach -0.002 at 90 degrees, which is preserved; with user-given parameters two
+# strongly negative G1 would multiply to a positive value without bound.
 MIN_COSINE = -0.01
 
 
 class ShiftedGamma(_Glossy):
-    """Microfacets of a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), a channel each
+    """Microfacets of a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
     (Bagher2012).
 
     D = normalization e^-x / (x^p pi cos^4 h), x = alpha + tan^2 h / alpha; G = G1(o) G1(i), where
     G1 = 1 + Lambda (1 - exp(t^k)) of t = (theta - theta0) / reach, 1 below theta0;
-    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. In the paper c = reach^-k, which is past 1e100 in its own fits; the angle is
-    not. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate to 1. All of these are fitted numbers: F can
-    pass 1 and, where f1 > f0, be negative, G1 can end below 0 at the horizon, and the lobe is then negative, as
-    printed. Reciprocal. Sampled by a power law and an exponential that together stay within a factor e of D, of the
-    narrowest channel's width and the widest's.
+    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. The paper's c = reach^-k exceeds 1e100 in its own fits, hence the angle
+    `reach`. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate to 1. All values are fitted: F can exceed
+    1 and, for f1 > f0, be negative; G1 can be negative at the horizon, and so can the lobe, as published. Reciprocal.
+    Sampled by a power law and an exponential that together approximate D within a factor e, with the smallest and
+    largest width of the channels.
     """
 
     specular: Colour = spectrum(default=0.3, doc="factor of the lobe", low=0.0)
     alpha: Colour = spectrum(default=0.05, doc="width of the distribution: tan^2 h falls off over alpha", low=1e-5)
     p: Colour = spectrum(default=0.5, doc="power of the distribution's peak", low=0.0, high=3.0)
     f0: Colour = spectrum(default=0.05, doc="F at normal incidence, but for f1")
-    f1: Colour = spectrum(default=0.0, doc="what F loses with the cosine")
+    f1: Colour = spectrum(default=0.0, doc="decrease of F with the cosine")
     normalization: Colour = spectrum(default=17.5, doc="factor of D (K in the paper)", low=0.0)
     Lambda: Colour = spectrum(default=3.0, doc="depth of the masking", low=0.0)
-    reach: Colour = spectrum(default=1.64, doc="angle past theta0 at which masking is deep", low=0.05, unit="rad")
+    reach: Colour = spectrum(default=1.64, doc="angle beyond theta0 at which masking is strong", low=0.05, unit="rad")
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("F and G are fitted factors, which no law bounds, "),
+        "energy": sum_breach("F and G are fitted factors without bounds, "),
         "positivity": KnownViolation(
-            "F is negative where f1 cos is more than Schlick's curve, and G1 may be at the horizon",
+            "F is negative where f1 cos exceeds Schlick's curve, and G1 may be negative at the horizon",
             1.0,
             certain=False,
         ),
@@ -75,11 +75,11 @@ class ShiftedGamma(_Glossy):
         return schlick(cos_theta, self.f0) - self.f1 * cos_theta
 
     @function
-    def _seen(self, v: Direction) -> Spectrum:
+    def _shadowing(self, v: Direction) -> Spectrum:
         """G1 = 1 + Lambda (1 - exp(t^k)) (Bagher2012, eq. 11)."""
         theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
         t = maximum(theta - self.theta0, 1e-6) / self.reach
-        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
+        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 is within float32, and far below the lower limit of G1
         depth = self.Lambda * power * exprel(power)
         return maximum(1.0 - depth, MIN_COSINE)
 
@@ -94,30 +94,30 @@ class ShiftedGamma(_Glossy):
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F D G / (pi cos theta_o)."""
         h, cos = facet(wo, wi)
-        facets = self._density(h) * self._seen(wo) * self._seen(wi) * (inv_pi / wo.z)
+        facets = self._density(h) * self._shadowing(wo) * self._shadowing(wi) * (inv_pi / wo.z)
         return self.specular * self.reflectance(cos) * facets
 
     @function
     def _widths(self) -> tuple[Scalar, Scalar, Scalar]:
-        """(least alpha, largest alpha, mean p) of the channels."""
+        """(smallest alpha, largest alpha, mean p) of the channels."""
         return -max_component(-self.alpha), max_component(self.alpha), mean(self.p)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the two widths, over 4 (o.h)."""
+        """Mixture for the two widths, over 4 (o.h)."""
         h, cos = facet(wo, wi)
         narrow, wide, p = self._widths()
         return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / cos
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector of one of the two."""
+        """wo mirrored at a half vector for one of the two widths."""
         narrow, wide, p = self._widths()
         return frame.reflect(wo, _gamma_sample(u.y, u.z, where(u.x < 0.5, narrow, wide), p))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """4 / pi specular F G, G at the mirrored direction: of a narrow lobe."""
-        return self.specular * self.reflectance(wo.z) * sqr(self._seen(wo)) * (4.0 * inv_pi)
+        """4 / pi specular F G, G at the mirrored direction: the albedo of a narrow lobe."""
+        return self.specular * self.reflectance(wo.z) * sqr(self._shadowing(wo)) * (4.0 * inv_pi)
 
 
 @function

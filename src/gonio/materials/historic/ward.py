@@ -17,9 +17,9 @@ from .glossy import _Glossy, facet, sum_breach
 class Ward(_Glossy):
     """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
-    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. A narrow lobe
-    reflects specular cos theta_o, so it loses energy as the view gets flat, and beyond, where a wide one has spread to
-    the normal's side, it gains without bound. Sampled by all half vectors, with density D (n.h) of Beckmann's D.
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. The albedo of
+    a narrow lobe is specular cos theta_o, so it loses energy toward grazing views; a wide lobe, spread toward the
+    normal, gains without bound there. Sampled by all half vectors, with density D (n.h) of Beckmann's D.
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe, seen from the normal", low=0.0)
@@ -32,7 +32,7 @@ class Ward(_Glossy):
 
     @property
     def _height(self) -> Spectrum:
-        """`specular`; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        """`specular`; mypy does not treat an inherited field of a subclass as a declared parameter."""
         return self.specular
 
     @function
@@ -48,7 +48,7 @@ class Ward(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the density of light at the peak against the cosine's."""
+        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the peak density of the lobe over the cosine's."""
         return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
 
     @function
@@ -70,5 +70,5 @@ class Ward(_Glossy):
         return frame.reflect(wo, frame.rotate_back(h, self.rotation))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular cos theta_o: of a narrow lobe."""
+        """specular cos theta_o, the albedo of a narrow lobe."""
         return self.specular * wo.z

@@ -1,4 +1,4 @@
-"""What follows from the parameters of OpenPBR alone: widths, indices, means over the hemisphere."""
+"""Values derived from the parameters of OpenPBR only: widths, indices, means over the hemisphere."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], str
 
 
 class Other(NamedTuple):
-    """What facets of glass miss that reflects otherwise than bare glass: under a film, or under a coat, by whose index
-    it reflects, while light is bent as by both. Missing are M + sum of less D (`spared`), M that of bare glass.
+    """Lost energy of glass facets whose reflectance differs from bare glass: under a film, or under a coat, whose index
+    determines reflection, while refraction depends on both. The loss is M + sum of less D (`spared`), M that of bare
+    glass.
 
-    less         by how much F differs at `FEW_PLACES`
-    thin, dense  the mean of what is missing, from outside and from inside
-    into, out    the share of it that passes to the other side (`compensation.glass`)
+    less         decrease of F at `FEW_PLACES`
+    thin, dense  mean of the loss, from outside and from inside
+    into, out    the fraction of it that passes to the other side (`compensation.glass`)
     """
 
     less: tuple[Spectrum, ...]
@@ -40,26 +41,26 @@ class Other(NamedTuple):
 
 
 class Between(NamedTuple):
-    """What follows from the parameters alone.
+    """Values that follow from the parameters only.
 
-    alpha        of the base, roughened by the coat, along x and y
+    alpha        widths of the base, roughened by the coat, along x and y
     rough        its roughness; the root of alpha with one width
-    coat_alpha   of the coat
-    ratio        index by which the base reflects, over what lies above it, 1 and more
-    eta          index by which it refracts, over the outside's
-    medium       index of what lies above the base, over the outside's
-    sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
-    joint        the same seen through the coat's
-    bent         by nodes of the cosine, how far that is off its mean; both of them
-    filmed       by how much the film changes F at `PLACES`; empty without one
-    extra        the mean of that
-    facets       factor of facets under the coat, by nodes of the cosine; empty without one
-    returned     what those of a dielectric return less than white ones would, averaged: the body below gets it
-    metal        what single scattering misses at F = 1
-    metal_again  colour of what a metal gives back
-    sheet_again  colours of what a thin sheet gives back, reflected and transmitted
-    glass        what it misses of bare glass; None where nothing is transmitted
-    other        what it misses more or less, as glass reflects otherwise there; None where it is bare
+    coat_alpha   widths of the coat
+    ratio        index for the base's reflection, over the medium above it, at least 1
+    eta          index for its refraction, over the outside's
+    medium       index of the medium above the base, over the outside's
+    sheer        fraction of diffuse light that the base's surface transmits: 1 minus its albedo, averaged
+    joint        the same for the base's and the coat's surface
+    bent         deviations from these means, by nodes of the cosine
+    filmed       change of F by the film at `PLACES`; empty without a film
+    extra        the mean of `filmed`
+    facets       factor of facets under the coat, by nodes of the cosine; empty without a coat
+    returned     mean loss of a dielectric's facets relative to white ones; the body below receives it
+    metal        energy lost by single scattering at F = 1
+    metal_again  color of a metal's compensation
+    sheet_again  colors of a thin sheet's compensation, reflected and transmitted
+    glass        energy lost by bare glass; None if nothing is transmitted
+    other        correction of that loss for the actual reflectance of the glass; None if it is bare
     """
 
     alpha: Pair
@@ -83,7 +84,7 @@ class Between(NamedTuple):
 
 
 def derive(model: _OpenPBR) -> Between:
-    """Widths and indices, means over the hemisphere, and what facets scatter twice."""
+    """Widths and indices, means over the hemisphere, and multiple scattering between facets."""
     rough = model.roughened()
     alpha = model.widths(rough, model.specular_roughness_anisotropy)
     coat_alpha = model.widths(model.coat_roughness, model.coat_roughness_anisotropy)
@@ -148,7 +149,7 @@ def derive(model: _OpenPBR) -> Between:
 def colors_of_sheet(
     model: _OpenPBR, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
 ) -> tuple[Spectrum, Spectrum]:
-    """Mean colors of what a thin sheet reflects and transmits."""
+    """Mean colors of the light that a thin sheet reflects and transmits."""
     f = [ones_like(model.base_color) * one for one in bare]
     if filmed:
         f = [one + more for one, more in zip(f, filmed, strict=True)]
@@ -157,7 +158,7 @@ def colors_of_sheet(
 
 
 def missed_by_glass(model: _OpenPBR, eta: Scalar, alpha: Pair) -> Glass:
-    """What single scattering at bare glass of that index misses."""
+    """The energy lost by single scattering in bare glass of that index."""
     kind = Dielectric(alpha=(0.1, 0.2) if model.anisotropic else 0.1, masking=model.masking)
     zero, white = zeros_like(model.base_color), ones_like(model.base_color)
     values = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
@@ -169,7 +170,7 @@ def missed_by_glass(model: _OpenPBR, eta: Scalar, alpha: Pair) -> Glass:
 def at_places(
     model: _OpenPBR, ratio: Scalar, eta: Scalar, medium: Scalar
 ) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
-    """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
+    """F of the bare dielectric at `PLACES`, its change by a film there, and the mean of that change."""
     cosines = [x + zeros_like(ratio) for x in PLACES]
     bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
     if not model.has("thin_film_weight"):
@@ -181,7 +182,7 @@ def at_places(
 def misses_otherwise(
     model: _OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
 ) -> Other:
-    """What that glass misses more or less than bare glass of index eta."""
+    """The difference of that glass's lost energy from bare glass of index eta."""
     white = ones_like(model.base_color)
     less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
     for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
@@ -213,13 +214,13 @@ def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[S
 def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple[Scalar, ...]:
     """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
 
-    A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
-    light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+    Some steps of Sinkhorn's iteration, damped. It starts at the solution for facets that scatter a fraction b of their
+    light uniformly and transmit the rest, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
 
-    kept  1 - E_coat at the nodes
+    transmitted  1 - E_coat at the nodes
     """
     rows, w = tables.scattered_at_nodes(rough, model.masking), []
-    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # where most light is
+    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # at the cosine of most of the light
     for n, one in enumerate(transmitted):
         cos = (n / (HATS - 1.0)) ** 2
         b = sqr(rough) / (sqr(rough) + cos + 1e-3)

@@ -1,4 +1,4 @@
-"""Small formulas of OpenPBR's slabs."""
+"""Formulas shared by OpenPBR's slabs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def mix(a: Array, b: Array, share: Scalar) -> Array:
 
 @function
 def modulated(ratio: Scalar, weight: Scalar) -> Scalar:
-    """The index whose F0 is that of `ratio` times a weight, held at index 5."""
+    """The index whose F0 is that of `ratio` times a weight, limited to index 5."""
     root = (ratio - 1.0) / (ratio + 1.0)
     epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), MAX_ROOT_F0), root)
     return (1.0 + epsilon) / (1.0 - epsilon)
@@ -53,8 +53,8 @@ def total_of(terms: list[Array]) -> Array:
 
 
 def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
-    """<w>: the mean factor of facets over what those of a dielectric send to a direction of a cosine. They reflect most
-    where light grazes: shares of the light are white facets' times F of the facet half way between."""
+    """<w>: the mean factor of facets over the light that a dielectric's facets scatter to a direction of a cosine. They
+    reflect most at grazing angles: the weights are white facets' times F of the facet half way between."""
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
     weighted, total = ops.zeros_like(cos), ops.zeros_like(cos)
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
@@ -67,8 +67,8 @@ def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[S
 
 @function
 def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
-    """The roughness of which a dielectric of one width reflects about as much as of two, seen along a direction:
-    straight down by the root of their mean square, where light grazes by the one seen. Met to .02 at a ratio of 3."""
+    """The width of an isotropic dielectric that reflects about as much as an anisotropic one, along a direction: the
+    root mean square at normal incidence, the width along the direction at grazing. Error 0.02 at a ratio of 3."""
     total, sin2 = 0.5 * (sqr(alpha.x) + sqr(alpha.y)), frame.sin2(w)
     seen2 = (sqr(alpha.x * w.x) + sqr(alpha.y * w.y) + 1e-6 * total) / (sin2 + 1e-6)
     share = (1.0 - w.z) * (1.2 - (index - 1.0) / (index + 1.0))
@@ -76,48 +76,48 @@ def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
 
 
 def covered_less(transmitted: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
-    """What a coat leaves of light that facets let in: its own, and what they send out less than white ones."""
+    """The light that a coat transmits from facets: its own fraction, and the loss of facets relative to white ones."""
     return transmitted + less * (1.0 - let_in) / maximum(let_in, 1e-3)
 
 
 def covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
-    """The albedo of facets under a film: what it changes at `PLACES`, by how much these count."""
+    """The albedo of facets under a film: the film's changes at `PLACES`, weighted by `shares`."""
     if not filmed:
         return E
     return clamp(E + total_of([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
 
 
 def averaged(values: list[Array]) -> Array:
-    """2 int F mu dmu of what F is at `PLACES`, or at `FEW_PLACES`."""
+    """2 int F mu dmu from F at `PLACES`, or at `FEW_PLACES`."""
     x, w = gauss(len(values))
     return total_of([value * weight for value, weight in zip(values, (2.0 * w * x).tolist(), strict=True)])
 
 
 @function
 def over_pi(scale: Scalar) -> Scalar:
-    """The mean whose inverse over pi that is; 0 of 0."""
+    """The mean whose inverse over pi is `scale`; 0 for 0."""
     return safe_div(inv_pi, scale)
 
 
 def colour_again(f: Spectrum, lost: Scalar) -> Spectrum:
-    """Colour of light that facets scatter twice or more: F^2 E_avg / (1 - F (1 - E_avg))."""
+    """Color of light scattered twice or more by facets: F^2 E_avg / (1 - F (1 - E_avg))."""
     return sqr(f) * (1.0 - lost) / (1.0 - f * lost)
 
 
 @function
 def power(colour: Spectrum, exponent: Scalar) -> Spectrum:
-    """A colour to a power; black stays black."""
+    """A color to a power; 0 remains 0."""
     return ops.exp(log(maximum(colour, 1e-6)) * exponent)
 
 
 def direction_at(cos: Scalar) -> Direction:
-    """A direction of a cosine, half way between the axes of two widths."""
+    """A direction with a given cosine, half way between the axes of two widths."""
     sin = math.sqrt(0.5) * safe_sqrt(1.0 - sqr(cos))
     return vec3(sin, sin, cos)
 
 
 def lobe_value(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
-    """A lobe's value; 0 where its facets are smooth, and of what is ideal `mirror` of smooth ones alone."""
+    """A lobe's value; 0 for smooth facets, and for ideal pairs `mirror` for smooth facets only."""
     if ideal is None:
         return value if smooth is None else where(smooth, 0.0, value)
     rough = where(ideal, 0.0, value)

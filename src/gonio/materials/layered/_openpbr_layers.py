@@ -1,4 +1,4 @@
-"""What OpenPBR's coat and fuzz leave of the light of what lies under them."""
+"""Attenuation by OpenPBR's coat and fuzz of the light of the layers below."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from ._openpbr_tables import HATS, NODES
 
 
 class Sides(NamedTuple):
-    """A pair of directions, both turned up.
+    """A pair of directions, both on the upper side.
 
-    wo, wi   above the surface; the normal where a pair is not to be evaluated
-    near     whether wi lies on wo's side
-    above    whether coat and fuzz lie on that side
+    wo, wi   above the surface; the normal in place of a pair that is not evaluated
+    near     whether wi is on wo's side
+    above    whether coat and fuzz are on that side
     """
 
     wo: Direction
@@ -51,7 +51,7 @@ class Sides(NamedTuple):
 
 
 def let_in(model: _OpenPBR, w: Direction) -> Spectrum:
-    """1 - E of the base's dielectric surface; of two widths that of the one that stands for them along w."""
+    """1 - E of the base's dielectric surface; for two widths by the equivalent width along w."""
     b = model.derived
     rough = b.rough
     if model.anisotropic:
@@ -60,7 +60,7 @@ def let_in(model: _OpenPBR, w: Direction) -> Spectrum:
 
 
 def kept_below(model: _OpenPBR, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
-    """The same by what follows from the parameters."""
+    """`let_in` as a function of a cosine and derived values."""
     E = tables.reflected(cos, rough, ratio, model.masking) + ops.zeros_like(model.base_color)
     return 1.0 - covered(E, filmed, tables.faced(cos, rough, model.masking) if filmed else ())
 
@@ -73,8 +73,8 @@ def fuzz_lobe(model: _OpenPBR) -> Sheen:
 def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
     """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
 
-    The lobe sends more light to some cosines than Lambert's, and those surfaces let less through there. Its mean
-    over azimuth is known: the factor makes a white base whole to second order.
+    The lobe scatters more light to some cosines than Lambert's, and those surfaces transmit less there. Its mean over
+    azimuth is known: the factor makes a white base lossless to second order.
     """
     rough = model.base_diffuse_roughness
     lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
@@ -88,7 +88,7 @@ def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
 
 
 def coat_kept(model: _OpenPBR, w: Direction) -> Scalar:
-    """1 - E of the coat's surface; of two widths as `_let_in`."""
+    """1 - E of the coat's surface; for two widths as in `let_in`."""
     rough = model.coat_roughness
     if model.may_be_anisotropic("coat_roughness_anisotropy"):
         rough = rough_along(w, model.derived.coat_alpha, model.coat_ior)
@@ -103,7 +103,7 @@ def inside(model: _OpenPBR, cos: Scalar) -> Scalar:
 
 @function
 def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
-    """(1 - K) / (1 - E_b K), K what the coat sends back down, E_b the base's albedo from above."""
+    """(1 - K) / (1 - E_b K), K the fraction that the coat reflects back down, E_b the base's albedo from above."""
     b = model.derived
     outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, model.coat_ior), model.coat_ior)
     broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(model.coat_ior)) / sqr(model.coat_ior)
@@ -118,11 +118,11 @@ def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
 
 
 def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
-    """At a direction outside: what the coat's surface lets through, what its colour leaves of one crossing with
-    the root of the darkening, the factor of a lobe of facets, and what those of a dielectric, for all that they
-    reflect, send out less than white ones: they reflect most where light grazes, and the coat covers most there.
+    """At a direction outside: the transmittance of the coat's surface; the coat's color for one crossing times the root
+    of the darkening; the factor of a lobe of facets; and the loss of a dielectric's facets relative to white ones: they
+    reflect most at grazing angles, where the coat transmits least.
 
-    A last step of the iteration (`balanced`): of a mirror the root of 1 - E, as exact as that itself.
+    Includes a last step of the iteration (`balanced`): for a mirror it is exactly the root of 1 - E.
     """
     b, cos = model.derived, w.z
     transmitted = coat_kept(model, w)
@@ -136,8 +136,8 @@ def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scal
 
 
 def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
-    """Factors of the base's facets and of its diffuse lobe, of which those let in so much from both directions; 1
-    where there is no coat on their side."""
+    """Factors of the base's facets and of its diffuse lobe, given the transmittance along both directions; 1 if there
+    is no coat on their side."""
     C = model.coat_weight
     kept_o, tint_o, facet_o, less_o = under(model, pair.wo)
     if model.layering == "albedo":
@@ -160,7 +160,7 @@ def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]
 
 
 def past_layers(model: _OpenPBR, w: Direction) -> Spectrum:
-    """What coat and fuzz leave of light that passes them once, on its way in or out."""
+    """Transmittance of coat and fuzz for light that crosses them once, inward or outward."""
     left = ones_like(model.base_color)
     if model.has("coat_weight"):
         transmitted, tint, _, less = under(model, w)

@@ -20,9 +20,9 @@ from ._openpbr_slabs import _OpenPBR
 
 
 def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Mask | None = None) -> Spectrum:
-    """The sum of all lobes of what is there of the surface, times |cos theta_i|.
+    """The sum of all lobes of the covered part of the surface, times |cos theta_i|.
 
-    ideal  rays whose two directions smooth facets join: there the value is what those send on
+    ideal  rays whose two directions are joined by smooth facets: there the value is the facets' delta weight
     """
     b = model.derived
     pair = sides(model, wo, wi)
@@ -40,7 +40,7 @@ def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Ma
         glossy = model.glossy(cos, b.ratio, b.eta, b.medium)
         dielectric = glossy * model.specular_color * facets
     if model.geometry_thin_walled and model.has("transmission_weight"):
-        assert b.sheet_again is not None, "derived where walls are thin"
+        assert b.sheet_again is not None, "derived for thin walls"
         back, on = model.sheet(cos, glossy, b.eta)
         sheet = (back * facets + b.sheet_again[0] * multiple) * model.specular_color
         dielectric = mix(dielectric, sheet, T)
@@ -74,7 +74,7 @@ def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Ma
 
 
 def facet_lobe(model: _OpenPBR, o: Direction, i: Direction, h: Direction, alpha: Pair) -> Scalar:
-    """D G / (4 cos theta_o), which is the lobe of facets at F = 1, times cos theta_i."""
+    """D G / (4 cos theta_o), the lobe of facets at F = 1, times cos theta_i."""
     ndf = distribution("ggx")
     g = masking.masking_shadowing(model.masking, ndf, o, i, h, alpha)
     return ndf.D(h, alpha) * g / (4.0 * o.z)
@@ -98,22 +98,22 @@ def glass_lobes(
     smooth: Mask | None,
     ideal: Mask | None,
 ) -> tuple[Spectrum, Spectrum, Spectrum]:
-    """(F, what glass reflects, what it lets through) of a pair of directions, from either side."""
+    """(F, light reflected by glass, light transmitted by it) for a pair of directions, from either side."""
     b, glass, T = model.derived, interface(model), model.transmission_weight
     white, above = ops.ones_like(model.base_color), wo.z > 0.0
     eta = glass._relative_eta(wo)
     at = glass._facet(wo, wi, eta)
-    # F is a matter of the cosine outside, wherever light comes from
+    # F depends on the cosine outside for both directions of light
     cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
     joined, outside = where(above, abs(at.dot_o), abs(at.dot_i)), where(above, pair.wo, pair.wi)
     crosses = joined if ideal is None else where(ideal, outside.z, joined)
     outer = where(pair.near, where(above, cos, maximum(cos_t, 1e-4)), crosses)
     f = model.glossy(outer, b.ratio, b.eta, b.medium)
-    # from inside, what coat and fuzz would send back comes back with what the base reflects
+    # from inside, light that coat and fuzz would reflect is added to the base's reflection
     inner = where(cos_t > 0.0, f, white)
     inner = 1.0 - (1.0 - inner) * layers.past_layers(model, direction_at(maximum(cos_t, 1e-4)))
     twice = lobe_value(scattered_twice(model, wo, wi, mode), None, ideal)
-    # what is no glass looks from below as from above
+    # the opaque part looks the same from below as from above
     opaque = model.glossy(cos, b.ratio, b.eta, b.medium)
     mirrored = where(above, f * model.specular_color, mix(opaque, inner, T))
     tint = where(above, model.specular_color, white)
@@ -127,7 +127,7 @@ def glass_lobes(
 
 
 def interface(model: _OpenPBR) -> Dielectric:
-    """The geometry of refraction at the base's facets; how much goes that way is said elsewhere."""
+    """The geometry of refraction at the base's facets, without weights."""
     b, zero = model.derived, ops.zeros_like(model.base_color)
     kind = Dielectric(alpha=(0.1, 0.2) if model.anisotropic else 0.1, masking=model.masking)
     clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": ops.zeros_like(b.eta)}
@@ -135,7 +135,7 @@ def interface(model: _OpenPBR) -> Dielectric:
 
 
 def sides(model: _OpenPBR, wo: Direction, wi: Direction) -> Sides:
-    """Both turned up; a thin wall looks alike from both sides."""
+    """Both directions on the upper side; a thin wall is the same from both sides."""
     near = wo.z * wi.z > 0.0
     above = wo.z > 0.0
     valid = (wo.z != 0.0) & (wi.z != 0.0)
@@ -150,7 +150,7 @@ def sides(model: _OpenPBR, wo: Direction, wi: Direction) -> Sides:
 
 
 def diffuse_lobes(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
-    """What the body under the dielectric reflects and, of a thin wall, lets through, times cos theta_i."""
+    """Reflection by the body below the dielectric and, for a thin wall, its transmission, times cos theta_i."""
     b = model.derived
     white = ops.ones_like(model.base_color)
     values = {"roughness": model.base_diffuse_roughness}
@@ -171,15 +171,15 @@ def diffuse_lobes(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum
 
 
 def multiple_scattering(model: _OpenPBR, wo: Direction, wi: Direction) -> Scalar:
-    """What facets that lose nothing scatter more than once, times cos theta_i."""
+    """Multiple scattering between lossless facets, times cos theta_i."""
     lost = model.derived.metal
     return lost.at(wo) * lost.at(wi) * lost.over_average(wi) * wi.z
 
 
 def scattered_twice(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-    """What facets of glass scatter more than once, to both sides, times |cos theta_i|."""
+    """Multiple scattering between facets of glass, to both sides, times |cos theta_i|."""
     lost, other = model.derived.glass, model.derived.other
-    assert lost is not None, "derived where light is transmitted"
+    assert lost is not None, "derived if light is transmitted"
     cos = abs(wi.z) * lost.radiance(wo, wi, mode)
     if other is None:
         bare = lost.at(wo) * lost.at(wi) * lost.over_average(wi) * lost.share(wo, wi)
@@ -191,9 +191,9 @@ def scattered_twice(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode) -
 
 
 def missed(model: _OpenPBR, w: Direction) -> Spectrum:
-    """What glass misses at a direction, from its own side."""
+    """Energy lost by glass at a direction, from its own side."""
     b = model.derived
-    assert b.glass is not None and b.other is not None, "derived where light is transmitted"
+    assert b.glass is not None and b.other is not None, "derived if light is transmitted"
     shares = tables.spared(abs(w.z), b.rough, b.eta, model.masking)
     count = len(b.other.less)
     more = [

@@ -1,4 +1,4 @@
-"""How OpenPBR draws directions: a mixture of its lobes, by about what each sends on."""
+"""Sampling of OpenPBR: a mixture of its lobes, by their approximate albedos."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ._openpbr_slabs import _OpenPBR
 
 
 class Shares(NamedTuple):
-    """Probabilities of the lobes: fuzz, coat, facets that mirror and that refract, cosines on both sides."""
+    """Probabilities of the lobes: fuzz, coat, reflecting and refracting facets, cosines on both sides."""
 
     fuzz: Scalar
     coat: Scalar
@@ -47,7 +47,7 @@ class Shares(NamedTuple):
 
 
 def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
-    """Of each lobe about what it reflects or lets through, with a little of all, so that no weight grows."""
+    """The approximate albedo of each lobe, plus a small probability for all, which bounds the weights."""
     b = model.derived
     o = upper(wo)
     cos = maximum(o.z, 1e-4)
@@ -60,7 +60,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
     if model.has("coat_weight"):
         coat = where(above, model.coat_weight * (1.0 - layers.coat_kept(model, o)), 0.0) * left
         left = left - coat
-    # a film's part by its mean: its colours would double the work, for probabilities
+    # the film's effect by its mean: per channel it would double the work for probabilities
     glossy = clamp(exact.dielectric(cos, fresnel.cos_transmitted(cos, b.ratio), b.ratio) + b.extra, 0.0, 1.0)
     body = model.base_color * model.base_weight
     thin = model.geometry_thin_walled and model.has("subsurface_weight")
@@ -81,7 +81,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
         refracted = mean(on[1]) * (1.0 - M) * T
         near, far = near + lost * T * mean(on[0]), lost * T * mean(on[1])
     elif model.refracts:
-        assert b.glass is not None, "derived where light is transmitted"
+        assert b.glass is not None, "derived if light is transmitted"
         cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
         inner = exact.dielectric(cos_t, fresnel.cos_transmitted(cos_t, b.ratio), b.ratio) + b.extra
         inner = clamp(where(cos_t > 0.0, inner, 1.0), 0.02, 0.98)
@@ -100,7 +100,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
 
 
 def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
-    """The mixture of the lobes' densities, by their shares."""
+    """The mixture of the lobes' densities, by their probabilities."""
     b = model.derived
     pair = lobes.sides(model, wo, wi)
     o, i = pair.wo, pair.wi
@@ -129,7 +129,7 @@ def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) ->
 
 
 def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
-    """A direction of the lobe that u.x picks."""
+    """A direction of the lobe that u.x selects."""
     b, shares = model.derived, shares_at(model, wo)
     pick = u.x
     if model.has_holes():
@@ -189,7 +189,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
 def _transmitted(
     model: _OpenPBR, wo: Direction, o: Direction, m: Direction, mirrored: Direction
 ) -> tuple[Direction, Mask]:
-    """The direction on the far side by a facet of normal m, and whether there is one."""
+    """The direction refracted by a facet of normal m, and whether there is one."""
     if model.geometry_thin_walled:
         return vec3(mirrored.x, mirrored.y, -mirrored.z), mirrored.z > 0.0
     b = model.derived
@@ -200,7 +200,7 @@ def _transmitted(
 
 
 def _with_holes(model: _OpenPBR, wo: Direction, sample: Sample, covered: Mask) -> Sample:
-    """The sample where the surface is there (`covered`); elsewhere light goes straight on."""
+    """The sample on the covered part of the surface; elsewhere light passes straight through."""
     one = ops.ones_like(sample.pdf)
     return Sample(
         where(covered, sample.wi, -wo),

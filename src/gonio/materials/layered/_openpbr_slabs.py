@@ -1,4 +1,4 @@
-"""The parameters of OpenPBR, which of its lobes there are, and the reflectances of its slabs."""
+"""The parameters of OpenPBR, the presence of its lobes, and the reflectances of its slabs."""
 
 from __future__ import annotations
 
@@ -40,42 +40,42 @@ from ...optics.roughness import SMOOTH
 from ._openpbr_formulas import mix, modulated, power
 
 NARROWEST = 1e-3  # of two widths
-NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
+NEAREST = 1.001  # index of refraction over the outside's: closer to 1 no facet can be determined for refraction
 LAYERINGS = {
-    "reciprocal": "a layer dims what lies under it at both ends, so that light may be turned round",
+    "reciprocal": "a layer attenuates the light below along both directions, which is reciprocal",
     "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
 }
 
 
 class _OpenPBR(BSDF):
-    """What the parameters of OpenPBR say before any direction is known; `OpenPBR` adds its lobes."""
+    """The parameters of OpenPBR and facts that do not depend on directions; `OpenPBR` adds the lobes."""
 
     masking: ClassVar[str] = "smith-correlated"
 
-    base_weight: Number = number(default=1.0, doc="factor on the base's colour", low=0.0, high=1.0)
-    base_color: Colour = spectrum(default=0.8, doc="diffuse colour; of metal, seen from above", low=0.0, high=1.0)
+    base_weight: Number = number(default=1.0, doc="factor on the base's color", low=0.0, high=1.0)
+    base_color: Colour = spectrum(default=0.8, doc="diffuse color; of metal, at normal incidence", low=0.0, high=1.0)
     base_diffuse_roughness: Number = number(
         default=0.0, doc="of the diffuse lobe, as `eon`", low=0.0, high=1.0, off=0.0
     )
-    base_metalness: Number = number(default=0.0, doc="share of the surface that is metal", low=0.0, high=1.0, off=0.0)
+    base_metalness: Number = number(default=0.0, doc="metal fraction of the surface", low=0.0, high=1.0, off=0.0)
     specular_weight: Number = number(default=1.0, doc="factor on F0 by the index, and on metal", low=0.0, high=4.0)
     specular_color: Colour = spectrum(
-        default=1.0, doc="tint of what is reflected outside; of metal, at the edge", low=0.0, high=1.0
+        default=1.0, doc="tint of the outer reflection; of metal, at the edge", low=0.0, high=1.0
     )
     specular_roughness: Number = number(default=0.3, doc="root of alpha", low=0.0, high=1.0)
     specular_roughness_anisotropy: Number = number(
-        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
     )
     specular_ior: Number = number(default=1.5, doc="index of the base", low=1.0, high=5.0)
     transmission_weight: Number = number(
-        default=0.0, doc="share of the dielectric that light passes through", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="fraction of the dielectric that transmits light", low=0.0, high=1.0, off=0.0
     )
     transmission_color: Colour = spectrum(
-        default=1.0, doc="what is left of white light after `transmission_depth`; at depth 0 a tint", low=0.0, high=1.0
+        default=1.0, doc="color of white light after `transmission_depth`; at depth 0 a tint", low=0.0, high=1.0
     )
     transmission_depth: Number = number(default=0.0, doc="0 tints at the surface", low=0.0, high=1e6)
     transmission_scatter: Colour = spectrum(
-        default=0.0, doc="scattering inside, which no surface has: 0, or an error", low=0.0, inside=True
+        default=0.0, doc="volume scattering, which no surface has: 0, or an error", low=0.0, inside=True
     )
     transmission_scatter_anisotropy: Number = number(
         default=0.0, doc="of that scattering", low=-1.0, high=1.0, inside=True
@@ -85,74 +85,74 @@ class _OpenPBR(BSDF):
     )
     transmission_dispersion_abbe_number: Number = number(default=20.0, doc="of that dispersion", low=0.0, inside=True)
     subsurface_weight: Number = number(
-        default=0.0, doc="share of the opaque dielectric that scatters under its surface", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="fraction of the opaque dielectric with subsurface scattering", low=0.0, high=1.0, off=0.0
     )
-    subsurface_color: Colour = spectrum(default=0.8, doc="its colour", low=0.0, high=1.0)
+    subsurface_color: Colour = spectrum(default=0.8, doc="its color", low=0.0, high=1.0)
     subsurface_radius: Number = number(
-        default=1.0, doc="mean free path; taken for 0, with a warning", low=0.0, inside=True
+        default=1.0, doc="mean free path; treated as 0, with a warning", low=0.0, inside=True
     )
     subsurface_radius_scale: Colour = spectrum(
-        default=(1.0, 0.5, 0.25), doc="factor on it, by colour", low=0.0, inside=True
+        default=(1.0, 0.5, 0.25), doc="factor on it, per channel", low=0.0, inside=True
     )
     subsurface_scatter_anisotropy: Number = number(
-        default=0.0, doc="of a thin wall: 1 sends all light on, -1 all back", low=-1.0, high=1.0
+        default=0.0, doc="of a thin wall: 1 scatters all light forward, -1 all back", low=-1.0, high=1.0
     )
-    coat_weight: Number = number(default=0.0, doc="share of the surface under the coat", low=0.0, high=1.0, off=0.0)
+    coat_weight: Number = number(default=0.0, doc="fraction of the surface under the coat", low=0.0, high=1.0, off=0.0)
     coat_color: Colour = spectrum(
-        default=1.0, doc="what the coat leaves of light that crosses it twice, straight", low=0.0, high=1.0
+        default=1.0, doc="transmittance of the coat for two crossings at normal incidence", low=0.0, high=1.0
     )
     coat_roughness: Number = number(default=0.0, doc="root of alpha", low=0.0, high=1.0)
     coat_roughness_anisotropy: Number = number(
-        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
     )
     coat_ior: Number = number(default=1.6, doc="index of the coat", low=1.0, high=5.0)
     coat_darkening: Number = number(
-        default=1.0, doc="how much light that bounces under the coat darkens the base", low=0.0, high=1.0
+        default=1.0, doc="darkening of the base by light reflected under the coat", low=0.0, high=1.0
     )
-    fuzz_weight: Number = number(default=0.0, doc="share of the surface under fuzz", low=0.0, high=1.0, off=0.0)
-    fuzz_color: Colour = spectrum(default=1.0, doc="factor on what the fuzz scatters", low=0.0, high=1.0)
-    fuzz_roughness: Number = number(default=0.5, doc="0 is fibres along the normal, 1 dust", low=0.0, high=1.0)
+    fuzz_weight: Number = number(default=0.0, doc="fraction of the surface under fuzz", low=0.0, high=1.0, off=0.0)
+    fuzz_color: Colour = spectrum(default=1.0, doc="factor on the light scattered by the fuzz", low=0.0, high=1.0)
+    fuzz_roughness: Number = number(default=0.5, doc="0 is fibers along the normal, 1 dust", low=0.0, high=1.0)
     thin_film_weight: Number = number(
-        default=0.0, doc="share of the base under a thin film", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="fraction of the base under a thin film", low=0.0, high=1.0, off=0.0
     )
     thin_film_thickness: Number = number(default=0.5, doc="of the film", low=0.0, high=3.0, unit="um")
     thin_film_ior: Number = number(default=1.4, doc="index of the film", low=1.0, high=3.0)
     emission_luminance: Number = number(
-        default=0.0, doc="0, or an error: a shape's emitter shines", low=0.0, unit="nit", inside=True
+        default=0.0, doc="0, or an error: emission belongs to a shape's emitter", low=0.0, unit="nit", inside=True
     )
     emission_color: Colour = spectrum(default=1.0, doc="of that emission", low=0.0, inside=True)
     geometry_opacity: Number = number(
         default=1.0,
-        doc="share of the surface that is there; light goes straight on elsewhere",
+        doc="fraction of the surface that is covered; light passes straight through elsewhere",
         low=0.0,
         high=1.0,
         off=1.0,
     )
-    geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an inside")
-    layering: str = choice("reciprocal", "how a coat dims what lies under it", LAYERINGS)
+    geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an interior")
+    layering: str = choice("reciprocal", "how a coat attenuates the layers below", LAYERINGS)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         given = self.has
         if given("emission_luminance"):
             hint = "give the shape an emitter in the scene"
-            raise InputError("a surface that shines: emission_luminance 0 expected", "OpenPBR.emission_luminance", hint)
+            raise InputError("emission given, emission_luminance 0 expected", "OpenPBR.emission_luminance", hint)
         bulk = given("transmission_weight") and not self.geometry_thin_walled
         if bulk and given("transmission_scatter") and given("transmission_depth"):
             hint = "transmission_scatter 0 leaves absorption, which paths follow; or subsurface_weight for a dense body"
-            raise InputError("light scattered inside is no matter of a surface", "OpenPBR.transmission_scatter", hint)
+            raise InputError("volume scattering is not a property of a surface", "OpenPBR.transmission_scatter", hint)
         if bulk and given("transmission_dispersion_scale"):
             hint = 'Dielectric(eta="bk7") in a spectral render'
-            raise InputError("dispersion is not followed", "OpenPBR.transmission_dispersion_scale", hint)
+            raise InputError("dispersion is not supported", "OpenPBR.transmission_dispersion_scale", hint)
         if given("subsurface_weight") and given("subsurface_radius") and not self.geometry_thin_walled:
             text = (
-                "subsurface_radius is taken for 0: light leaves where it enters, as a diffuse lobe of subsurface_color"
+                "subsurface_radius is treated as 0: light leaves where it enters, as a diffuse lobe of subsurface_color"
             )
             warnings.warn(f"OpenPBR: {text}", GonioWarning, stacklevel=3)
 
     def has(self, name: str) -> bool:
-        """Whether a weight may be other than 0, known before anything runs: then its part of the code is there. In a
-        recording all parts are, as their weights are yet to come."""
+        """Whether a weight may differ from 0, known statically: if so, the component's code is included. A recording
+        includes all components, as their weights are unknown."""
         value = getattr(self.plain, name)
         if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
             return True
@@ -163,7 +163,7 @@ class _OpenPBR(BSDF):
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the base has, or may have, two widths; never for what is only recorded."""
+        """Whether the base has, or may have, two widths; False in recordings."""
         return self.may_be_anisotropic("specular_roughness_anisotropy")
 
     @property
@@ -181,7 +181,7 @@ class _OpenPBR(BSDF):
         return bool(np.any(np.asarray(value, float) != 1.0))
 
     def times_opacity(self, value: Array) -> Array:
-        """A value times the share of the surface that is there."""
+        """A value times the covered fraction of the surface."""
         return value * self.geometry_opacity if self.has_holes() else value
 
     def may_be_smooth(self, name: str) -> bool:
@@ -193,42 +193,42 @@ class _OpenPBR(BSDF):
 
     @property
     def refracts(self) -> bool:
-        """Whether light goes on into a body."""
+        """Whether light is refracted into a body."""
         return not self.geometry_thin_walled and self.has("transmission_weight")
 
     @property
     def two_faced(self) -> bool:
-        """Whether there is anything to see from below."""
+        """Whether the surface is visible from below."""
         return self.geometry_thin_walled or self.refracts
 
-    # ------------------------------------------------------------------ what follows from the parameters
+    # ------------------------------------------------------------------ values derived from the parameters
 
     @function
     def widths(self, roughness: Scalar, anisotropy: Scalar) -> Pair:
-        """alpha along x and y, whose squares add up to twice roughness^4, held at 1, where the tables end."""
+        """alpha along x and y, with squares that add up to twice roughness^4, limited to 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
-        # of a lobe that is no mirror neither width: a thread of 1e-4 is narrower than samples resolve
+        # for a rough lobe neither width may be tiny: a strip of 1e-4 is narrower than samples resolve
         across = maximum(along * low, minimum(along, NARROWEST))
         return vec2(clamp(along, SMOOTH, 1.0), clamp(across, SMOOTH, 1.0))
 
     def smooth(self, alpha: Pair, name: str) -> Mask | None:
-        """Where facets of these widths are a mirror; None where they are nowhere."""
+        """Where facets of these widths are a mirror; None if nowhere."""
         return (alpha.x <= SMOOTH) & (alpha.y <= SMOOTH) if self.may_be_smooth(name) else None
 
     @function
     def roughened(self) -> Scalar:
-        """Roughness of the base, whose facets are seen through a rough coat."""
+        """Roughness of the base as seen through a rough coat."""
         own, over = sqr(sqr(self.specular_roughness)), sqr(sqr(self.coat_roughness))
         under = sqrt(sqrt(clamp(own + 2.0 * over, 1e-12, 1.0)))
         return mix(self.specular_roughness, under, self.coat_weight)
 
     @function
     def indices(self) -> tuple[Scalar, Scalar, Scalar]:
-        """(index by which the base reflects, by which it refracts, index of what lies above it).
+        """(index for the base's reflection, index for its refraction, index of the medium above it).
 
-        The coat bends light before it meets the base, so that a coat of the higher index reflects nothing totally: as
-        specified, the ratio is turned round then.
+        The coat refracts light before it reaches the base, so a coat of higher index causes no total reflection: as
+        specified, the ratio is inverted then.
         """
         base, coat = self.specular_ior, self.coat_ior
         ratio = base / coat
@@ -241,11 +241,11 @@ class _OpenPBR(BSDF):
     # ------------------------------------------------------------------ reflectances
 
     def film_change(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
-        """What the film adds to R of a base of index eta + i k, both over the medium's, under a cosine outside.
+        """Change of R by the film over a base of index eta + i k, both relative to the medium, at a cosine outside.
 
-        That is R of the film less R of a film of no thickness by the same formula. The base without it has a
-        reflectance of its own (a metal's F82 curve), and the formula's three harmonics do not end at Fresnel's
-        equations: so a film of thickness 0, or of the medium's index, changes nothing.
+        It is R with the film minus R with a film of thickness 0 by the same formula. The base without the film has its
+        own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to Fresnel's
+        equations: with this difference, a film of thickness 0, or of the medium's index, changes nothing.
         """
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
         thickness = 1000.0 * self.thin_film_thickness
@@ -260,7 +260,7 @@ class _OpenPBR(BSDF):
     def clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
         """What the film adds to R of the dielectric."""
         white = ops.ones_like(self.base_color)
-        # one value for all channels, so that compilers do the work for one
+        # the same value for all channels, so that compilers evaluate it once
         alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))
         return self.film_change(cos, alike, None, medium)
 
@@ -273,13 +273,13 @@ class _OpenPBR(BSDF):
 
     @function
     def bare_metal(self, cos: Scalar) -> Spectrum:
-        """F82 by its colours."""
+        """F82 from its colors."""
         r0 = self.base_color * self.base_weight
         return f82(cos, r0, self.specular_color * schlick(GRAZING, r0)) * minimum(self.specular_weight, 1.0)
 
     @function
     def metal(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """F of the metal; under a film of the index that Gulbrandsen2014 finds for them."""
+        """F of the metal; under a film with the index that Gulbrandsen2014 assigns to its colors."""
         bare = self.bare_metal(cos)
         if not self.has("thin_film_weight"):
             return bare
@@ -292,7 +292,7 @@ class _OpenPBR(BSDF):
         return clamp(bare + added * self.thin_film_weight, 0.0, 1.0)
 
     def sheet(self, cos: Scalar, f: Spectrum, eta: Scalar) -> tuple[Spectrum, Spectrum]:
-        """What a thin sheet whose faces reflect f sends back and lets through, all bounces between them together."""
+        """Light that a thin sheet with face reflectance f reflects and transmits, all bounces included."""
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(eta))
         t = power(self.transmission_color, 1.0 / maximum(inner, 0.05))
         rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)
@@ -317,7 +317,7 @@ class _OpenPBR(BSDF):
     @property
     def isotropic(self) -> bool:
         plain = self.plain
-        if isinstance(self.specular_roughness_anisotropy, Node):  # a recording's may take any value
+        if isinstance(self.specular_roughness_anisotropy, Node):  # unknown in a recording
             return False
         widths = plain.specular_roughness_anisotropy, plain.coat_roughness_anisotropy
         return all(isinstance(one, int | float) and one == 0 for one in widths)
@@ -335,7 +335,7 @@ class _OpenPBR(BSDF):
         return Interior(self.indices()[1], loss, ops.zeros_like(self.transmission_depth))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's colours under a cosine."""
+        """The base's colors at a cosine."""
         b = self.derived
         cos = abs(wo.z)
         f = self.glossy(cos, b.ratio, b.eta, b.medium)

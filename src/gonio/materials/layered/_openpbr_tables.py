@@ -1,4 +1,4 @@
-"""What OpenPBR knows of rough surfaces as tables: how much facets of any reflectance send back, and where to."""
+"""Tables of rough surfaces for OpenPBR: the albedo of facets of any reflectance, and its distribution."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ from ...optics.special import gauss
 from ..compensated.kulla_conty import KullaConty
 from ..microfacet.conductor import Conductor
 
-SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror, whatever it is
+SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror
 MAX_ROOT_F0 = 2.0 / 3.0  # root of F0 at index 5, where the tables end
-INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # at grazing angles F is met to 2e-3 whatever the index, else to 5e-4
-DRAWS = 1 << 12  # of each direction
-HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
-NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means of what two layers let through: 1e-3 at F0 = .05
+INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # error of F: 2e-3 at grazing angles for any index, else 5e-4
+DRAWS = 1 << 12  # samples per direction
+HATS = 12  # nodes of the cosine, over its root: error 0.5 % for a white coated metal, with 8 nodes 1 %
+NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means through two layers: error 1e-3 at F0 = 0.05
 
 
 def _row(roughness: Scalar) -> Scalar:
-    """Where a roughness stands on the tables' axes."""
+    """The coordinate of a roughness in the tables."""
     return maximum(roughness - SHARP, 0.0) * (1.0 / (1.0 - SHARP))
 
 
 def _root_of(eta: Scalar) -> Scalar:
-    """Where an index stands in the tables: nodes get closer toward 1, where F changes fastest at grazing angles."""
+    """The coordinate of an index in the tables: nodes are denser toward 1, where F varies fastest at grazing angles."""
     return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * MAX_ROOT_F0))
 
 
 def _rows(count: int) -> np.ndarray:
-    """The roughness of so many rows."""
+    """The roughness of each of `count` rows."""
     return SHARP + (1.0 - SHARP) * np.linspace(0.0, 1.0, count)
 
 
 @function
 def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
-    """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
+    """E of GGX facets of a dielectric of index 1 to 5: light reflected once."""
     table = _albedos(masking)
     places = _root_of(index), _row(roughness), sqrt(maximum(cos, 0.0))
     at = [inset(x, count) for x, count in zip(places, table.shape, strict=True)]
@@ -71,7 +71,7 @@ def _albedos(masking: str) -> Table:
 
 
 def reflected_at_nodes(roughness: Scalar, index: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """`reflected` at the cosines of `HATS`, then at those of `NODES`: one look at a table instead of eighteen."""
+    """`reflected` at the cosines of `HATS`, then at those of `NODES`: one lookup instead of eighteen."""
     table = _at_nodes(masking).reflected
     return lookup(table, *[inset(x, n) for x, n in zip((_root_of(index), _row(roughness)), table.shape, strict=True)])
 
@@ -98,7 +98,7 @@ class _AtNodes(NamedTuple):
 
 @lru_cache
 def _at_nodes(masking: str) -> _AtNodes:
-    """The tables at some cosines, read as everybody reads them."""
+    """The tables at fixed cosines, interpolated by the common rule."""
     hats = np.linspace(0.0, 1.0, HATS)
 
     def at(table: Table, x: np.ndarray) -> np.ndarray:
@@ -115,7 +115,7 @@ def _at_nodes(masking: str) -> _AtNodes:
 
 
 def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Shares of light that white facets, all bounces together, send to the neighbourhoods of `HATS` cosines."""
+    """Fractions of light that white facets, all bounces included, scatter to the neighborhoods of `HATS` cosines."""
     table = _scattering(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -123,7 +123,7 @@ def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...
 
 @lru_cache
 def _scattering(masking: str) -> Table:
-    """Those shares over (roughness, root of the cosine)."""
+    """`scattered` over (roughness, root of the cosine)."""
 
     def build() -> np.ndarray:
         cos = np.maximum(np.linspace(0.0, 1.0, COSINES) ** 2, 1e-4)
@@ -144,8 +144,8 @@ def _scattering(masking: str) -> Table:
 
 
 def _hats(x: np.ndarray) -> np.ndarray:
-    """By how much values at the nodes count at places between them, (N, HATS): cubic (Catmull and Rom), as of straight
-    lines what layers let through, which is bent, is too small in the mean; beyond the ends it goes straight on."""
+    """Weights of the nodes at positions between them, (N, HATS): cubic (Catmull-Rom), since linear interpolation would
+    underestimate the mean of a concave transmittance; extrapolated linearly beyond the ends."""
     d = np.abs(x[:, None] * (HATS - 1) - np.arange(-1, HATS + 1))
     near, far = 1.0 + d * d * (1.5 * d - 2.5), 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
     weights: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
@@ -155,25 +155,25 @@ def _hats(x: np.ndarray) -> np.ndarray:
     return weights[:, 1:-1]
 
 
-# means with the cosine of what is known at those nodes
+# cosine-weighted means of values at those nodes
 MEANS: list[float] = _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
 # --------------------------------------------------------------------------- any reflectance
 
-# Cosines of facets at which a reflectance is asked for, by Gauss; between them it is a polynomial
+# Gauss nodes for the cosine of facets at which a reflectance is evaluated; between them it is a polynomial
 PLACES = [float(x) for x in gauss(8)[0]]
-FEW_PLACES = [float(x) for x in gauss(4)[0]]  # for what is small anyway
+FEW_PLACES = [float(x) for x in gauss(4)[0]]  # for small corrections
 LOSS_INDICES, LOSS_ROUGHNESSES, LOSS_COSINES = 13, 13, 25
 
 
 def prepare(masking: str) -> None:
-    """Find all tables."""
+    """Compute all tables."""
     for find in (_at_nodes, _spared):
         find(masking)
 
 
 def shares_of(x: Array, places: list[float]) -> list[Array]:
-    """Lagrange's polynomials: by how much the value at each place counts at x."""
+    """Lagrange polynomials: the weight of the value at each place at x."""
     shares = []
     for n, here in enumerate(places):
         others = [one for m, one in enumerate(places) if m != n]
@@ -190,7 +190,7 @@ FROM_PLACES: list[list[float]] = np.array(
 
 
 def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """By how much the reflectance at each of `PLACES` counts in the albedo of facets seen under a cosine."""
+    """Weight of the reflectance at each of `PLACES` in the albedo of facets at a cosine."""
     table = _faced(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -198,7 +198,7 @@ def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
 
 @lru_cache
 def _faced(masking: str) -> Table:
-    """That over (roughness, root of the cosine)."""
+    """`faced` over (roughness, root of the cosine)."""
     rows, columns = ROUGHNESSES, 65
 
     def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, _: Scalar) -> tuple[Scalar, ...]:
@@ -214,8 +214,8 @@ def _faced(masking: str) -> Table:
 
 
 def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """How much more of what facets of glass refract gets through than of what they mirror, by how much the reflectance
-    at each of `FEW_PLACES`, of cosines outside, counts: seen from outside, then from inside."""
+    """Excess of the transmitted over the reflected energy of glass facets per unit of reflectance at each of
+    `FEW_PLACES`, of cosines outside: from outside, then from inside."""
     table = _spared(masking)[0]
     at = [
         inset(x, count)
@@ -225,14 +225,14 @@ def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[S
 
 
 def spared_on_average(roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """The mean of `spared` with the cosine."""
+    """The cosine-weighted mean of `spared`."""
     table = _spared(masking)[1]
     return lookup(table, *[inset(x, n) for x, n in zip((_root_of(eta), _row(roughness)), table.shape, strict=True)])
 
 
 @lru_cache
 def _spared(masking: str) -> tuple[Table, Table]:
-    """Those over (root of sqrt(F0), roughness, root of the cosine)."""
+    """`spared` over (root of sqrt(F0), roughness, root of the cosine), for both sides."""
 
     def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, eta: Scalar) -> tuple[Scalar, ...]:
         cos_t = fresnel.cos_transmitted(o_m, eta)
@@ -240,7 +240,7 @@ def _spared(masking: str) -> tuple[Table, Table]:
         back = terms.masking_shadowing(masking, ndf, wo, mirrored, m, alpha)
         on = terms.masking_shadowing(masking, ndf, wo, through, m, alpha, transmits=True)
         more = ops.where((cos_t > 0.0) & (through.z < 0.0), on, 0.0) - ops.where(mirrored.z > 0.0, back, 0.0)
-        more = ops.where(cos_t > 0.0, more, 0.0)  # what is reflected totally is so whatever covers the surface
+        more = ops.where(cos_t > 0.0, more, 0.0)  # total reflection does not depend on layers
         return tuple(more * share for share in shares_of(ops.where(eta > 1.0, o_m, cos_t), FEW_PLACES))
 
     def build() -> np.ndarray:

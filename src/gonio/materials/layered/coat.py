@@ -1,4 +1,4 @@
-"""A clear or coloured coat over any material that reflects."""
+"""A clear or colored coat over any material that reflects."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ from ..microfacet.dielectric import Dielectric
 from .interior import LayerTables, colour_of, colour_place, left_place, tables_of
 
 BOUNCES = {
-    "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
-    "white": "the base's once, as most renderers have it: its colour is then what is seen of it",
+    "coloured": "the base's color applied at each bounce: more saturated and darker than the base alone",
+    "white": "the base's color applied once, as in most renderers: it is the color of the coated material",
 }
-ALMOST_ONE = 0.99999994  # the largest float32 under 1
+ALMOST_ONE = 0.99999994  # the largest float32 below 1
 
 
 class Coat(BSDF):
-    """A dielectric layer over a base: light is reflected at the top, or refracted, dimmed on its slant way through the
-    layer, scattered by the base, and bounced between the two until it leaves.
+    """A dielectric layer over a base: light is reflected at the top, or refracted, absorbed on its slanted path through
+    the layer, scattered by the base, and reflected between the two until it leaves.
 
     f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
-    T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
-    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, g of
-    it, and a separable rest (`interior.py` says how): over Lambert exact, over a metal exact in albedo, channel
-    by channel. Reciprocal; white on white keeps all light.
+    T = 1 - R is the transmittance of the top, o' and i' the refracted directions, t = exp(-absorption depth / cos)
+    Beer's law along them, eta^2 the change of solid angle. Light that bounces more than once is represented by the
+    base's own lobe, by the factor g, and a separable rest (see `interior.py`): exact over Lambert, exact in albedo over
+    a metal, per channel. Reciprocal; a white coat on a white base conserves all light.
 
-    With `bounces="white"` g and rest are a white base's: what is seen is R, and 1 - R of the base's colour, neither
-    darker nor deeper.
+    With `bounces="white"` g and rest are those of a white base: the coated material reflects R, plus 1 - R times the
+    base's color, neither darker nor more saturated.
 
-    The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
-    albedo R; refracted light is not blurred. g and the rest are tables found when the material is first asked. Colours
-    of the base may vary over the surface, and so may the coat's own colour and depth, over which the tables run; no
-    other value may, and derivatives leave the change of the tables out.
+    The base is embedded in the coat: its own index is relative to the coat's. A rough top reflects like rough glass,
+    with albedo R; refracted light is not blurred. g and the rest are tables computed on first use. Colors of the base
+    may vary over the surface, as may the coat's own color and depth, which are axes of the tables; no other value may,
+    and derivatives omit the change of the tables.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "what a rough top reflects and lets through is met to so much, by draws of rough glass",
+            "reflection and transmission of a rough top have this error, by sampling of rough glass",
             lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
             certain=False,
         ),
@@ -71,11 +71,11 @@ class Coat(BSDF):
     base: BSDF = bsdf("the material under the coat; it must not transmit")
     index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
     alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
-    absorption: Colour = spectrum(default=0.0, doc="a crossing straight down leaves exp(-absorption depth)", low=0.0)
-    depth: Number = number(default=1.0, doc="how thick the coat is", low=0.0)
+    absorption: Colour = spectrum(default=0.0, doc="transmittance at normal incidence: exp(-absorption depth)", low=0.0)
+    depth: Number = number(default=1.0, doc="thickness of the coat", low=0.0)
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
-    bounces: str = choice("coloured", "colour of light that bounces between coat and base", BOUNCES)
+    bounces: str = choice("coloured", "color of light that bounces between coat and base", BOUNCES)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -92,14 +92,14 @@ class Coat(BSDF):
         fixed = self.fixed
         for leaf in tree.leaves(self):
             if leaf.path in fixed and leaf.value is not None and leaf.parameter.rows(leaf.value) > 1:
-                what = f"{leaf.path} varies from ray to ray, yet tables are found from it once"
-                hint = "colours of the base may vary, and the coat's own absorption and depth"
+                what = f"{leaf.path} varies from ray to ray, but tables are computed from it once"
+                hint = "colors of the base may vary, and the coat's own absorption and depth"
                 raise InputError(what, f"Coat.{leaf.path}", hint)
 
-    # ------------------------------------------------------------------ what is known of the inside
+    # ------------------------------------------------------------------ properties of the interior
 
     def prepare(self) -> None:
-        """Find the tables, before a loop is recorded."""
+        """Compute the tables, before a loop is recorded."""
         tables_of(self.plain)
 
     @property
@@ -108,12 +108,12 @@ class Coat(BSDF):
 
     @property
     def _mirror(self) -> bool:
-        """Whether the base is a mirror, of which the series is known in closed form."""
+        """Whether the base is a mirror, for which the series has a closed form."""
         return self.plain.base.delta == "always"
 
     @property
     def _top(self) -> Dielectric:
-        """The outside, as glass that only reflects."""
+        """The outer interface, as glass that only reflects."""
         kind = Dielectric(transmission=False, ndf=self.ndf, masking=self.masking)
         one = ops.ones_like(self.absorption)
         return binding.bound_copy(kind, {"eta": self.index, "alpha": self.alpha, "rotation": None, "albedo": one})
@@ -122,13 +122,13 @@ class Coat(BSDF):
 
     @function
     def _through(self, w: Direction) -> Scalar:
-        """What the base's lobe is multiplied by at each end: T by Fresnel's equations; of a rough top the table's."""
+        """Factor of the base's lobe at each end: T by Fresnel's equations; for a rough top from the table."""
         _, smooth = widths(self.alpha)
         return where(smooth, self._sharp(w), self._at(w)[2])
 
     @function
     def _sharp(self, w: Direction) -> Scalar:
-        """T of a smooth top, by Fresnel's equations: not 1 - R, which at grazing angles has no digits left."""
+        """T of a smooth top, by Fresnel's equations; 1 - R would lose all digits at grazing angles."""
         cos = ops.abs(w.z)
         cos_t = fresnel.cos_transmitted(cos, self.index)
         return exact.transmittance(cos, cos_t, self.index)
@@ -147,22 +147,22 @@ class Coat(BSDF):
 
     @function
     def _crossed(self) -> Spectrum:
-        """u: what one crossing leaves, straight down."""
+        """u: transmittance of one crossing at normal incidence."""
         return exp(self.absorption * (-self.depth))
 
     @function
     def _left(self, inner: Direction) -> Spectrum:
-        """t: what a crossing along a direction inside leaves."""
+        """t: transmittance of a crossing along a direction inside."""
         return exp(self.absorption * (-self.depth / maximum(inner.z, 1e-4)))
 
     def _colour(self, w: Direction) -> Spectrum:
-        """a: what colours the base's light, with each bounce."""
+        """a: the color applied to the base's light at each bounce."""
         white = ops.ones_like(self.absorption)
         up = ops.vec3(ops.zeros_like(w.z), ops.zeros_like(w.z), ops.ones_like(w.z))
         return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
-        """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
+        """(factor of the base's lobe, the separable lobe) for bounces between the coat and a base of color a."""
         bounce_color = ops.ones_like(a) if self.bounces == "white" else a
         u = self._crossed() + ops.zeros_like(a)
         tables, ends = self._tables, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
@@ -192,8 +192,8 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of what is under the top, of a cosine among it): that finds the separable lobe, and what the
-        base sends back totally, whose samples fail."""
+        """(probability of light from below the top, that of a cosine among it): the cosine samples the separable lobe,
+        and replaces samples of the base that are totally reflected and fail."""
         reflected, even, _, beyond = self._at(wo)
         _, smooth = widths(self.alpha)
         cos = ops.abs(wo.z)
@@ -203,13 +203,13 @@ class Coat(BSDF):
         inner = self._inside(wo)
         tint = clamp(self.base.tint(inner) * ops.ones_like(self.absorption), 0.0, 1.0)
         below = through * mean(self._left(inner) * tint) + 2.0 * beyond
-        under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
+        under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # continuous at a black base
         cosine = ops.zeros_like(even) if self._mirror else even
         return ops.vec2(under, cosine)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The mixture of the top's lobe, the cosine, and the base's density as it is refracted."""
+        """The mixture of the top's lobe, the cosine, and the base's refracted density."""
         shares = self._shares(wo)
         above = (wo.z > 0.0) & (wi.z > 0.0)
         top = self._top.pdf(wo, wi)
@@ -222,7 +222,7 @@ class Coat(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks the top, the cosine or the base; what the base would send into total reflection is a failure."""
+        """u1 selects the top, the cosine or the base; a base sample that is totally reflected is a failed sample."""
         shares = self._shares(wo)
         over, by_base = 1.0 - shares.x, 1.0 - shares.y
         on_top = u.x >= shares.x
@@ -232,7 +232,7 @@ class Coat(BSDF):
         o = self._inside(wo)
         s_top = self._top.sample(wo, u, mode)
         s_base = self.base.sample(where(wo.z > 0.0, o, -o), ops.vec3(maximum(second, 0.0), u.y, u.z), mode)
-        # out of the coat: tangential parts grow by eta
+        # out of the coat: tangential components grow by eta
         x, y = s_base.wi.x * self.index, s_base.wi.y * self.index
         height2 = 1.0 - (sqr(x) + sqr(y))
         leaves = (height2 > 0.0) & (s_base.wi.z > 0.0) & (s_base.pdf > 0.0)
@@ -256,26 +256,26 @@ class Coat(BSDF):
 
     @function
     def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:
-        """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
+        """T^2 t^2 / (1 - a k) for a mirror, k = (1 - T) t^2."""
         through, left2 = self._through(wo), sqr(self._left(inner))
         k = (1.0 - through) * left2
         tint = self.base.tint(inner)
         return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
 
     def lossless(self) -> Self:
-        """Over the white base, and without absorption."""
+        """The coat over the lossless base, without absorption."""
         white = self.base.lossless()
         values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
         return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
 
     @property
     def fixed(self) -> frozenset[str]:
-        """What the tables are found from: all but colours of the base, and the coat's own colour and depth."""
+        """All parameters except colors of the base and the coat's own color and depth: tables depend on them."""
         numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
         return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
 
     def tint(self, wo: Direction) -> Spectrum:
-        """R, and what is left of the base's."""
+        """R, plus the attenuated tint of the base."""
         through = self._through(wo)
         return (1.0 - through) + through * sqr(self._left(self._inside(wo))) * self.base.tint(self._inside(wo))
 

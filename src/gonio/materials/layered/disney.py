@@ -35,12 +35,12 @@ from ...optics.warp import square_to_cosine_hemisphere
 from ..historic.glossy import facet, lit
 from ..microfacet import microfacet
 
-SMALLEST = 0.001  # width: Burley2012's own code holds it there
-COAT_WIDTH = 0.25  # of the coat's masking, whatever its gloss (Burley2012, 5.6)
+SMALLEST = 0.001  # width: the limit in Burley2012's code
+COAT_WIDTH = 0.25  # of the coat's masking, for any gloss (Burley2012, 5.6)
 
 
 class Pieces(NamedTuple):
-    """What the model is the sum of, times cos theta_i.
+    """The terms of the model, times cos theta_i.
 
     diffuse   retro-reflection at grazing angles, toward subsurface scattering
     specular  GTR2 lobe
@@ -55,43 +55,45 @@ class Pieces(NamedTuple):
 
 
 class Disney(BSDF):
-    """Disney's principled BRDF: eleven dials, each from 0 to 1 (Burley2012, with the formulas of its published code).
+    """Disney's principled BRDF: eleven parameters, each from 0 to 1 (Burley2012, with its published code).
 
     f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
     f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
-    D is GTR2 (GGX) of alpha = roughness^2, drawn out by 1 / aspect, aspect^2 = 1 - .9 anisotropic; G is Smith's; F is
-    Schlick's of .08 specular, tinted, or of the base colour where metallic. f_r is a second lobe, GTR1 of width .1 to
-    .001, F0 = .04. Tints are the base colour over the mean of its channels (his are over its luminance).
+    D is GTR2 (GGX) of alpha = roughness^2, stretched by 1 / aspect, aspect^2 = 1 - 0.9 anisotropic; G is Smith's; F is
+    Schlick's of 0.08 specular, tinted, or of the base color for metal. f_r is a second lobe, GTR1 of width 0.1 to
+    0.001, F0 = 0.04. Tints are the base color over the mean of its channels (in the paper over its luminance).
 
-    The lobes are simply added, as artists wanted them: at grazing views, and where several dials are up, it gives back
-    more than it receives, and rough metal loses what it scatters twice. Reciprocal.
+    The lobes are simply added, as artists preferred: at grazing views, and with several large parameters, it reflects
+    more than it receives, and rough metal loses multiply scattered light. Reciprocal.
     """
 
-    base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)
-    subsurface: Number = number(default=0.0, doc="from diffuse to flattened, as light under a skin", low=0.0, high=1.0)
+    base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
+    subsurface: Number = number(
+        default=0.0, doc="flattens the diffuse lobe, as subsurface scattering", low=0.0, high=1.0
+    )
     metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0)
-    specular: Number = number(default=0.5, doc="F0 over .08, of a dielectric", low=0.0, high=1.0)
-    specular_tint: Number = number(default=0.0, doc="how much of the base colour is in F0", low=0.0, high=1.0)
+    specular: Number = number(default=0.5, doc="F0 over 0.08, of a dielectric", low=0.0, high=1.0)
+    specular_tint: Number = number(default=0.0, doc="fraction of the base color in F0", low=0.0, high=1.0)
     roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
-    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0)
+    anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0)
     rotation: Angle = microfacet.rotation_angle()
     sheen: Number = number(default=0.0, doc="an extra rim, for cloth", low=0.0, high=1.0)
-    sheen_tint: Number = number(default=0.5, doc="how much of the base colour is in the sheen", low=0.0, high=1.0)
+    sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
+            "the lobes are added, and rough diffuse reflection gains at grazing angles: their sum has no bound",
             2.5,
             certain=False,
         ),
-        "linearity": KnownViolation("tints are ratios of the base colour to its mean", 10.0, certain=False),
+        "linearity": KnownViolation("tints are ratios of the base color to its mean", 10.0, certain=False),
     }
 
     @property
     def isotropic(self) -> bool:
-        if isinstance(self.anisotropic, Node):  # a recording's may take any value
+        if isinstance(self.anisotropic, Node):  # unknown in a recording
             return False
         return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
 
@@ -113,7 +115,7 @@ class Disney(BSDF):
 
     @function
     def _tint(self) -> Spectrum:
-        """The base colour over its mean, 1 of black."""
+        """The base color over its mean, 1 for black."""
         level = mean(self.base_color)
         some = level > 0.0
         return where(some, self.base_color / where(some, level, 1.0), ops.ones_like(self.base_color))
@@ -161,7 +163,7 @@ class Disney(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The sum of its parts, above the surface."""
+        """The sum of the terms, above the surface."""
         above, o, i = lit(wo, wi)
         parts = self._pieces(o, i)
         return where(above, parts.diffuse + parts.specular + parts.sheen + parts.coat, 0.0)
@@ -175,7 +177,7 @@ class Disney(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Direction:
-        """Probabilities of the specular lobe, of the coat, and of the cosine, by what each reflects, about."""
+        """Probabilities of the specular lobe, of the coat, and of the cosine, by their approximate albedos."""
         at_o = _schlick(wo.z)
         f0 = mean(self._normal_reflectance())
         specular = _mix(f0, 1.0, at_o)
@@ -197,7 +199,7 @@ class Disney(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks the lobe."""
+        """u1 selects the lobe."""
         o = where(wo.z > 0.0, wo, frame.normal_like(wo))
         shares = self._shares(o)
         wo_local = frame.rotate(o, self.rotation)
@@ -215,7 +217,7 @@ class Disney(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base colour and F0."""
+        """The base color and F0."""
         return self.base_color * (1.0 - self.metallic) + self._normal_reflectance()
 
 

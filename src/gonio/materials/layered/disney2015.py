@@ -20,20 +20,20 @@ from .openpbr import OpenPBR
 
 COAT_INDEX = 1.5  # of the clearcoat
 SATIN, GLOSS = 0.1, 0.001  # its widths at gloss 0 and 1
-STRENGTH = 0.25  # of a coat of 1
-STRETCH = 0.9  # by how much an anisotropic of 1 stretches
+STRENGTH = 0.25  # of a coat with `clearcoat` 1
+STRETCH = 0.9  # amount of stretch at `anisotropic` 1
 
 
 class _Slabs(OpenPBR):
-    """OpenPBR whose coat lies on its base without changing its index or its width: the base is seen as it is."""
+    """OpenPBR with a coat that does not change the index or width of its base: the base appears unchanged."""
 
     name: ClassVar[str] = ""
 
-    if TYPE_CHECKING:  # OpenPBR's, which mypy forgets to be declared parameters
+    if TYPE_CHECKING:  # OpenPBR's parameters, which mypy does not recognize as declared
         specular_roughness: Number = number(0.3)
         specular_ior: Number = number(1.5)
 
-    # What there is of the slabs is known from the dials (`DisneyBSDF._kind`), whether those are recorded or not.
+    # The presence of slabs is determined by `DisneyBSDF._kind`, in recordings too.
     def has(self, name: str) -> bool:
         return bool(getattr(self.plain, name) != 0.0)
 
@@ -52,46 +52,47 @@ class _Slabs(OpenPBR):
 
 
 class DisneyBSDF(BSDF):
-    """Disney's principled BSDF of 2015, on slabs that keep energy: glass, metal and thin walls by one set of dials.
+    """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls by one parameter set.
 
-    The dials are those of Burley2015: `disney` of 2012 with the index in place of `specular`, `spec_trans` for glass
-    and, of a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass are his lobes: GGX of alpha =
-    roughness^2, drawn out by sqrt(1 - .9 anisotropic), F by the index, of metal Schlick's of the base colour, glass
-    tinted by the root of the base colour at each crossing. What he adds up is layered here, so that nothing is gained,
-    and light that facets scatter twice comes back: the slabs are `openpbr`'s, and so are their laws.
+    The parameters are those of Burley2015: `disney` of 2012 with the index in place of `specular`, `spec_trans` for
+    glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the paper's lobes: GGX
+    of alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic), F by the index, for metal Schlick's of the base
+    color, glass tinted by the root of the base color at each crossing. Terms that the paper adds are layered here, so
+    no energy is gained, and multiple scattering between facets is included: the slabs are `openpbr`'s, and so are their
+    laws.
 
-    Not as he has it: the diffuse lobe is `eon` of that roughness under the dielectric (his has a rim of its own, which
-    `flatness` takes off; here it makes `eon` a Lambert), sheen is the `sheen` of fibres, the coat GGX of his GTR1's
-    width, masking has correlated heights, tints are the base colour over its largest channel, and a thin sheet's
-    transmission is as rough as its reflection. docs/openpbr.md has the sizes.
+    Differences from the paper: the diffuse lobe is `eon` of that roughness under the dielectric (the paper's has its
+    own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert), sheen is the `sheen` of fibers, the
+    coat is GGX of the paper's GTR1 width, masking is height-correlated, tints are the base color over its largest
+    channel, and a thin sheet's transmission is as rough as its reflection. docs/openpbr.md has the differences in size.
     """
 
     name: ClassVar[str] = "disney2015"
     reads_wavelengths: ClassVar[bool] = True
 
-    base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)
+    base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
     metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
     roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
-    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0)
+    anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0)
     rotation: Angle = rotation_angle()
     eta: Number = number(default=1.5, doc="index inside over index outside", low=1.0, high=3.0)
     specular_tint: Number = number(
-        default=0.0, doc="how much of the base colour is in what a dielectric reflects", low=0.0, high=1.0
+        default=0.0, doc="fraction of the base color in a dielectric's reflection", low=0.0, high=1.0
     )
-    spec_trans: Number = number(default=0.0, doc="share of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
-    sheen: Number = number(default=0.0, doc="fibres on a dielectric", low=0.0, high=1.0, off=0.0)
-    sheen_tint: Number = number(default=0.5, doc="how much of the base colour is in the sheen", low=0.0, high=1.0)
+    spec_trans: Number = number(default=0.0, doc="fraction of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
+    sheen: Number = number(default=0.0, doc="fibers on a dielectric", low=0.0, high=1.0, off=0.0)
+    sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
     diff_trans: Number = number(
-        default=0.0, doc="of a thin sheet: 0 is opaque, 1 even on both sides, 2 sends all light on", low=0.0, high=2.0
+        default=0.0, doc="of a thin sheet: 0 is opaque, 1 even on both sides, 2 transmits all light", low=0.0, high=2.0
     )
-    flatness: Number = number(default=0.0, doc="1 takes the roughness from the diffuse lobe", low=0.0, high=1.0)
-    thin: bool = flag(default=False, doc="whether it is a sheet without an inside")
+    flatness: Number = number(default=0.0, doc="1 removes the roughness of the diffuse lobe", low=0.0, high=1.0)
+    thin: bool = flag(default=False, doc="whether it is a sheet without an interior")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the sheen's table of lobes is one of the viewer's direction alone",
+            "the sheen's table of lobes depends on the viewer's direction only",
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
@@ -101,14 +102,14 @@ class DisneyBSDF(BSDF):
             certain=False,
         ),
         "linearity": KnownViolation(
-            "tints are ratios of the base colour, and glass takes its root", 10.0, certain=False
+            "tints are ratios of the base color, and glass takes its root", 10.0, certain=False
         ),
     }
 
     # ------------------------------------------------------------------ as slabs
 
     def _kind(self) -> _Slabs:
-        """Which parts of the slabs' code there are."""
+        """The slabs that determine which components are compiled."""
         plain = self.plain
 
         def at(name: str, on: float = 0.5) -> float:
@@ -120,7 +121,7 @@ class DisneyBSDF(BSDF):
             return 0.0 if open_ else float(np.min(np.asarray(value, float)))
 
         return _Slabs(
-            base_diffuse_roughness=0.5,  # roughness is no weight: what is recorded of 0 holds for others too
+            base_diffuse_roughness=0.5,  # not a weight: code recorded at 0 must hold for other values too
             base_metalness=at("metallic"),
             specular_roughness=rough("roughness"),
             specular_roughness_anisotropy=0.5 if _some(plain.anisotropic) else 0.0,
@@ -134,12 +135,12 @@ class DisneyBSDF(BSDF):
         )
 
     def _slabs(self) -> _Slabs:
-        """The slabs that these dials stand for."""
+        """The slabs for these parameters."""
         kind, colour = self._kind(), self.base_color
         one, white = ops.ones_like(self.roughness), ops.ones_like(colour)
         most = max_component(colour)
         tint = where(most > 0.0, colour / where(most > 0.0, most, 1.0), white)
-        # alpha r^2 / a and r^2 a, a^2 = 1 - .9 anisotropic: the same ratio, and the roughness whose squares add up so
+        # alpha r^2 / a and r^2 a, a^2 = 1 - 0.9 anisotropic: the same ratio, and the roughness whose squares add up so
         low = 1.0 - STRETCH * self.anisotropic
         wide = sqrt(sqrt(0.5 * (low + 1.0 / low)))
         rest = {
@@ -174,32 +175,32 @@ class DisneyBSDF(BSDF):
         return copy
 
     def derive(self) -> Between:
-        """What the slabs derive."""
+        """The derived values of the slabs."""
         return self._slabs().derive()
 
     def prepare(self) -> None:
-        """Find the tables, before a loop is recorded."""
+        """Compute the tables, before a loop is recorded."""
         self._kind().prepare()
 
-    def _turned(self, w: Direction) -> Direction:
+    def _in_tangent_frame(self, w: Direction) -> Direction:
         return frame.rotate(w, self.rotation)
 
     # ------------------------------------------------------------------ values
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """That of the slabs, along the axes of the anisotropy."""
-        return self._slabs().eval(self._turned(wo), self._turned(wi), mode)
+        """The value of the slabs, along the axes of the anisotropy."""
+        return self._slabs().eval(self._in_tangent_frame(wo), self._in_tangent_frame(wi), mode)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The density of the slabs, along the axes of the anisotropy."""
-        return self._slabs().pdf(self._turned(wo), self._turned(wi))
+        return self._slabs().pdf(self._in_tangent_frame(wo), self._in_tangent_frame(wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A sample of the slabs, turned back to the surface."""
-        drawn = self._slabs().sample(self._turned(wo), u, mode)
+        """A sample of the slabs, rotated back to the surface's axes."""
+        drawn = self._slabs().sample(self._in_tangent_frame(wo), u, mode)
         return drawn._replace(wi=frame.rotate_back(drawn.wi, self.rotation))
 
     # ------------------------------------------------------------------ facts
@@ -232,5 +233,5 @@ class DisneyBSDF(BSDF):
 
 
 def _some(value: object) -> bool:
-    """Whether a dial may be other than 0."""
+    """Whether a parameter may differ from 0."""
     return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))

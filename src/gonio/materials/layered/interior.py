@@ -1,26 +1,26 @@
-"""Light between a coat and the material under it: what the base sends back through the coat, bounce after bounce.
+"""Light between a coat and the material below: the interreflections of base and coat.
 
-Light that the base scatters along w leaves the coat by the share T(w) t(w), and comes down again by k(w) = (1 - T(w))
-t(w)^2, mirrored: T is the interface's transmittance from inside, t what is left of the light after one crossing. With B
-the base, all that leaves is the series B + B k B + B k B k B + ...
+Light that the base scatters along w leaves the coat by the fraction T(w) t(w), and returns by k(w) = (1 - T(w)) t(w)^2,
+mirrored: T is the interface's transmittance from inside, t the transmittance of one crossing. With the base's operator
+B, all light that leaves is the series B + B k B + B k B k B + ...
 
-Its sum is found on 33 directions, averaged over azimuth: rows of a matrix P are drawn by the `sample` of the base's
-white twin (`BSDF.white`), k stands inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being what leaves after
-the first bounce. A smooth interface sends light in along one direction; of a rough one, glass whose lost light Kulla
-and Conty give back, samples say where light goes in and how much comes out.
+The sum is computed on 33 directions, averaged over azimuth: rows of a matrix P are sampled with the base's lossless
+variant (`BSDF.lossless`), k is inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being the light that leaves
+after the first bounce. A smooth interface transmits light along one direction; for a rough one, glass with Kulla-Conty
+compensation, samples determine where light enters and how much leaves.
 
-A base's own Fresnel reflectance is known for its channels, by what each makes of the white twin's draws when every
-share of light is 1; of any other colour it is taken between theirs, and black's and white's. So the series holds for
-every channel of a metal, with the rise of its reflectance where light grazes, and for any colour over which the rest
-of the base varies.
+A base's own Fresnel reflectance is known for its channels, from their values at the lossless variant's samples with
+every albedo 1; for any other color it is interpolated between them, black and white. The series therefore holds for
+every channel of a metal, with the rise of its reflectance at grazing angles, and for any color by which the rest of the
+base varies.
 
-What leaves, B(o), is then shared between two terms whose sum is exactly that:
+The light that leaves, B(o), is then divided into two terms whose sum is exact:
 
-    lobe         the base's own, refracted, times a factor: as much of it as fits under B at every o. Over Lambert that
-                 is all there is (Saunderson1942), and nearly all of a narrow lobe under a smooth coat
-    rest(o)      what is left, as a separable lobe rest(o) rest(i) / norm, reciprocal like Kulla-Conty's
+    lobe         the base's own, refracted, times a factor: as much of it as stays below B at every o. Over Lambert it
+                 is everything (Saunderson1942), and nearly everything for a narrow lobe under a smooth coat
+    rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, reciprocal like Kulla-Conty's
 
-Both are tables over the colour a and over u, what one crossing straight down leaves.
+Both are tables over the color a and over u, the transmittance of one crossing at normal incidence.
 """
 
 from __future__ import annotations
@@ -48,22 +48,23 @@ from ..microfacet.dielectric import Dielectric
 
 Floats: TypeAlias = "NDArray[np.floating]"
 
-HALF = 16  # steps of the directions that leave, and of those that cannot
-POINTS = 1 << 13  # directions drawn at each node
-NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R bends like it at grazing angles
-ROUGH = 33  # of those at which a rough interface is drawn from
-COLOURS, LEFT = 13, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
-MIN_LEFT = 0.03  # of the light after a crossing, the first step of that
-CACHE_SIZE = 32  # accounts in memory
+HALF = 16  # steps of the directions that leave, and of those that are totally reflected
+POINTS = 1 << 13  # samples per node
+NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R behaves like it at grazing angles
+ROUGH = 33  # nodes at which a rough interface is sampled
+COLOURS, LEFT = 13, 13  # steps of the color and of the transmittance u, see `colour_place` and `left_place`
+MIN_LEFT = 0.03  # the smallest u, the first step
+CACHE_SIZE = 32  # sets of tables in memory
 EPSILON = 1e-9
 
 
 class LayerTables(NamedTuple):
-    """What a coat must know of its inside, as tables.
+    """The coat's interior as tables.
 
-    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that a
-           cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
-    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None where there is none
+    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the fraction of the base's samples to
+           be replaced by a cosine, the transmittance of a rough interface for the base's lobe, and R's part beyond one
+           bounce
+    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None if there is none
     bounced  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
     """
 
@@ -73,19 +74,19 @@ class LayerTables(NamedTuple):
 
 
 def colour_place(a: Array) -> Array:
-    """Where a colour stands on the tables' axis: in a / (2 - a) a series 1 / (1 - a k) is nearly straight, of k = 1 / 2
+    """The coordinate of a color in the tables: in a / (2 - a) a series 1 / (1 - a k) is nearly linear, for k = 1 / 2
     exactly."""
     return a / (2.0 - a)
 
 
 def left_place(u: Array) -> Array:
-    """Where what one crossing leaves stands: closer near 1, where light that bounces often fades at once. 1 is the last
-    node but one, so that a clear coat has a derivative by its absorption."""
+    """The coordinate of the transmittance u in the tables: denser near 1, where multiply reflected light decays slowly.
+    1 is the last node but one, so that a clear coat has a derivative with respect to its absorption."""
     return u / (3.0 - 2.0 * u) * ((LEFT - 2.0) / (LEFT - 1.0))
 
 
 class Coated(Protocol):
-    """What is asked of a coat here: plain values."""
+    """The interface of a coat in this module: plain values."""
 
     base: BSDF
     index: object
@@ -98,13 +99,13 @@ _cache: OrderedDict[object, LayerTables] = OrderedDict()
 
 
 def tables_of(coat: BSDF) -> LayerTables:
-    """The account of a coat as it was made, found once and kept; InputError while Dr.Jit records a loop."""
+    """The cached tables of an unbound coat. Raises InputError if they must be computed while Dr.Jit records a loop."""
     own = vars(coat).get("_layer_tables")
     if own is None:
         key = _bright(guide_search.plain_values(coat))
         if key not in _cache:
             if backend.drjit().flag(backend.drjit().JitFlag.SymbolicScope):
-                what = f"what lies under {type(coat).__name__} cannot be found inside a loop"
+                what = f"the interior of {type(coat).__name__} cannot be computed while a loop is recorded"
                 raise InputError(what, "eval", "call its `eval` once before the loop")
             _cache[key] = find(key)  # type: ignore[arg-type]
             while len(_cache) > CACHE_SIZE:
@@ -115,7 +116,8 @@ def tables_of(coat: BSDF) -> LayerTables:
 
 
 def _bright(coat: BSDF) -> BSDF:
-    """The coat without what changes no table: its own colour, and every share of light in the base, which is 1."""
+    """The coat without parameters that do not affect the tables: its own color, and every albedo in the base, set to
+    1."""
     values: dict[str, object] = {"absorption": 0.0, "depth": 1.0, "bounces": "coloured"}
     for leaf in tree.leaves(coat):
         if leaf.parameter.numeric and leaf.parameter.white is not None and leaf.value is not None:
@@ -124,8 +126,8 @@ def _bright(coat: BSDF) -> BSDF:
 
 
 def colour_of(base: BSDF, up: Direction) -> Spectrum:
-    """a: the tint of a bound base seen straight down, over that of its white twin; of a base that is its own white twin
-    over its brightest channel."""
+    """a: the tint of a bound base at normal incidence, over that of its lossless variant; for a base that is its own
+    lossless variant, over its brightest channel."""
     tint = base.tint(up)
     white = base.lossless()
     if white is base:
@@ -133,15 +135,15 @@ def colour_of(base: BSDF, up: Direction) -> Spectrum:
     return ops.safe_div(tint, white.tint(up))
 
 
-def _colours(base: BSDF) -> Floats:
-    """The same as three numbers."""
+def _colors(base: BSDF) -> Floats:
+    """`colour_of` as three numbers."""
     kind = backend.types("float64")
     up = ops.vec3(kind.float(0.0), kind.float(0.0), kind.float(1.0))
     return backend.to_numpy(kind.vec3(1.0) * colour_of(base.bind(kind), up), 1)[0]
 
 
 def find(coat: Coated) -> LayerTables:
-    """The account of a coat whose shares of light are 1, one value each."""
+    """The tables of a coat whose albedos are 1, with uniform values."""
     index = float(coat.index)  # type: ignore[arg-type]
     outside = np.linspace(0.0, 1.0, NODES) ** 2
     face = _interface(coat, index)
@@ -152,10 +154,10 @@ def find(coat: Coated) -> LayerTables:
     draws = _drawn(coat.base, index)
     totally = (draws.weight * (draws.position <= 0.0)).sum(1) / np.maximum(draws.weight.sum(1), EPSILON)
     t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
-    colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
-    sums = [_series(draws, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
+    colors = np.maximum(2.0 * t / (1.0 + t), 1e-4)
+    sums = [_series(draws, colors, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
     rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
-    # what is sampled by a cosine: what the base's own samples lose totally, and the rest
+    # fraction sampled by a cosine: base samples that are totally reflected, and the rest
     share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, totally), 0.7 * sums[-1].share)
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return LayerTables(
@@ -172,11 +174,12 @@ class _Curve(Protocol):
 class _Interface(NamedTuple):
     """The coat's surface.
 
-    reflected  R seen from outside, by the cosine outside
-    out        T from inside, by the place (`_places`)
-    beyond     square root, normalized, of what R is beyond the facets' first reflection
-    entering   None of a smooth one; else, for `ROUGH` places outside, weights, cosines and places of draws inside
-    returning  likewise for the places inside: where it sends back what does not leave
+    reflected  R from outside, by the cosine outside
+    out        T from inside, by the position (`_places`)
+    beyond     square root, normalized, of R's part beyond the facets' first reflection
+    entering   None for a smooth one; else, for `ROUGH` positions outside, weights, cosines and positions of samples
+               inside
+    returning  likewise for the positions inside: light that is reflected back
     """
 
     reflected: _Curve
@@ -186,7 +189,7 @@ class _Interface(NamedTuple):
     returning: tuple[Floats, Floats, Floats] | None
 
     def lobe(self, x: Floats) -> Floats:
-        """The crossing that the base's lobe makes at each end: a narrow one makes T(o) going in and T(i) coming out."""
+        """The transmittance for the base's lobe at each end: for a narrow lobe T(o) inward and T(i) outward."""
         crossing: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, EPSILON))))
         return crossing
 
@@ -220,7 +223,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
     cosine = down.wi[:, 2].reshape(len(mu), POINTS)
     leaves = (weight * (cosine > 0.0)).sum(1)
     stays, returning_cosine = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
-    # R is that of one reflection, by quadrature, and what is beyond it
+    # R of one reflection, by quadrature, and the part beyond it
     single = tree.replace(glass, {"transmission": False})
     angles = (0.0,) if x_width == y_width else (0.0, 0.25 * np.pi, 0.5 * np.pi)
     fine = np.linspace(0.0, 1.0, NODES)
@@ -244,8 +247,8 @@ def _directions(mu: Floats, lattice: Floats) -> Floats:
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
-    """(places, cosines inside) of the nodes: 0 to 1 the root of the cosine outside where light leaves, as what leaves
-    changes fast where it grazes; -1 to 0 where it cannot."""
+    """(positions, cosines inside) of the nodes: 0 to 1 is the root of the cosine outside for light that can leave,
+    whose amount varies fast at grazing angles; -1 to 0 for totally reflected light."""
     place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
@@ -253,7 +256,7 @@ def _places(index: float) -> tuple[Floats, Floats]:
 
 
 def _place_of(cosine: Floats, index: float) -> Floats:
-    """The place of directions inside, by their cosines."""
+    """The positions of directions inside, from their cosines."""
     outside2 = 1.0 - index**2 * (1.0 - cosine**2)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, EPSILON), 0.0))
@@ -262,12 +265,12 @@ def _place_of(cosine: Floats, index: float) -> Floats:
 
 
 class _Draws(NamedTuple):
-    """What the white base does with light inside.
+    """Samples of the lossless base for light inside.
 
     place, mu           of the nodes
-    weight              of each draw at each node (nodes, POINTS)
-    cosine, position    of the directions drawn, and their places
-    colours, share      of black, the base's channels and white, rising; by what each multiplies a draw of the others
+    weight              of each sample at each node (nodes, POINTS)
+    cosine, position    of the sampled directions
+    colors, share      of black, the base's channels and white, ascending; the factor of each for samples of the others
     """
 
     place: Floats
@@ -275,21 +278,21 @@ class _Draws(NamedTuple):
     weight: Floats
     cosine: Floats
     position: Floats
-    colours: Floats
+    colors: Floats
     share: Floats
 
 
 def _drawn(base: BSDF, index: float) -> _Draws:
-    """Draws of the white base's own sampling from the nodes, over all azimuths. Of a base that is its own white twin
-    the brightest channel is met."""
+    """Samples of the lossless base from the nodes, over all azimuths. A base that is its own lossless variant is
+    normalized to its brightest channel."""
     white = base.lossless()
     place, mu = _places(index)
     lattice = r_sequence(POINTS, 4)
     wo = _directions(mu, lattice)
     drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
     channels = drawn.weight
-    colours, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
-    tints = _colours(base)
+    colors, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
+    tints = _colors(base)
     if white is base:
         channels = channels[:, np.argmax(tints)][:, None]
     else:
@@ -297,17 +300,17 @@ def _drawn(base: BSDF, index: float) -> _Draws:
         known, first = np.unique(np.round(tints, 3), return_index=True)
         known, first = known[known < 1.0], first[known < 1.0]
         ratio = np.where(full > 0.0, own / np.where(full > 0.0, full, 1.0), tints)[:, first].T
-        colours = np.concatenate([[0.0], known, [1.0]])
+        colors = np.concatenate([[0.0], known, [1.0]])
         share = np.concatenate([share[:1], np.clip(ratio, 0.0, 1.0), share[1:]])
     weight = np.where(drawn.pdf > 0.0, channels.mean(1), 0.0).reshape(len(mu), POINTS) / POINTS
-    weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # a base that gains light would do so without end
+    weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # the series would diverge for a base that gains light
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
     share = share.reshape(-1, len(mu), POINTS)
-    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
+    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colors, share)
 
 
 class _Sum(NamedTuple):
-    """The series at one u, for each colour: see `Account`; and the share of the rest in what leaves a white base."""
+    """The series at one u, per color: see `LayerTables`; and the rest's fraction of the light leaving a white base."""
 
     rest: Floats
     over_factor: Floats
@@ -315,8 +318,8 @@ class _Sum(NamedTuple):
     share: Floats
 
 
-def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
-    """The series, summed and shared out."""
+def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: float) -> _Sum:
+    """The sum of the series, divided into lobe and rest."""
     n = len(draws.place)
     out, t = face.out(draws.position), u ** (1.0 / draws.cosine)
     out = np.where((draws.position <= 0.0) & (face.entering is None), 0.0, out)
@@ -329,9 +332,9 @@ def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: f
         weight, cosine, place = face.returning
         back = _onto(weight * u ** (1.0 / cosine), place, n)
     kinds = []
-    for share in draws.share[1:]:  # of black nothing comes
+    for share in draws.share[1:]:  # black contributes nothing
         weight = draws.weight * share
-        # a smooth interface sends light back as a mirror does
+        # a smooth interface reflects like a mirror
         P = (
             _onto(weight * (1.0 - out) * t**2, draws.position, n)
             if back is None
@@ -346,14 +349,14 @@ def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: f
         rows = _onto(weight * u ** (1.0 / cosine), place, n)
         enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ rows
     area = np.gradient(root) * 2.0 * root**3  # x dx
-    judged = x > 1e-3  # at the horizon both vanish
+    judged = x > 1e-3  # both vanish at the horizon
     rests, factors, norms, share = [], [], [], 0.0 * x
-    for a in colours:
-        mixed = [float(np.interp(a, draws.colours, one)) for one in np.eye(len(draws.colours))[1:]]
+    for a in colors:
+        mixed = [float(np.interp(a, draws.colors, one)) for one in np.eye(len(draws.colors))[1:]]
         P, first, lobe = (
             sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
         )
-        # a perfect mirror keeps forever what it reflects totally, though nothing gets there
+        # light totally reflected over a perfect mirror never leaves, but no light gets there
         leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - EPSILON), first)
         some = judged & (lobe > 1e-6 * a)
         factor = float(np.min((leaves / np.maximum(lobe, EPSILON * a))[some], initial=1e3))
@@ -361,7 +364,7 @@ def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: f
         share = rest / np.maximum(leaves, EPSILON)
         rest = rest / (a * u * u)
         norm = 2.0 * np.pi * float(area @ rest)
-        some_rest = norm > 1e-7  # less is roundings
+        some_rest = norm > 1e-7  # smaller values are rounding errors
         rests.append(rest * some_rest)
         factors.append(1.0 / factor)
         norms.append(norm * some_rest)
@@ -369,12 +372,12 @@ def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: f
 
 
 def _continued(values: list[Floats]) -> Floats:
-    """Values at each u, last, and one more, in a straight line."""
+    """Values at each u, last, extended linearly by one more."""
     return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
 
 
 def _onto(weight: Floats, position: Floats, n: int) -> Floats:
-    """Draws of each row shared out among the nodes on both sides of their places -1 to 1, (rows, n)."""
+    """Samples of each row distributed to the nodes adjacent to their positions -1 to 1, (rows, n)."""
     scaled = (position + 1.0) * (0.5 * (n - 1))
     cell = np.minimum(scaled, n - 1 - EPSILON).astype(int)
     part, row = scaled - cell, np.arange(len(weight))[:, None] * n

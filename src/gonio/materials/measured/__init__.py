@@ -1,1 +1,1 @@
-"""The material that a table of measured values is."""
+"""The material for a table of measured values."""

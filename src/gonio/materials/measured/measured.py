@@ -17,37 +17,37 @@ class Measured(BSDF):
     """A table of measured values, interpolated in its own coordinates (course notes, part B).
 
     Files: MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), networks (.npz, as
-    FILE.npz:NAME) and Gonio's .gonio; docs/measured.md has what is known of each. What the data are is shown: negative
-    values stay negative, an albedo over 1 stays over 1, and a table that is not reciprocal is not made so. Reflection
-    only, black from below. A table is sampled by its own densities (RGL), or by a density found from its values.
+    FILE.npz:NAME) and Gonio's .gonio; see docs/measured.md for each. Data are not corrected: negative values remain
+    negative, an albedo over 1 remains over 1, and a table that is not reciprocal is not made so. Reflection only, black
+    from below. A table is sampled by its own densities (RGL), or by a density computed from its values.
     """
 
     file: str = file(
         default=SAMPLE,
-        doc="file of measured values; behind a colon which one, of files that hold several; `sample` comes with Gonio",
+        doc="file of measured values; after a colon the item, of files that hold several; `sample` comes with Gonio",
     )
     only_rgb: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the measured albedo is over 1, and shown as it is",
+            "the measured albedo is over 1, and is not corrected",
             lambda model: max(1.05 * float(model.table.albedos().max()) - 1.0, 0.0),
             certain=False,
         ),
         "reciprocity": KnownViolation(
-            "measured values are shown as they are", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
+            "measured values are not corrected", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
         ),
         "positivity": KnownViolation(
-            "values below 0 were measured, and are shown; as a share of the largest",
+            "values below 0 were measured, and are not corrected; as a fraction of the largest",
             lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
             certain=False,
         ),
         "isotropy": KnownViolation(
-            "the table is not its own mirror image, or its place is found by sums that lose digits where a lobe ends",
+            "the table is not mirror-symmetric, or its lookup uses sums that lose digits where a lobe ends",
             lambda model: 0.0 if model.table.mirrored else 2.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "the place in a table is found by sums that lose digits where a lobe ends",
+            "the lookup in the table uses sums that lose digits where a lobe ends",
             lambda model: 0.1 if model.table.sums else 0.0,
             certain=False,
         ),
@@ -84,12 +84,12 @@ class Measured(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The table's density, or that of the guide that was found for it."""
+        """The table's density, or that of the guide computed for it."""
         return where(above(wo, wi), self.table.pdf(wo, wi), 0.0)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A direction from that density."""
+        """A direction with that density."""
         wi, pdf = self.table.draw(wo, u)
         pdf = where(above(wo, wi), pdf, 0.0)
         value = self.table.value(wo, wi)

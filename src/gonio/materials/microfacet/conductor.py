@@ -20,7 +20,7 @@ class Conductor(_Reflector):
     """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
 
     D, G and F are chosen by name. alpha below 1e-4 is a perfect mirror. Light that a second facet would reflect is
-    lost: at alpha = 1 more than half.
+    lost: more than half at alpha = 1.
     """
 
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, over the outside's", low=0.0)
@@ -43,22 +43,22 @@ class Conductor(_Reflector):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F by name, times albedo, at a facet seen under cos_theta."""
+        """F, by name, times albedo, at a facet seen at cos_theta."""
         return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
     def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:
-        """What a facet does to polarization."""
+        """Polarization by a facet."""
         return reflected_by_metal(cos_theta, self.eta, self.k)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        """All of the light, by the exact equations; the Fresnel kind affects only its amount."""
         m = frame.half_vector(wo, wi)
         cos = abs(dot(wo, m))
         value = where(delta, self.reflectance(cos), self.eval(wo, wi, mode))
         return (Polarized(value, m, self._polarization(cos)),)
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """By the kind of Fresnel, or by the fit of `artist.imageworks`."""
+        """From the Fresnel kind, or by the fit of `artist.imageworks`."""
         kind = fresnel.kind(self.fresnel)
         if average == "imageworks" and not kind.white:
             return imageworks(*edge_tint(self.eta, self.k))

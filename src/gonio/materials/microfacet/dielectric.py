@@ -24,7 +24,7 @@ from .microfacet import Terms
 
 
 class _Facet(NamedTuple):
-    """What joins a pair of directions.
+    """The facet that joins a pair of directions.
 
     wo, wi        the pair, in the frame of the widths
     m             normal of the facet, m.z >= 0
@@ -50,13 +50,13 @@ class Dielectric(microfacet._Microfacet):
     """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
 
     With eta = eta_i / eta_o (indices on the wi and wo sides) and the facet's normal m along +-(wo + eta wi):
-    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form that carries radiance: it holds the
-    factor 1 / eta^2 by which radiance shrinks; mode "importance" leaves it out. alpha below 1e-4 is smooth glass, and
-    eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
+    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form for radiance, which includes the
+    factor 1 / eta^2 by which radiance shrinks; mode "importance" omits it. alpha below 1e-4 is smooth glass, and
+    eta = 1 is no surface. `transmission=False` leaves only the reflection.
 
-    What light loses on its way through (`absorption`, by Beer and Lambert exp(-absorption length)) and which of several
-    media that overlap is there (`priority`, Schmidt2002) are matters of paths: Gonio's integrators apply them, no value
-    of the surface depends on them.
+    Absorption inside (`absorption`, by Beer and Lambert exp(-absorption length)) and the choice among overlapping media
+    (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
+    depends on them.
     """
 
     eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
@@ -66,13 +66,13 @@ class Dielectric(microfacet._Microfacet):
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
-    transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
+    transmission: bool = flag(default=True, doc="whether refracted light is transmitted, or lost")
     sampling: str = microfacet.sampling_choice()
     absorption: Colour = spectrum(
-        default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length", inside=True
+        default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
-        default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6, inside=True
+        default=0.0, doc="among overlapping media the highest counts", low=-1e6, high=1e6, inside=True
     )
 
     preset_kind: ClassVar[str] = "medium"
@@ -85,7 +85,7 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """F by name at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F, by name, at a facet seen at cos_o, with transmitted cosine cos_t (0: total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
@@ -95,14 +95,15 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def _normal(self, wo: Direction, wi: Direction, eta: Scalar) -> Direction:
-        """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
+        """Normal of the facet that reflects or refracts wo into wi (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
         h = fma(wi, ratio, wo)
         h = h * rsqrt(maximum(dot(h, h), frame.TINY))
         return where(h.z < 0.0, -h, h)
 
     def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
-        """The facet that joins a pair of directions, along the axes of the anisotropy; turned last, see `Conductor`."""
+        """The facet that joins a pair of directions, along the axes of the anisotropy; rotated last, see
+        `Conductor`."""
         m = self._normal(wo, wi, eta)
         wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
         alpha, smooth = self._widths()
@@ -110,10 +111,10 @@ class Dielectric(microfacet._Microfacet):
         reflects = wo.z * wi.z > 0.0
         spread = 0.25 + zeros_like(dot_o)
         if self.transmission:
-            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
+            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which is accurate near eta = 1
             thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
             spread = where(reflects, spread, abs(dot_i * dot_o) * thinned)
-        # a facet seen from its back, or one that would refract into the wrong side, is never sampled
+        # a facet seen from its back, or one that would refract to the wrong side, is never sampled
         lit = (dot_o * wo.z > 0.0) & (dot_i * wi.z > 0.0) & ~smooth
         if not self.transmission:
             lit = lit & reflects
@@ -146,7 +147,7 @@ class Dielectric(microfacet._Microfacet):
         return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
 
     def _squeeze(self, reflects: Mask, eta: Scalar) -> Scalar:
-        """eta^2 for refraction: by how much solid angle shrinks on its way in, and radiance grows."""
+        """eta^2 for refraction: by how much solid angle shrinks on the way in, and radiance grows."""
         return where(reflects, 1.0, sqr(eta))
 
     def _share(self, f: Scalar) -> Scalar:
@@ -177,7 +178,8 @@ class Dielectric(microfacet._Microfacet):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
+        """A normal first, then u1 selects reflection with probability F; a direction on the wrong side is a failed
+        sample."""
         wo_local = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
@@ -192,7 +194,7 @@ class Dielectric(microfacet._Microfacet):
         wi = frame.rotate_back(wi, self.rotation)
         sides = wo.z * wi.z
         right_side = where(reflects, sides > 0.0, sides < 0.0)
-        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        # m recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         facet = self._facet(wo, wi, eta)
         squeeze = self._squeeze(reflects, eta)
         value = where(smooth, 1.0 / squeeze, self._value(facet))
@@ -205,10 +207,10 @@ class Dielectric(microfacet._Microfacet):
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        """All of the light, by the exact equations; the Fresnel kind affects only its amount."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.normal_like(wo), m)  # equal indices send light straight on, at no normal of their own
+        m = where(delta, frame.normal_like(wo), m)  # equal indices pass light straight through, without a normal
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
@@ -222,7 +224,7 @@ class Dielectric(microfacet._Microfacet):
     def _polarization(
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Scalar], Diattenuation[Scalar]]:
-        """What a facet does to the polarization of what it reflects, and of what it lets through."""
+        """Polarization of the light that a facet reflects, and of the light that it transmits."""
         return reflected_by_glass(cos_o, eta), refracted(cos_o, cos_i, eta)
 
     @method
@@ -234,7 +236,7 @@ class Dielectric(microfacet._Microfacet):
         return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Pair, Mask]:
-        """Widths, and whether the surface is smooth; where both indices are equal light goes straight on."""
+        """Widths, and whether the surface is smooth; if both indices are equal light passes straight through."""
         alpha, smooth = widths(self.alpha)
         if self.transmission:
             smooth = smooth | (abs(self.eta - 1.0) < MATCHED)
@@ -270,13 +272,13 @@ class Dielectric(microfacet._Microfacet):
         return self.reflectance(one, one, self.eta) * self.albedo
 
     def mean_reflectance(self, average: str = "exact") -> Scalar:
-        """From the side of the less dense medium."""
+        """F_avg from the side of the less dense medium."""
         return fresnel.kind(self.fresnel).dielectric_average(self.eta)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """Of smooth glass, which keeps nothing; without transmission, F."""
+        """For smooth glass, which absorbs nothing; without transmission F."""
         if self.delta != "always":
             return None
         albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))
@@ -289,6 +291,6 @@ class Dielectric(microfacet._Microfacet):
         return albedo * backend.to_numpy(f, len(mu))[:, None]
 
 
-# Refraction turns light by about (eta - 1) tan: below this difference of indices that is lost in the rounding of a
-# float32 direction (6e-8), and the normal that joins two directions can no longer be told.
+# Refraction deflects light by about (eta - 1) tan: below this difference of indices the deflection is lost in the
+# rounding of a float32 direction (6e-8), and the normal that joins two directions cannot be determined.
 MATCHED = 1e-6

@@ -11,7 +11,7 @@ from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation
 from .conductor import Conductor
 
-FRESNELS = {"exact": "the waves of the film", "one": "no loss at all: F = 1"}
+FRESNELS = {"exact": "interference of the film's waves", "one": "F = 1, without any loss"}
 
 
 def thickness_number() -> Number:
@@ -25,19 +25,19 @@ def film_index() -> Number:
 
 
 def film_form() -> str:
-    """Declare how colours follow from the waves."""
-    return choice("local", "how three colours follow from the waves", film.FORMS)
+    """Declare how RGB colors follow from the waves."""
+    return choice("local", "how RGB colors follow from the waves", film.FORMS)
 
 
 class FilmConductor(Conductor):
-    """Rough metal under a thin clear film: a `conductor` whose F has the colours of interference (Belcour2017).
+    """Rough metal under a thin clear film: a `conductor` with the interference colors of F (Belcour2017).
 
-    Every facet carries the film. In spectral variants F is that of each wavelength; else three colours follow from it
-    by `form`, with the metal's indices at 650, 550 and 450 nm and straight lines between them. A film of more than 2
-    or 3 um has fringes that are closer than the 20 nm of `local`.
+    Every facet carries the film. In spectral variants F is evaluated per wavelength; otherwise RGB colors follow by
+    `form`, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. The fringes of a film thicker than 2
+    or 3 um are closer than the 20 nm steps of `local`.
     """
 
-    if TYPE_CHECKING:  # the conductor's, which mypy forgets to be declared parameters
+    if TYPE_CHECKING:  # the conductor's parameters, which mypy does not recognize as declared
         eta: Colour = spectrum(0.0)
         k: Colour = spectrum(1.0)
         albedo: Colour = spectrum(1.0)
@@ -50,7 +50,7 @@ class FilmConductor(Conductor):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F of the film, times albedo, at a facet seen under cos_theta."""
+        """F of the film, times albedo, at a facet seen at cos_theta."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * film.reflectance(cos_theta, self._film())
@@ -62,7 +62,7 @@ class FilmConductor(Conductor):
         return film.polarization(cos_theta, self._film())[0]
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """The integral of F, whatever fit is asked for; its rule of ten angles follows films up to about 1 um."""
+        """The integral of F, whatever `average` is; its rule of ten angles resolves films up to about 1 um."""
         if self.fresnel == "one":
             return ones_like(self.eta)
         one = ones_like(self.film_eta)

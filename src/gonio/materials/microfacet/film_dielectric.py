@@ -20,14 +20,14 @@ from .film_conductor import FRESNELS, film_form, film_index, thickness_number
 
 
 class FilmDielectric(Dielectric):
-    """Rough glass under a thin clear film: a `dielectric` whose F has the colours of interference (Belcour2017).
+    """Rough glass under a thin clear film: a `dielectric` with the interference colors of F (Belcour2017).
 
-    What the film does not reflect goes through, in the opposite colours. It lies outside: from inside, F is that of the
-    direction that light refracts to. Forms and limits are those of `film-conductor`. eta = film_eta = 1 is nothing at
-    all; a soap bubble is eta = 1 and film_eta = 1.33.
+    Light that the film does not reflect is transmitted, in the complementary colors. The film is outside: from inside,
+    F is that of the refracted direction. Forms and limits are those of `film-conductor`. eta = film_eta = 1 is no
+    surface; a soap bubble is eta = 1 and film_eta = 1.33.
     """
 
-    if TYPE_CHECKING:  # the dielectric's, which mypy forgets to be declared parameters
+    if TYPE_CHECKING:  # the dielectric's parameters, which mypy does not recognize as declared
         eta: Number = number(1.5)
         albedo: Colour = spectrum(1.0)
     fresnel: str = choice("exact", "Fresnel reflectance", FRESNELS, white="one")
@@ -37,12 +37,12 @@ class FilmDielectric(Dielectric):
 
     reads_wavelengths: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "delta": KnownViolation("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+        "delta": KnownViolation("it reflects by its film, not by the bare index", 1.0, certain=False)
     }
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
-        """F of the film at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F of the film at a facet seen at cos_o, with transmitted cosine cos_t (0: total reflection)."""
         white = ones_like(self.albedo)
         if self.fresnel == "one":
             return white * ones_like(cos_o)
@@ -50,7 +50,7 @@ class FilmDielectric(Dielectric):
         return where(cos_t > 0.0, filmed, white)
 
     def _inside(self, eta: Scalar) -> Mask:
-        """Whether light comes from the glass, by the index on the far side over that on its own."""
+        """Whether light comes from the glass, by the index on the far side over that on the near side."""
         return (eta - 1.0) * (self.eta - 1.0) < 0.0
 
     def _film(self) -> film.Film:
@@ -61,8 +61,8 @@ class FilmDielectric(Dielectric):
         return mean(f) if self.transmission else ones_like(mean(f))
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
-        """The lobes are chosen by their mean colours."""
-        _, smooth = self._widths()  # where no index bends the light, no facet can be told from its directions
+        """The lobes are selected by their mean colors."""
+        _, smooth = self._widths()  # without refraction no facet can be determined from its directions
         cos_o, cos_i = (
             where(smooth, abs(w.z), abs(dot)) for w, dot in ((facet.wo, facet.dot_o), (facet.wi, facet.dot_i))
         )
@@ -75,7 +75,7 @@ class FilmDielectric(Dielectric):
     def _polarization(  # type: ignore[override]
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-        """From inside by the laws of Stokes: the same shares, and the phases that time reversed has."""
+        """From inside by Stokes' relations: the same amounts, with the phases of time reversal."""
         inside = self._inside(eta)
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         back, _ = film.polarization(where(inside, cos_t, cos_o), self._film())
@@ -93,11 +93,11 @@ class FilmDielectric(Dielectric):
 
     @property
     def microsurface(self) -> Microsurface | None:  # type: ignore[override]
-        """None: the tables of energy are of bare glass."""
+        """None: the energy tables are those of bare glass."""
         return None
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]
-        """From outside; the integral of F, whose rule of ten angles follows films up to about 1 um."""
+        """From outside: the integral of F, whose rule of ten angles resolves films up to about 1 um."""
         if self.fresnel == "one":
             return ones_like(self.albedo)
         one = ones_like(self.film_eta)
@@ -106,5 +106,5 @@ class FilmDielectric(Dielectric):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """Of smooth glass, which keeps nothing."""
+        """For smooth glass, which absorbs nothing."""
         return super().known_albedo(mu, phi, inner, nodes) if self.transmission else None

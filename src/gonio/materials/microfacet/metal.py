@@ -1,4 +1,4 @@
-"""A metal by its colours."""
+"""A metal given by its colors."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from ...optics.fresnel.schlick import schlick
 from . import microfacet
 from .reflector import _Reflector
 
-FRESNELS = {"f82": "Schlick's curve, bent at 82 degrees", "one": "no loss at all: F = 1"}
+FRESNELS = {"f82": "Schlick's curve, corrected at 82 degrees", "one": "F = 1, without any loss"}
 
 
 class Metal(_Reflector):
-    """Rough metal as artists mean it: a colour from above, and a tint at the edge (F82-tint, Kutz2021).
+    """Rough metal with artist-friendly parameters: a color at normal incidence, and a tint at the edge (F82-tint,
+    Kutz2021).
 
-    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times Schlick's value there, so that an
-    edge of 1 is Schlick's curve; at 90 degrees all is reflected. It is the metal of OpenPBR, and has no index: thin
-    films and polarization want a `conductor`.
+    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times Schlick's value there, so an edge of
+    1 is Schlick's curve; at 90 degrees F = 1. It is the metal of OpenPBR, and has no index: thin films and polarization
+    require a `conductor`.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "linearity": KnownViolation("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
-        "precision": KnownViolation("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
+        "linearity": KnownViolation("for an edge below a half and a dark r0, F is clamped at 0", 1.0, certain=False),
+        "precision": KnownViolation("near the places where F is clamped at 0 it is a difference", 0.01, certain=False),
     }
 
-    r0: Colour = spectrum(default=0.9, doc="reflectance from above", low=0.0, high=1.0, soft_high=True)
+    r0: Colour = spectrum(default=0.9, doc="reflectance at normal incidence", low=0.0, high=1.0, soft_high=True)
     edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
@@ -42,7 +43,7 @@ class Metal(_Reflector):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F times albedo, at a facet seen under cos_theta."""
+        """F times albedo, at a facet seen at cos_theta."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * self._curve(cos_theta)
@@ -51,7 +52,7 @@ class Metal(_Reflector):
         return f82(cos_theta, self.r0, self.edge * schlick(GRAZING, self.r0))
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """The curve's integral, whatever fit is asked for."""
+        """The curve's integral, whatever `average` is."""
         if self.fresnel == "one":
             return ones_like(self.r0)
         return mean_over_angles(self._curve)

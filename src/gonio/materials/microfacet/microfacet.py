@@ -1,4 +1,4 @@
-"""What the two microfacet materials share: the facet's facts, which normals are sampled, D G over the cosines."""
+"""The base of the two microfacet materials: facts, sampling of normals, and D G over the cosines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SAMPLINGS = {
 
 
 class Terms(NamedTuple):
-    """What a microfacet lobe is made of, at the half vector of a pair of directions.
+    """The terms of a microfacet lobe, at the half vector of a pair of directions.
 
     D  density of microfacet normals, 1/sr
     G  masking and shadowing
@@ -41,8 +41,8 @@ def alpha_width() -> Width:
 
 
 def rotation_angle() -> Angle:
-    """Declare the turn of the two widths."""
-    return angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
+    """Declare the rotation of the two widths."""
+    return angle(default=0.0, doc="rotation of the anisotropy's axes about the normal, from dp/du")
 
 
 def ndf_choice() -> Member:
@@ -69,14 +69,14 @@ def sampling_choice() -> str:
 
 
 def albedo_factor(doc: str) -> Colour:
-    """Declare the factor on everything that leaves."""
+    """Declare the factor on all light that leaves."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
 
 class _Microfacet(BSDF):
-    """A rough surface of mirrors or of glass: what a conductor and a dielectric say of themselves alike."""
+    """A rough surface of mirrors or of glass: the shared properties of conductor and dielectric."""
 
-    if TYPE_CHECKING:  # declared by each, in the order in which its constructor takes them
+    if TYPE_CHECKING:  # declared by each class, in the order of its constructor's arguments
         alpha: Width
         rotation: Angle
         ndf: Member
@@ -112,13 +112,13 @@ class _Microfacet(BSDF):
         return Microsurface(*kinds, self.alpha, self.rotation, self._index(), self.albedo, self.transmits)
 
     def _index(self) -> Scalar | None:
-        """Index inside over index outside, of a dielectric; None of a conductor."""
+        """Index inside over index outside, for a dielectric; None for a conductor."""
         return None
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """Of a smooth surface, whose one direction leaves with the weight of a sample."""
+        """For a smooth surface, whose single direction leaves with the weight of a sample."""
         if self.delta != "always":
             return None
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
@@ -128,7 +128,7 @@ class _Microfacet(BSDF):
 
 
 def delta_of(alpha: object) -> Delta:
-    """Whether widths, as the user gave them, make a delta lobe: alpha = 0 is a mirror."""
+    """Whether user-given widths make a delta lobe: alpha = 0 is a mirror."""
     pair = (alpha,) if backend.is_drjit(alpha) else pair_of(alpha)
     if any(backend.is_drjit(width) for width in pair):
         return "maybe"
@@ -138,12 +138,12 @@ def delta_of(alpha: object) -> Delta:
 
 @function
 def upper(w: Direction) -> Direction:
-    """w above the surface, -w below: a facet seen from behind at -w looks as from the front at w."""
+    """w above the surface, -w below: a facet seen from behind along -w looks as from the front along w."""
     return where(w.z < 0.0, -w, w)
 
 
 def _bounded(model: _Microfacet) -> bool:
-    """Whether the bound on reflections may be used: a facet that it leaves out could still transmit."""
+    """Whether the bound on reflections may be used: an excluded facet could still transmit."""
     return model.sampling == "bounded" and not model.transmits
 
 

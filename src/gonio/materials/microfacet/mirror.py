@@ -38,7 +38,7 @@ class Mirror(BSDF):
         return Sample(frame.mirror(wo), self.albedo * one, one, above, ones_like(wo.z))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of it: s turns over and p does not, as at a perfect conductor."""
+        """All of the light: s changes sign and p does not, as at a perfect conductor."""
         zero = zeros_like(wo.z)
         value = self.albedo * where(delta & (wo.z > 0.0), 1.0 + zero, 0.0)
         return (Polarized(value, frame.normal_like(wo), Diattenuation(zero, zero - 1.0, zero)),)

@@ -1,4 +1,4 @@
-"""A rough surface of mirrors, whatever its Fresnel reflectance: what the conductor and the artist's metal share."""
+"""A rough reflecting surface with any Fresnel reflectance: the base of the conductor and the artist's metal."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .microfacet import Terms
 
 
 class _Reflector(microfacet._Microfacet):
-    """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass gives `reflectance` and `mean_reflectance`."""
+    """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass defines `reflectance` and `mean_reflectance`."""
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F, times albedo, at a facet seen under cos_theta."""
+        """F, times albedo, at a facet seen at cos_theta."""
         raise NotImplementedError(f"{type(self).__name__} has no reflectance")
 
     def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
         """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
-        along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
+        along the axes of the anisotropy; rotated last, as wo + wi would magnify the rounding of the rotation."""
         m = frame.half_vector(wo, wi)
         alpha, smooth = self._roughness()
         wo, wi, m = (frame.rotate(w, self._turn) for w in (wo, wi, m))
@@ -45,7 +45,7 @@ class _Reflector(microfacet._Microfacet):
         wo_local = frame.rotate(wo, self._turn)
         m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
         wi = frame.rotate_back(frame.reflect(wo_local, m), self._turn)
-        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        # m recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         wo_local, wi_local, m, alpha, lit = self._facet(wo, wi)
         density = 0.25 * microfacet.pdf_per_cosine(self, wo_local, m, alpha)
         facets = where(lit, safe_div(microfacet.reflection(self, wo_local, wi_local, m, alpha), density), 0.0)

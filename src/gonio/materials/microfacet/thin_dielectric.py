@@ -20,13 +20,14 @@ from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from . import microfacet
 
 BOUNCES = {
-    "polarized": "of s and p apart, which a smooth sheet does not mix",
-    "mean": "of their mean, as most renderers have it; all light leaves unpolarized",
+    "polarized": "separately for s and p, which a smooth sheet does not mix",
+    "mean": "for their mean, as in most renderers; all light leaves unpolarized",
 }
 
 
 class _Sheet(NamedTuple):
-    """What a sheet reflects, all bounces together: of s, of p, and the product of both fields; that of what passes."""
+    """Reflection by a sheet, all bounces included: of s, of p, and the product of both fields; the product
+    transmitted."""
 
     s: Scalar
     p: Scalar
@@ -35,17 +36,18 @@ class _Sheet(NamedTuple):
 
 
 class ThinDielectric(BSDF):
-    """A thin sheet of clear glass: a window, a pane. What is not reflected goes straight on (PBRT4, sec. 9.5).
+    """A thin sheet of clear glass, such as a window pane. Light that is not reflected passes straight through (PBRT4,
+    sec. 9.5).
 
     Light bounces between both faces, R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and T' = 1 - R'; the sheet is
-    thicker than the light's coherence, thinner than its own picture. R is that of each polarization, and R' the mean of
-    both: at 60 degrees, index 1.5, .152. `bounces="mean"` takes R' of the mean R, .164, as renderers do that know no
-    polarization.
+    thicker than the light's coherence length, thinner than any visible displacement. R is that of each polarization,
+    and R' the mean of both: at 60 degrees, index 1.5, 0.152. `bounces="mean"` uses R' of the mean R, 0.164, as in
+    renderers without polarization.
     """
 
     eta: Number = number(default=1.5, doc="index of the sheet over that around it", low=0.2, high=5.0)
     fresnel: Member = microfacet.fresnel_choice()
-    bounces: str = choice("polarized", "what is summed over the bounces", BOUNCES)
+    bounces: str = choice("polarized", "reflectance that is summed over the bounces", BOUNCES)
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
 
     preset_kind: ClassVar[str] = "medium"
@@ -57,7 +59,7 @@ class ThinDielectric(BSDF):
 
     @function
     def reflectance(self, cos: Scalar) -> Scalar:
-        """R' under a cosine, from either side."""
+        """R' at a cosine, from either side."""
         cos_t = fresnel.cos_transmitted(cos, self.eta)
         if self.fresnel == "exact" and self.bounces == "polarized":
             sheet = self._sheet(cos, cos_t)
@@ -65,7 +67,7 @@ class ThinDielectric(BSDF):
         return _all_bounces(fresnel.kind(self.fresnel).dielectric(cos, cos_t, self.eta))
 
     def _sheet(self, cos: Scalar, cos_t: Scalar) -> _Sheet:
-        """All bounces together; powers add up, since waves of different bounces know nothing of each other."""
+        """All bounces; powers add up, since waves of different bounces are incoherent."""
         minus_r_s, r_p = exact.amplitudes(cos, cos_t, self.eta)
         s, p, once = sqr(minus_r_s), sqr(r_p), -minus_r_s * r_p
         through = (1.0 - s) * (1.0 - p)  # both faces
@@ -84,7 +86,7 @@ class ThinDielectric(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 chooses reflection with probability R'; else the direction is -wo."""
+        """u1 selects reflection with probability R'; else the direction is -wo."""
         share = self.reflectance(abs(wo.z))
         reflects = u.x < share
         one = ones_like(wo.z)
@@ -93,7 +95,7 @@ class ThinDielectric(BSDF):
         return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of it, unless polarization is lost between the bounces."""
+        """All of the light, unless polarization is lost between the bounces."""
         if self.bounces == "mean":
             return ()
         cos = abs(wo.z)
@@ -124,10 +126,10 @@ class ThinDielectric(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """albedo: nothing is kept."""
+        """albedo: nothing else is absorbed."""
         return np.array(np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3)))
 
 
 def _all_bounces(face: Scalar) -> Scalar:
-    """2 R / (1 + R): what both faces reflect together."""
+    """2 R / (1 + R): the reflectance of both faces together."""
     return 2.0 * face / (1.0 + face)

@@ -1,4 +1,4 @@
-"""Sheen of fibres that stand on a surface, multiple scattering included."""
+"""Sheen of upright fibers on a surface, including multiple scattering."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from ...optics.warp import square_to_cosine_hemisphere
 
 
 class Layer(NamedTuple):
-    """The transformed cosine at a wo: M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) takes it back to the cosine.
+    """The transformed cosine for a wo: M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) maps it back to the cosine.
 
     A, B  of the matrix
-    R     the layer's albedo seen along wo
+    R     the layer's albedo along wo
     """
 
     A: Scalar
@@ -35,26 +35,26 @@ class Layer(NamedTuple):
 
 
 class Sheen(BSDF):
-    """Light that a thin layer of upright fibres scatters: f cos theta_i = albedo R(wo) D(wo, wi) (Zeltner2022).
+    """Light scattered by a thin layer of upright fibers: f cos theta_i = albedo R(wo) D(wo, wi) (Zeltner2022).
 
-    D is a linearly transformed cosine (Heitz2016a), fitted to random walks through a layer of microflakes of unit
-    density and thickness that absorb nothing; so all orders of scattering are in it. R is the layer's own albedo: the
-    rest of the light goes on to what lies below, which this model alone leaves out. A colour is only a factor: fibres
-    that absorb would tint later bounces more. Sampled exactly, every weight is albedo R.
+    D is a linearly transformed cosine (Heitz2016a), fitted to random walks in a layer of lossless microflakes of unit
+    density and thickness, so it includes all orders of scattering. R is the layer's own albedo: the rest of the light
+    passes to the surface below, which this model omits. The color is only a factor: absorbing fibers would tint later
+    bounces more. Sampled exactly, every weight is albedo R.
 
-    The fit follows wo alone, so the model is not reciprocal. Its table has 32 x 32 nodes, linear between them.
+    The fit depends on wo only, so the model is not reciprocal. Its table has 32 x 32 nodes, linear between them.
     """
 
     albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
     roughness: Number = number(
         default=0.5,
-        doc="0 is fibres along the normal, 1 flakes any way: root of their cross section",
+        doc="0 is fibers along the normal, 1 flakes in any direction: root of their cross section",
         low=0.0,
         high=1.0,
     )
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("its table of lobes is one of the viewer's direction alone", 2.0)
+        "reciprocity": KnownViolation("its table of lobes depends on the viewer's direction only", 2.0)
     }
 
     @function

@@ -1,4 +1,4 @@
-"""Sheen by microfacets that stand on end."""
+"""Sheen by upright microfacets."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ WIDE = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
 
 
 class SheenCharlie(BSDF):
-    """Cloth whose fibres stand on end: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
+    """Cloth of upright fibers: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
 
     D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), which has its peak at the horizon instead of the normal
     G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), Lambda = exp L by their fit; their softened terminator, which is not
-    reciprocal, is left out. There is no Fresnel term. Single scattering: at alpha = 1 it reflects a fifth of the light
-    seen from the normal, at alpha = .1 a thousandth, and what is left goes on to the cloth below, which this model
-    leaves out. glTF's sheen is this one, with alpha the square of its roughness. Below alpha = .07 the fit returns more
-    than it receives near the horizon. Sampled by a guide.
+    reciprocal, is omitted. There is no Fresnel term. Single scattering: at normal incidence it reflects a fifth of the
+    light at alpha = 1, a thousandth at alpha = 0.1; the rest passes to the cloth below, which this model omits. glTF's
+    sheen is this one, with alpha the square of its roughness. Below alpha = 0.07 the fit reflects more than it receives
+    near the horizon. Sampled by a guide.
     """
 
     albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
-    alpha: Number = number(default=0.3, doc="how far fibres lean from the surface's plane", low=0.01, high=1.0)
+    alpha: Number = number(default=0.3, doc="tilt of the fibers from the surface's plane", low=0.01, high=1.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "Lambda's fit masks too little where alpha is under .07: at 89 degrees the albedo is then over 1",
+            "Lambda's fit masks too little for alpha below 0.07: at 89 degrees the albedo is then over 1",
             lambda model: _gain(model),
             certain=False,
         )
@@ -86,7 +86,7 @@ class SheenCharlie(BSDF):
 
 
 def _gain(model: SheenCharlie) -> float:
-    """What it returns beyond 1 at the worst angle: measured at 40 widths and 60 angles, and a tenth of it more."""
+    """The gain beyond 1 at the worst angle: measured at 40 widths and 60 angles, plus a tenth of it."""
     alpha = float(np.min(np.asarray(model.alpha)))
     return float(np.interp(alpha, GAINS[0], GAINS[1])) * float(np.max(np.asarray(model.albedo)))
 

@@ -1,1 +1,1 @@
-"""Measured materials in fewer bytes: a method a file, `compress` for all of them."""
+"""Compression of measured materials: one method per file, and `compress` for all of them."""

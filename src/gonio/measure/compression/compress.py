@@ -1,4 +1,4 @@
-"""Files of measurements in fewer bytes, and how far off that is: `gonio compress`."""
+"""Compression of measurement files, with the resulting error: `gonio compress`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ... import files
+from ...arguments import renamed
 from ...errors import InputError
 from .. import parted, read
 from ..compare import difference
@@ -16,22 +17,22 @@ from ..formats.own import Own
 from . import sphere
 from .base import Method
 
-SIZE = 16384  # bytes a material
+SIZE = 16384  # bytes per material
 LEAST = 1024
 
 
 @dataclass(frozen=True)
 class Compressed:
-    """A material in fewer bytes.
+    """A compressed material.
 
-    path     the file, with the material's name behind a colon where it holds several
-    kind     of table in it
-    method   by which
-    size     bytes a material: of a file with several the mean
-    before   bytes of its numbers as they were
-    error    E |new - old| / E |old| of f cos, as `gonio convert` says it
+    path     the file, followed by the material's name if it holds several
+    kind     of the table in it
+    method   of compression
+    size     bytes per material: the mean, for a file with several
+    before   bytes of its original numbers
+    error    E |new - old| / E |old| of f cos, as reported by `gonio convert`
     sphere   mean relative error of a sphere's pixels under a lamp and a sky
-    seconds  that it took, a material
+    seconds  computing time per material
     """
 
     path: str
@@ -47,20 +48,21 @@ class Compressed:
         return dict(vars(self))
 
 
+@renamed(method="codec")
 def compress(
     source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     output: str | os.PathLike[str],
-    method: str = "log",
+    codec: str = "log",
     bytes: int = SIZE,
 ) -> list[Compressed]:
-    """Write measured materials into a `.gonio` file of fewer bytes; the errors are measured on the file as written.
+    """Compress measured materials into a `.gonio` file; the errors are measured on the written file.
 
     source  a file or several, as `go.Measured` takes them; several make one file, whose materials are OUT.gonio:NAME
-    method  log (quantised logarithms), lowrank (factors that all share), rgl (without `vndf`), network (675 weights)
+    codec   log (quantised logarithms), lowrank (factors that all share), rgl (without `vndf`), network (675 weights)
     bytes   a material, for log and lowrank
-    Raises InputError where a file cannot be read, or the method cannot be used for it.
+    Raises InputError where a file cannot be read, or the codec cannot be used for it.
     """
-    one = Method.family.get(method, "method")
+    one = Method.family.get(codec, "codec")
     if not isinstance(bytes, int) or bytes < LEAST:
         raise InputError(f"{bytes} bytes given, a whole number from {LEAST} expected", "bytes")
     path = files.check_file(Path(output))
@@ -77,19 +79,19 @@ def compress(
     seconds = (time.perf_counter() - start) / len(made)
     own = Own()
     data = own.write(made[0]) if len(made) == 1 else own.write_several(dict(zip(tables, made, strict=True)))
-    found = []
+    results = []
     for name, table in tables.items():
         item = name if len(made) > 1 else ""
         new = own.read(data, str(path), item)
-        found.append(
+        results.append(
             Compressed(
-                f"{output}:{item}" if item else str(output), new.name, method, round(len(data) / len(made)),
+                f"{output}:{item}" if item else str(output), new.name, codec, round(len(data) / len(made)),
                 sum(array.nbytes for array in table.arrays().values()), difference(table, new),
                 sphere.error(sphere.picture(table.rgb), sphere.picture(new.rgb)), seconds,
             )
         )  # fmt: skip
     files.write_whole(path, data)
-    return found
+    return results
 
 
 def _name(file: str | os.PathLike[str]) -> str:

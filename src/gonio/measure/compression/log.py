@@ -1,4 +1,4 @@
-"""Quantised log tables."""
+"""Quantized log tables."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..formats.own import Own
 from ..tables.adaptive import Adaptive
 from ..tables.base import Floats, Measurement, in_rgb
 from ..tables.half_difference import HalfDifference
-from ..tables.log_adaptive import LogAdaptive, turned
+from ..tables.log_adaptive import LogAdaptive, log_values
 from ..tables.log_table import COLOURS, LogTable, Shape, above, from_cosines, packed, to_cosines
 from ..tables.low_rank import LowRank
 from ..tables.rebuilt import Rebuilt, rebuilding
 from .base import Method, over_half_vectors
 
-OFFSET = 0.05  # of the median of f: darker cells are known less well relatively
-FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and how coarse cosines are meanwhile
-STEPS = (1e-3, 300.0)  # between which the step is looked for
+OFFSET = 0.05  # of the median of f: darker cells are measured with lower relative accuracy
+FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and the step of the cosines meanwhile
+STEPS = (1e-3, 300.0)  # the range in which the step is searched
 HALVINGS = 9
 
 Stored = Mapping[str, NDArray[np.generic]]
@@ -30,44 +30,44 @@ C = TypeVar("C", LogTable, LowRank, LogAdaptive)
 
 
 class Log(Method):
-    """log: logarithms as cosines, each rounded to a multiple of a step, as fine as the bytes allow."""
+    """log: logarithms as cosine coefficients, each rounded to a multiple of a step, as fine as the size allows."""
 
     name: ClassVar[str] = "log"
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        found: list[Measurement] = []
+        compressed: list[Measurement] = []
         for table in tables:
             if isinstance(table, Adaptive) and table.wavelengths is None and table.jacobian:
-                found.append(_adaptive(table, size))
+                compressed.append(_adaptive(table, size))
                 continue
             logs = Logs(over_half_vectors(table))
-            found.append(coded(LogTable, logs, to_cosines(logs.values), {}, size))
-        return found
+            compressed.append(coded(LogTable, logs, to_cosines(logs.values), {}, size))
+        return compressed
 
 
 def _adaptive(table: Adaptive, size: int) -> Measurement:
-    """An adaptive table stays one: its lobes would be lost on another grid."""
+    """The table in adaptive form; on another grid its lobes would be lost."""
     offset = float(np.float32(OFFSET * max(float(np.median(np.abs(table.values))), 1e-9)))
-    numbers = to_cosines(turned(table.values, offset))
-    kept = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
-    stored = {name: array for name, array in kept.items() if name not in ("luminance", "values")}
+    numbers = to_cosines(log_values(table.values, offset))
+    arrays = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
+    stored = {name: array for name, array in arrays.items() if name not in ("luminance", "values")}
     stored["cells"] = np.array(numbers.shape[:3], np.int32)
     return rounded(LogAdaptive, table, numbers, stored, (1.0, offset), size)
 
 
 class Logs:
-    """A table's logarithms: smooth where it says nothing, in brightness and two differences of colour."""
+    """A table's logarithms, filled smoothly at invalid cells, as brightness and two color differences."""
 
     def __init__(self, table: HalfDifference) -> None:
         self.table = table
         n, m, count = table.values.shape[:3]
         self.shape: Shape = (n, m, count)
-        kept = in_rgb(table.values, table.wavelengths)
-        self.offset = float(np.float32(OFFSET * max(float(np.median(kept[table.valid])), 1e-9)))
-        held = table._held(kept) if not table.valid.all() else kept
+        rgb = in_rgb(table.values, table.wavelengths)
+        self.offset = float(np.float32(OFFSET * max(float(np.median(rgb[table.valid])), 1e-9)))
+        held = table._held(rgb) if not table.valid.all() else rgb
         self.values = np.log(np.maximum(held, 0.0) + self.offset) @ COLOURS.T
         if not table.valid.all():
-            # what coarse cosines say of the others is what costs least
+            # filling the others by a coarse cosine series needs the fewest bytes
             for _ in range(FILLS):
                 coarse = from_cosines(np.round(to_cosines(self.values) / FILL_STEP) * FILL_STEP)
                 self.values[~table.valid] = coarse[~table.valid]
@@ -82,7 +82,7 @@ class Logs:
 
 
 def coded(cls: type[T], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> T:
-    """A table over half vectors, of numbers by frequency; of the bytes of `more` so many are `shared`."""
+    """A table over half vectors from numbers by frequency; `shared` bytes of `more` are not counted."""
     return rounded(cls, logs.table, numbers, {**logs.stored, **more}, (logs.table.turn, logs.offset), size, shared)
 
 
@@ -90,10 +90,10 @@ def rounded(
     cls: type[C], source: Measurement, numbers: Floats, stored: Stored, scale: tuple[float, float], size: int,
     shared: int = 0,
 ) -> C:  # fmt: skip
-    """A table whose numbers are rounded as little as fits into a file of `size` bytes.
+    """A table whose numbers are rounded as finely as a file of `size` bytes allows.
 
-    stored  its other arrays; of their bytes `shared` are not counted
-    scale   turn and offset, the step stands between them
+    stored  its other arrays; `shared` of their bytes are not counted
+    scale   turn and offset, between which the step is inserted
     """
     own = Own()
     about = {"title": source.title, "source": source.source}
@@ -104,17 +104,17 @@ def rounded(
     def codes(step: float) -> NDArray[np.uint8]:
         return packed(np.round(numbers / step).astype(np.int64))
 
-    taken = len(own.file_of(cls, with_codes(1.0, np.zeros(0, np.uint8)), about)) - shared
-    finest = max(STEPS[0], float(np.abs(numbers).max()) / 2.0**22)  # what three bytes hold
-    step = least(lambda x: taken + len(codes(x)) <= size, finest, STEPS[1])
+    header = len(own.file_of(cls, with_codes(1.0, np.zeros(0, np.uint8)), about)) - shared
+    finest = max(STEPS[0], float(np.abs(numbers).max()) / 2.0**22)  # the range of three bytes
+    step = least(lambda x: header + len(codes(x)) <= size, finest, STEPS[1])
     if step is None:
-        what = f"{size} bytes, a table takes {taken + len(codes(STEPS[1]))} at least"
+        what = f"{size} bytes, a table takes {header + len(codes(STEPS[1]))} at least"
         raise InputError(what, "bytes", "allow more")
     return cls(with_codes(step, codes(step)), title=source.title, source=source.source)
 
 
 def least(fits: Callable[[float], bool], low: float, high: float) -> float | None:
-    """About the least number that fits, where larger ones do; None where none does."""
+    """Approximately the smallest number that fits, if larger ones do; None if none does."""
     if not fits(high):
         return None
     low, high = np.log(low), np.log(high)

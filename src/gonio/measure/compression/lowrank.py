@@ -14,11 +14,11 @@ from ..tables.low_rank import BASES, LowRank, projected
 from .base import Method, over_half_vectors
 from .log import Logs, coded
 
-RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # tried, alike along all axes
+RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # candidates, equal along all axes
 
 
 class Lowrank(Method):
-    """lowrank: bases of the slices along each axis, found by singular values for all materials together, and a core."""
+    """lowrank: bases of the slices along each axis, from singular vectors of all materials together, and a core."""
 
     name: ClassVar[str] = "lowrank"
     shared: ClassVar[bool] = True
@@ -36,7 +36,7 @@ class Lowrank(Method):
             spent = sum(basis.nbytes for basis in bases)
             if best is not None and spent / len(every) > 0.7 * size:
                 break
-            found: list[Measurement] = []
+            compressed: list[Measurement] = []
             missed = 0.0
             for one in every:
                 core = projected(one.values, [basis.astype(float) for basis in bases])
@@ -48,10 +48,10 @@ class Lowrank(Method):
                         return best[1]
                     raise
                 missed += _missed(one, made)
-                found.append(made)
+                compressed.append(made)
             if best is not None and missed > best[0]:
                 break
-            best = missed, found
+            best = missed, compressed
         assert best is not None, "a rank that does not fit has raised"
         return best[1]
 
@@ -64,8 +64,8 @@ def _vectors(every: list[Floats], axis: int) -> Floats:
         flat = np.moveaxis(logs, axis, 0).reshape(logs.shape[axis], -1)
         gram = gram + flat @ flat.T
     _, vectors = np.linalg.eigh(gram)
-    found: Floats = vectors[:, ::-1]
-    return found
+    basis: Floats = vectors[:, ::-1]
+    return basis
 
 
 def _missed(logs: Logs, made: LowRank) -> float:

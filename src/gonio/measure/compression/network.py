@@ -18,15 +18,15 @@ from .base import Method, over_half_vectors
 
 Floats32 = NDArray[np.float32]
 
-OFFSET = 0.3  # of the median of f: below it differences are differences, above it ratios
-LOWEST = 0.01  # cosine of both directions of what is learnt from: within .6 degrees of the horizon little is seen
-STEPS, BATCH, RATE = 9000, 2048, 1e-2  # of Adam; the rate falls to 0 linearly
-ROUNDS, PAIRS = 40, 5000  # of Gauss and Newton, with as many pairs each
-LARGEST = 60.0  # of log(1 + f), which exp can still take in float32
+OFFSET = 0.3  # of the median of f: separates absolute from relative differences
+LOWEST = 0.01  # minimum cosine of both directions in training: within 0.6 degrees of the horizon
+STEPS, BATCH, RATE = 9000, 2048, 1e-2  # of Adam; the rate decreases linearly to 0
+ROUNDS, PAIRS = 40, 5000  # of Gauss-Newton, with as many pairs each
+LARGEST = 60.0  # of log(1 + f), within the range of exp in float32
 
 
 class NetworkMethod(Method):
-    """network: 675 weights a material, 6 -> 21 -> 21 -> 3 (Sztrajman2021), trained here; of a fixed size."""
+    """network: 675 weights per material, 6 -> 21 -> 21 -> 3 (Sztrajman2021), trained here; of fixed size."""
 
     name: ClassVar[str] = "network"
 
@@ -35,9 +35,9 @@ class NetworkMethod(Method):
 
 
 def trained(table: Measurement, seed: int = 1) -> Network:
-    """The network of a table, found in about half a minute: by Adam in Dr.Jit, then by Levenberg and Marquardt.
+    """The network of a table, trained in about half a minute: by Adam in Dr.Jit, then by Levenberg-Marquardt.
 
-    What is made small is |log(f + c) - log(f' + c)|, c a share of the median, over a half-difference table's cells.
+    The loss is |log(f + c) - log(f' + c)|, c a fraction of the median, over a half-difference table's cells.
     """
     data = Data.of(over_half_vectors(table))
     rng = np.random.default_rng([seed, 97])
@@ -51,7 +51,7 @@ def trained(table: Measurement, seed: int = 1) -> Network:
 
 @dataclass(frozen=True)
 class Data:
-    """What is learnt: (hx, hy, hz, dx, dy, dz) of pairs, (6, N), log(f + offset), (3, N), and the offset."""
+    """The training data: (hx, hy, hz, dx, dy, dz) of pairs, (6, N), log(f + offset), (3, N), and the offset."""
 
     inputs: Floats32
     logs: Floats32
@@ -65,34 +65,34 @@ class Data:
         phi_d = (np.arange(count) + 0.5) / count * table.turn
         h, d, p = (a.ravel() for a in np.meshgrid(theta_h, theta_d, phi_d, indexing="ij"))
         along, side = np.sin(d) * np.cos(p), np.sin(d) * np.sin(p)
-        flip = np.where(side < 0.0, -1.0, 1.0)  # a whole turn is learnt as one half: exchanging changes nothing
+        flip = np.where(side < 0.0, -1.0, 1.0)  # a full turn is reduced to one half: exchanging changes nothing
         both = np.stack([np.sin(h), 0.0 * h, np.cos(h), along * flip, side * flip, np.cos(d)]).astype(np.float32)
         lowest = np.cos(d) * np.cos(h) - np.abs(np.sin(h) * along)
-        kept = table.valid.ravel() & (lowest > LOWEST)
-        f = in_rgb(table.values, table.wavelengths).reshape(-1, 3)[kept]
+        usable = table.valid.ravel() & (lowest > LOWEST)
+        f = in_rgb(table.values, table.wavelengths).reshape(-1, 3)[usable]
         offset = OFFSET * max(float(np.median(f)), 1e-6)
-        return cls(both[:, kept], np.log(np.maximum(f, 0.0) + offset).T.astype(np.float32), offset)
+        return cls(both[:, usable], np.log(np.maximum(f, 0.0) + offset).T.astype(np.float32), offset)
 
 
 Weights = dict[str, Floats32]
 
 
 def _started(data: Data, rng: np.random.Generator) -> Weights:
-    """Uniform numbers (Glorot2010), and the median colour."""
-    found: Weights = {}
+    """Random initial weights (Glorot2010), and the median color."""
+    weights: Weights = {}
     for name, shape in SHAPES.items():
         if name.startswith("kernel"):
             reach = np.sqrt(6.0 / sum(shape))
-            found[name] = rng.uniform(-reach, reach, shape[::-1]).astype(np.float32)
+            weights[name] = rng.uniform(-reach, reach, shape[::-1]).astype(np.float32)
         else:
-            found[name] = np.zeros((*shape, 1), np.float32)
+            weights[name] = np.zeros((*shape, 1), np.float32)
     median = np.exp(np.median(data.logs, axis=1)) - data.offset
-    found["bias2"] = np.log1p(np.maximum(median, 0.0))[:, None].astype(np.float32)
-    return found
+    weights["bias2"] = np.log1p(np.maximum(median, 0.0))[:, None].astype(np.float32)
+    return weights
 
 
 def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
-    """By Adam, on batches of pairs."""
+    """The weights after Adam, on batches of pairs."""
     dr, types = backend.drjit(), backend.types("float32")
     Tensor = types.module.TensorXf
     opt = importlib.import_module("drjit.opt").Adam(lr=RATE, params={n: Tensor(w) for n, w in weights.items()})
@@ -108,7 +108,7 @@ def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weight
         units = dr.maximum(opt["kernel0"] @ inputs[one] + opt["bias0"], 0.0)
         units = dr.maximum(opt["kernel1"] @ units + opt["bias1"], 0.0)
         f = dr.exp(opt["kernel2"] @ units + opt["bias2"]) - 1.0
-        # below 0 straight on, so that a network that says too little is told so
+        # linear below 0, so that the gradient of a value that is too small does not vanish
         log = dr.select(
             f > 0.0, dr.log(dr.maximum(f, 0.0) + data.offset), f * (1.0 / data.offset) + float(np.log(data.offset))
         )
@@ -118,7 +118,7 @@ def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weight
 
 
 def _refined(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
-    """By Levenberg and Marquardt on the squares: with 675 weights the normal equations are small."""
+    """The weights after Levenberg-Marquardt on the squares: with 675 weights the normal equations are small."""
     damping = 1e-2
     for _ in range(ROUNDS):
         pick = rng.choice(data.inputs.shape[1], min(PAIRS, data.inputs.shape[1]), replace=False)
@@ -146,7 +146,7 @@ def _units(weights: Weights, inputs: Floats32) -> tuple[Floats32, Floats32, Floa
 
 
 def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
-    """Of the logarithms, (3, N), and their derivatives by what the network says."""
+    """Differences of the logarithms, (3, N), and their derivatives by the network's outputs."""
     said = _units(weights, data.inputs)[2]
     f = np.expm1(said)
     lit = f > 0.0
@@ -155,7 +155,7 @@ def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
 
 
 def _normal_equations(weights: Weights, data: Data) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """J J^T, J r and the mean of r^2, r the differences: back-propagation of each channel, written out."""
+    """J J^T, J r and the mean of r^2, r the differences: back-propagation of each channel, written explicitly."""
     first, second, _ = _units(weights, data.inputs)
     rest, derivative = _differences(weights, data)
     sizes = [weights[name].size for name in SHAPES]

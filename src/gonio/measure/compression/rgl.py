@@ -1,4 +1,4 @@
-"""RGL tables without what follows from the rest."""
+"""RGL tables without redundant arrays."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Rgl(Method):
     name: ClassVar[str] = "rgl"
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        found: list[Measurement] = []
+        compressed: list[Measurement] = []
         for table in tables:
             if not isinstance(table, Adaptive):
                 what = f"a table of kind {table.name}, an adaptive one expected"
                 raise InputError(what, "FILE", "gonio convert IN OUT.bsdf makes one")
-            kept = {**table.arrays(), **rebuilding(table)}
-            found.append(Rebuilt(kept, title=table.title, source=table.source, wavelengths=table.wavelengths))
-        return found
+            arrays = {**table.arrays(), **rebuilding(table)}
+            compressed.append(Rebuilt(arrays, title=table.title, source=table.source, wavelengths=table.wavelengths))
+        return compressed

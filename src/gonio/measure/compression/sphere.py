@@ -1,4 +1,4 @@
-"""A sphere under a lamp and a sky, computed pair by pair: what an error of a table does to a picture."""
+"""A sphere under a lamp and a sky, computed pair by pair: the effect of a table's error on a picture."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from ..tables.base import Floats
 
 SIZE = 64  # pixels across
-LAMP = np.array([-0.5, 0.6, 0.62])  # toward it; as bright as all of the sky
-SKY = 256  # directions that the sky is made of, evenly spread
-DARK = 0.01  # of the picture's mean: what a pixel's difference is at least held against
+LAMP = np.array([-0.5, 0.6, 0.62])  # direction toward it; as bright as the whole sky
+SKY = 256  # evenly spread directions of the sky
+DARK = 0.01  # of the picture's mean: lower limit of the denominator of relative differences
 
 Rgb = Callable[[Floats, Floats], Floats]
 
@@ -40,12 +40,12 @@ def picture(rgb: Rgb) -> Floats:
     """The pixels of the sphere's disc, (P, 3), of f cos theta_i (wo, wi) -> (N, 3)."""
     n, t, b = frame()
     wo = np.stack([t[:, 2], b[:, 2], n[:, 2]], -1)  # the view, (0, 0, 1), in each pixel's frame
-    found = np.zeros_like(n)
+    radiance = np.zeros_like(n)
     for light, irradiance in zip(*lights(), strict=True):
         wi = np.stack([t @ light, b @ light, n @ light], -1)
         lit = wi[:, 2] > 0.0
-        found[lit] += irradiance * rgb(wo[lit], wi[lit])
-    return found
+        radiance[lit] += irradiance * rgb(wo[lit], wi[lit])
+    return radiance
 
 
 def error(old: Floats, new: Floats) -> float:

@@ -1,1 +1,1 @@
-"""Files of measured materials, one format a file of this folder; a new one is one new file: discovery finds it."""
+"""Files of measured materials, one format per file in this folder; to add one, add a file."""

@@ -1,4 +1,4 @@
-"""ASTM E1392 text files: a list of angles and values, the common ground of scatterometers."""
+"""ASTM E1392 text files: a list of angles and values, the common format of scatterometers."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ ANGLES = ["theta_i", "phi_i", "theta_s", "phi_s"]
 
 
 class Astm(Format):
-    """ASTM E1392: a head of keywords, ended by VARS, then rows of numbers with commas between them.
+    """ASTM E1392: a header of keywords, ended by VARS, then rows of comma-separated numbers.
 
-    Read as published: NUM_POINTS, where it stands, counts the rows; VARS names the columns, four angles in radians
+    As published, NUM_POINTS, if present, is the number of rows; VARS names the columns, four angles in radians
     (theta_i, phi_i, theta_s, phi_s) and a value each for red, green and blue (R, G, B), one channel, or wavelengths
-    ("550nm"). Where the rows are a whole grid over (theta_i, theta_s, |phi|), they are read as one.
+    ("550nm"). Rows that form a complete grid over (theta_i, theta_s, |phi|) are read as a grid.
     """
 
     name: ClassVar[str] = "astm"
@@ -56,7 +56,7 @@ class Astm(Format):
             raise InputError(f"NUM_POINTS says {claimed[:20]}, {len(values)} rows follow", where, "the file is damaged")
         nm = _wavelengths(columns[4:], where)
         if nm is None and len(columns) not in (5, 7):
-            what = f"{len(columns) - 4} values a row without wavelengths, 1 or 3 expected"
+            what = f"{len(columns) - 4} values per row without wavelengths, 1 or 3 expected"
             raise InputError(what, where, "name the columns 550nm and so on")
         source = {"format": self.name, **head}
         values[:, [0, 2]] = np.abs(values[:, [0, 2]])
@@ -68,7 +68,7 @@ class Astm(Format):
             i, r, p = (a.ravel() for a in np.meshgrid(table.theta_i, table.theta_r, table.phi, indexing="ij"))
             directions, values = np.stack([i, 0.0 * i, r, p], -1), table.values.reshape(len(i), -1)
         else:
-            assert isinstance(table, Samples), "`resampled` made it so"
+            assert isinstance(table, Samples), "ensured by `resampled`"
             directions, values = table.directions, table.values
         if table.wavelengths is not None:
             names = [f"{nm:.17g}nm" for nm in table.wavelengths]
@@ -79,7 +79,7 @@ class Astm(Format):
         return (head + written(np.concatenate([directions, values], axis=1), ",")).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples and grids themselves; else values at the directions of a goniometer's plan."""
+        """Samples and grids unchanged; other tables as values at the directions of a goniometer's plan."""
         if isinstance(source, Samples | Angles):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)
@@ -90,12 +90,12 @@ def _plain(name: str) -> str:
 
 
 def _wavelengths(names: list[str], where: str) -> Floats | None:
-    """What columns named "550nm" stand for; None where none is named so."""
-    found = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
-    if not any(found):
+    """The wavelengths of columns named "550nm"; None if there are none."""
+    matches = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
+    if not any(matches):
         return None
     try:
-        nm = np.array([float(one[1]) if one else np.nan for one in found])
+        nm = np.array([float(one[1]) if one else np.nan for one in matches])
     except ValueError:
         nm = np.full(1, np.nan)
     if not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0.0):
@@ -104,22 +104,19 @@ def _wavelengths(names: list[str], where: str) -> Floats | None:
 
 
 def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floats | None) -> Angles | None:
-    """The rows as a table, where they are a whole grid with |phi| from 0 to pi."""
+    """The rows as a table, if they are a complete grid with |phi| from 0 to pi."""
     between = np.abs((rows[:, 3] - rows[:, 1] + np.pi) % (2.0 * np.pi) - np.pi)
-    found = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
-    count = np.prod([len(nodes) for nodes in found])
-    if count != len(rows) or min(map(len, found)) < 2:
+    axes = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
+    count = np.prod([len(nodes) for nodes in axes])
+    if count != len(rows) or min(map(len, axes)) < 2:
         return None
     place = np.ravel_multi_index(
-        [
-            np.searchsorted(nodes, column)
-            for nodes, column in zip(found, (rows[:, 0], rows[:, 2], between), strict=True)
-        ],
-        tuple(map(len, found)),
+        [np.searchsorted(nodes, column) for nodes, column in zip(axes, (rows[:, 0], rows[:, 2], between), strict=True)],
+        tuple(map(len, axes)),
     )
     if len(np.unique(place)) != count:
         return None
-    theta_i, theta_r, phi = found
+    theta_i, theta_r, phi = axes
     values = np.empty((int(count), rows.shape[1] - 4))
     values[place] = rows[:, 4:]
-    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, found), -1), where, title, source, nm)
+    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, axes), -1), where, title, source, nm)

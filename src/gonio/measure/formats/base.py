@@ -1,7 +1,7 @@
-"""What a format is: how its files are recognised, read and written.
+"""The interface of a format: how its files are recognized, read and written.
 
-A reader is strict: it takes a file whole or refuses it with one error, and before it allocates anything it knows from
-the file's size that the file can justify it.
+A reader is strict: it accepts a file completely or rejects it with one error, and before it allocates memory it checks
+the claimed sizes against the file's size.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from ...errors import InputError
 from ...members import Family, instances_of
 from ..tables.base import Measurement
 
-MOST = 1 << 31  # bytes that a file may have: 60 times the largest of today's tables
+MAX_BYTES = 1 << 31  # of a file: 60 times the largest existing table
 
 
 class Format:
-    """A format of files.
+    """A file format.
 
-    name      as `gonio info` prints it
-    suffixes  by which files are recognised, the first is the one that is written
-    writes    the kind of table that `write` takes, by name; "" where the format cannot be written
+    name      printed by `gonio info`
+    suffixes  by which files are recognized; the first is used for writing
+    writes    the kind of table that `write` accepts, by name; "" if the format cannot be written
     """
 
     family: ClassVar[Family[Format]]
@@ -31,26 +31,26 @@ class Format:
     several: ClassVar[bool] = False  # whether a file holds several materials
 
     def fits(self, data: bytes) -> bool:
-        """Whether a file of its suffix is its own, where formats share one."""
+        """Whether a file with its suffix is of this format, if formats share the suffix."""
         return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
-        """The table in a file's bytes. InputError where they are not one.
+        """The table in a file's bytes. Raises InputError if they are of another format.
 
-        item  which one, of files that hold several
+        item  the material, in files that hold several
         """
         raise NotImplementedError
 
     def write(self, table: Measurement) -> bytes:
-        """The file of a table of the kind `writes`."""
+        """The bytes of a file for a table of the kind `writes`."""
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
     def resampled(self, source: Measurement) -> Measurement:
-        """A table of the kind `writes` that stands for another, found by evaluating it; itself where it is one."""
+        """A table of the kind `writes` with the values of another; unchanged if it is of that kind."""
         raise NotImplementedError
 
     def items(self, data: bytes, where: str) -> list[str]:
-        """The names of the materials in a file that holds several; empty in others."""
+        """The names of the materials in a file that holds several; empty for others."""
         return []
 
 
@@ -58,20 +58,20 @@ Format.family = Family("format", "gonio.formats", ["gonio.measure.formats"], ins
 
 
 def by_suffix(path: str | Path) -> list[Format]:
-    """The formats of a file's suffix, the one whose own it is first."""
+    """The formats of a file's suffix, the one with the suffix listed first before others."""
     suffix = Path(path).suffix.lower()
-    found = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
-    return sorted(found, key=lambda one: one.suffixes.index(suffix))
+    formats = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
+    return sorted(formats, key=lambda one: one.suffixes.index(suffix))
 
 
 def contents(path: Path, where: str = "") -> bytes:
-    """A file's bytes. InputError where it cannot be read, or is larger than any table."""
+    """A file's bytes. Raises InputError if it cannot be read, or is larger than any table."""
     try:
         size = path.stat().st_size
         if not path.is_file():
             raise InputError(f"'{path}' is no file", where or str(path))
-        if size > MOST:
-            raise InputError(f"{size} bytes, at most {MOST} expected", str(path))
+        if size > MAX_BYTES:
+            raise InputError(f"{size} bytes, at most {MAX_BYTES} expected", str(path))
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None

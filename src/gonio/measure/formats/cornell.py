@@ -1,4 +1,4 @@
-"""Cornell's text files of gonioreflectometer measurements, as pbrt-v2 ships them."""
+"""Cornell's text files of gonioreflectometer measurements, as shipped with pbrt-v2."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..tables.samples import Samples, sampled
 from .base import Format
 from .text import lines, numbers, written
 
-WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; what colours are written at
+WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; used to write colors
 
 
 class Cornell(Format):
-    """Cornell text: the number of wavelengths, the wavelengths [nm], then a sample a row.
+    """Cornell text: the number of wavelengths, the wavelengths [nm], then one sample per row.
 
-    A sample is theta_i, phi_i, theta_r, phi_r in radians and a value for each wavelength. Lines that start with # are
+    A sample is theta_i, phi_i, theta_r, phi_r in radians and a value per wavelength. Lines that start with # are
     comments, the first of them the title.
     """
 
@@ -61,9 +61,9 @@ class Cornell(Format):
         return Samples(rows[:, :4], rows[:, 4:], where, title, about, nm)
 
     def write(self, table: Measurement) -> bytes:
-        assert isinstance(table, Samples), "`resampled` made it so"
+        assert isinstance(table, Samples), "ensured by `resampled`"
         nm, values = table.wavelengths, table.values
-        if nm is None:  # three channels, or one: the smoothest spectra that look so
+        if nm is None:  # three channels, or one: the smoothest spectra of these colors
             nm = WAVELENGTHS
             values = np.repeat(values, 3, 1) if values.shape[1] == 1 else values
             values = values @ colours.to_spectrum(nm)
@@ -73,7 +73,7 @@ class Cornell(Format):
         return (head + written(np.concatenate([table.directions, values], axis=1))).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The samples themselves; else values at the directions of a goniometer's plan."""
+        """Samples unchanged; other tables as values at the directions of a goniometer's plan."""
         if isinstance(source, Samples):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)

@@ -1,4 +1,4 @@
-"""MERL's `.binary`: the table of Matusik2003, and its variant with a whole turn of phi_d."""
+"""MERL's `.binary`: the table of Matusik2003, and its variant with a full turn of phi_d."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CELLS = (90, 90)
 class Merl(Format):
     """MERL BRDF: three int32, then red, green and blue planes of float64 over (theta_h, theta_d, phi_d).
 
-    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a whole one. Values are f times 1500,
+    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a full turn. Values are f times 1500,
     1500 / 1.15 and 1500 / 1.66; a negative one marks an invalid cell.
     """
 
@@ -48,16 +48,16 @@ class Merl(Format):
         )
 
     def write(self, table: Measurement) -> bytes:
-        assert isinstance(table, HalfDifference), "`resampled` made it so"
+        assert isinstance(table, HalfDifference), "ensured by `resampled`"
         values = in_rgb(table.values, table.wavelengths) / SCALE
         values[~table.valid] = -1.0
         return struct.pack("<3i", *table.values.shape[:3]) + np.moveaxis(values, -1, 0).astype("<f8").tobytes()
 
     def resampled(self, source: Measurement, phi: int | None = None) -> Measurement:
-        """The table itself where it has MERL's cells; else the values at the middle of each cell.
+        """The table itself if it has MERL's cells; else the values at the center of each cell.
 
-        phi  cells of phi_d: 180 over half a turn, or 360 over a whole one, which keeps what is not reciprocal;
-             None: those of the table itself, else 180
+        phi  cells of phi_d: 180 over half a turn, or 360 over a complete one, which preserves nonreciprocal values;
+             None: as many as the table has, else 180
         """
         if isinstance(source, HalfDifference) and source.values.shape[:3] in ((*CELLS, 180), (*CELLS, 360)):
             cells = source.values.shape[2]

@@ -1,4 +1,4 @@
-"""Small networks that stand for materials of the MERL database (Sztrajman2021)."""
+"""Small networks that represent materials of the MERL database (Sztrajman2021)."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ CELLS = (90, 90, 180)
 class Networks(Format):
     """Networks of 675 weights (Sztrajman2021): half and difference vector -> 21 -> 21 -> exp(x) - 1 = RGB of f.
 
-    A .npz file holds NAME/kernel0 to 2 and NAME/bias0 to 2 of several materials; FILE.npz:NAME names one. It is read as
-    a half-difference table of MERL's size, whose cells hold the network's values: what it says below the horizon is
-    extrapolation, and is marked invalid.
+    A .npz file holds NAME/kernel0 to 2 and NAME/bias0 to 2 of several materials; FILE.npz:NAME selects one. It is read
+    as a half-difference table of MERL's size with the network's values; values below the horizon are extrapolations
+    and marked invalid.
     """
 
     name: ClassVar[str] = "networks"
@@ -42,10 +42,10 @@ class Networks(Format):
             what = f"no material '{item}' in it" if item else f"{len(names)} materials in it, one expected"
             hint = did_you_mean(item, names) if item else f"give {where}:{names[0]}, or another of " + ", ".join(names)
             raise InputError(what, where, hint)
-        found = arrays(data, where)
+        stored = arrays(data, where)
         weights = {}
         for part, shape in SHAPES.items():
-            array = found.get(f"{item}/{part}")
+            array = stored.get(f"{item}/{part}")
             if array is None or array.shape != shape or array.dtype.kind != "f":
                 given = "is missing" if array is None else f"has shape {array.shape} of {array.dtype}"
                 raise InputError(f"{item}/{part} {given}, {shape} of floats expected", where)
@@ -63,9 +63,9 @@ class Networks(Format):
 
 
 def tabulated(weights: dict[str, NDArray[np.float32]]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """A network's values at the middle of MERL's cells, (90, 90, 180, 3), and which lie above the surface.
+    """A network's values at the centers of MERL's cells, (90, 90, 180, 3), and which lie above the surface.
 
-    A cell's half vector is (sin theta_h, 0, cos theta_h), its difference vector the light's direction seen from there.
+    A cell's half vector is (sin theta_h, 0, cos theta_h), its difference vector the light's direction in its frame.
     """
     n, m, count = CELLS
     theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)

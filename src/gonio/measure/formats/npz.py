@@ -1,4 +1,4 @@
-"""Arrays in a zip file (NumPy's .npz), read so that no claim of a header is believed before it is checked."""
+"""Untrusted arrays in a zip file (NumPy's .npz): every claim of a header is checked before use."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from ...errors import InputError
 
 MEMBERS = 4096
-HEADER = 4096  # letters of an array's header that are looked at
-LARGEST = 1 << 28  # bytes of all arrays together where they are compressed: deflate makes a thousandth of zeros
+HEADER = 4096  # maximum length of an array's header
+LARGEST = 1 << 28  # bytes of all arrays together if they are compressed: deflate reduces zeros by a factor of 1000
 
 
 def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The arrays in a file, by name. InputError for what is no zip, damaged, or holds objects (pickles)."""
+    """The arrays in a file, by name. Raises InputError for a file that is not a zip, damaged, or holds objects
+    (pickles)."""
     if data[-22:-18] != b"PK\5\6":  # the end of an archive without a comment
-        raise InputError("it does not end as a .npz does", where, "the file is truncated, longer, or no .npz")
+        raise InputError("it does not end like a .npz file", where, "the file is truncated, longer, or not a .npz")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
             members = file.infolist()
@@ -31,26 +32,26 @@ def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
             if sum(one.file_size for one in members) > limit:
                 size = sum(one.file_size for one in members)
                 raise InputError(f"{len(data)} bytes claim to hold {size}", where, "such a file is not unpacked")
-            found: dict[str, NDArray[np.generic]] = {}
+            entries: dict[str, NDArray[np.generic]] = {}
             total = 0
             for member in members:
                 name = member.filename.removesuffix(".npy")
                 if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or member.flag_bits & 1:
-                    raise InputError(f"'{name[:80]}' is packed in an unusual way", where, "numpy.savez writes others")
-                if name in found:
-                    raise InputError(f"'{name[:80]}' stands twice", where)
+                    raise InputError(f"'{name[:80]}' is compressed in an unusual way", where, "use numpy.savez")
+                if name in entries:
+                    raise InputError(f"'{name[:80]}' occurs twice", where)
                 with file.open(member) as part:
-                    content = part.read(member.file_size + 1)  # what unpacks to more than it claims is refused
+                    content = part.read(member.file_size + 1)  # content longer than claimed is rejected
                 total += len(content)
                 if len(content) != member.file_size or total > limit:
                     raise InputError(f"'{name[:80]}' is longer than it claims", where)
-                found[name] = _array(content, name, where)
-            return found
+                entries[name] = _array(content, name, where)
+            return entries
     except InputError:
         raise
-    except Exception as error:  # zipfile and zlib each have their own ways to fail on a file of any content
+    except Exception as error:  # zipfile and zlib raise their own types for damaged content
         what = f"no arrays can be read from it: {type(error).__name__}: {str(error)[:120]}"
-        raise InputError(what, where, "the file is damaged, or no .npz") from None
+        raise InputError(what, where, "the file is damaged, or not a .npz") from None
 
 
 def _array(content: bytes, name: str, where: str) -> NDArray[np.generic]:
@@ -61,7 +62,7 @@ def _array(content: bytes, name: str, where: str) -> NDArray[np.generic]:
     start = 12 if wide else 10
     (length,) = struct.unpack_from("<I" if wide else "<H", content, 8)
     if length > HEADER or start + length > len(content):
-        raise InputError(f"a header of {length} letters", place, "the file is damaged")
+        raise InputError(f"a header of {length} characters", place, "the file is damaged")
     try:
         header = ast.literal_eval(content[start : start + length].decode("latin-1").strip())
         dtype, shape, fortran = np.dtype(header["descr"]), tuple(header["shape"]), bool(header["fortran_order"])
@@ -82,7 +83,7 @@ def _array(content: bytes, name: str, where: str) -> NDArray[np.generic]:
 
 
 def written(parts: Mapping[str, NDArray[np.generic]]) -> bytes:
-    """A file of arrays, not compressed; the same bytes for the same content."""
+    """The bytes of an uncompressed file of arrays; equal content gives equal bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as file:
         for name, array in parts.items():

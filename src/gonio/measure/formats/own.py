@@ -1,4 +1,4 @@
-"""Gonio's own tables, `.gonio`: any kind, with its axes and units inside."""
+"""Gonio's own tables, `.gonio`: any kind of table, with its axes and units."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Arrays = Mapping[str, NDArray[np.generic]]
 class Own(Format):
     """Gonio table: a .npz of plain arrays and a manifest in JSON (version, kind, title, source, axes with units).
 
-    Values are f in 1/sr (of adaptive tables what the RGL's format means by them), angles are radians, wavelengths nm.
-    No array is compressed and nothing is pickled. Every kind of table is kept as it is, with the standard error of each
-    value (`error`) and its part of one bounce (`first`) where an instrument found them.
+    Values are f in 1/sr (for adaptive tables as in the RGL's format), angles are radians, wavelengths nm. No array is
+    compressed and nothing is pickled. Every kind of table is stored unchanged, with the standard error of each value
+    (`error`) and its single-bounce part (`first`) if an instrument measured them.
 
-    A file of version 2 holds several materials: its manifest has that of each under its name, their arrays are
-    NAME/ARRAY, and those without a name before them belong to all.
+    A file of version 2 holds several materials: its manifest contains that of each under its name, their arrays are
+    NAME/ARRAY, and arrays without a name belong to all.
     """
 
     name: ClassVar[str] = "gonio"
@@ -52,18 +52,21 @@ class Own(Format):
             own = {name.removeprefix(f"{item}/"): part for name, part in parts.items() if name.startswith(f"{item}/")}
             parts = {**{name: part for name, part in parts.items() if "/" not in name}, **own}
         elif item:
-            raise InputError(f"no material '{item}' in it", where, "it holds one alone, give no name")
+            raise InputError(f"no material '{item}' in it", where, "it holds a single material, give no name")
         else:
             manifest = self._manifest(parts, where)
         parts.pop(MANIFEST)
         try:
             kind, title = str(manifest["kind"]), str(manifest.get("title", ""))
             source = {str(key): str(value) for key, value in dict(manifest.get("source", {})).items()}
-        except Exception:  # JSON of any shape
+        except Exception:  # JSON of any structure
             raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
+        for name, part in parts.items():
+            if part.size == 0:  # such as an axis without entries, of which no table has one
+                raise InputError(f"the array {name} of shape {part.shape} is empty", where, "the file is damaged")
         nm = parts.pop("wavelengths", None)
-        beside = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
+        extra = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
         try:
             about = {"where": where, "title": title, "source": source, "wavelengths": nm}
             table = cls.from_arrays(parts, **about)
@@ -73,14 +76,14 @@ class Own(Format):
             what = f"its arrays are not those of a {kind} table: {type(error).__name__}: {str(error)[:100]}"
             raise InputError(what, where, "the file is damaged") from None
         shape = tuple(table.shape.values())
-        for name, array in beside.items():
+        for name, array in extra.items():
             if array.shape != shape:
                 raise InputError(f"{name} has shape {array.shape}, the values have {shape}", where)
-        table.beside.update(beside)
+        table.beside.update(extra)
         return table
 
     def _parts(self, data: bytes, where: str) -> tuple[dict[str, NDArray[np.generic]], dict[str, Any]]:
-        """The arrays, and of a file with several materials the manifest of each."""
+        """The arrays and, for a file with several materials, the manifest of each."""
         parts = arrays(data, where)
         manifest = self._manifest(parts, where)
         if manifest["version"] != SEVERAL:
@@ -94,27 +97,27 @@ class Own(Format):
         try:
             manifest = json.loads(parts[MANIFEST].astype(np.uint8).tobytes().decode())
             version = manifest["version"] = int(manifest["version"])
-        except Exception:  # JSON of any shape
+        except Exception:  # JSON of any structure
             raise _no_manifest(where) from None
         if version not in (VERSION, SEVERAL):
             what = f"version {version} of Gonio's tables, {VERSION} or {SEVERAL} expected"
             raise InputError(what, where, "is Gonio up to date?")
-        found: dict[str, Any] = manifest
-        return found
+        checked: dict[str, Any] = manifest
+        return checked
 
     def write(self, table: Measurement) -> bytes:
         about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
-        beside = {name: np.asarray(array, np.float32) for name, array in table.beside.items()}
-        return self.file_of(type(table), {**table.arrays(), **beside}, about)
+        extra = {name: np.asarray(array, np.float32) for name, array in table.beside.items()}
+        return self.file_of(type(table), {**table.arrays(), **extra}, about)
 
     def file_of(self, kind: type[Measurement], parts: Arrays, about: Mapping[str, Any]) -> bytes:
-        """The file of a table of a kind, by its arrays and what is known of it: title, source, wavelengths."""
+        """The file of a table of a kind, from its arrays and metadata: title, source, wavelengths."""
         nm = about.get("wavelengths")
         more = {} if nm is None else {"wavelengths": nm}
         return written({MANIFEST: _text({"version": VERSION, **_about(kind, about)}), **parts, **more})
 
     def write_several(self, tables: Mapping[str, Measurement]) -> bytes:
-        """The file of several tables, by name; an array that all have is held once."""
+        """The file of several tables, by name; arrays that all share are stored once."""
         manifests = {
             name: _about(type(table), {"title": table.title, "source": table.source}) for name, table in tables.items()
         }

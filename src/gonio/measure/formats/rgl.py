@@ -19,15 +19,15 @@ MAGIC = b"tensor_file\0"
 TYPES = {
     1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8",
 }  # fmt: skip
-ALIGNED = 8  # bytes that fields start at multiples of, and a file may end with
-FIELDS, NAME, RANK = 64, 256, 8  # most of each that a sane file has
+ALIGNED = 8  # bytes of which fields start at multiples, and of which a file may have padding at its end
+FIELDS, NAME, RANK = 64, 256, 8  # limits for plausible files
 
 
 class Rgl(Format):
     """RGL BSDF: a tensor file (`tensor_file`, version 1.0) of Dupuy2018, RGB or spectral.
 
-    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 for each axis. Needed are
-    phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; the others are left alone.
+    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 per axis. Required are
+    phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; other fields are ignored.
     """
 
     name: ClassVar[str] = "rgl"
@@ -40,7 +40,7 @@ class Rgl(Format):
     def read(self, data: bytes, where: str, item: str = "") -> Adaptive:
         if not data.startswith(MAGIC):
             hint = "Zemax's .bsdf is text, and starts with Source or a comment"
-            raise InputError("no tensor file: it does not start with 'tensor_file'", where, hint)
+            raise InputError("not a tensor file: it does not start with 'tensor_file'", where, hint)
         fields = tensors(data, where)
         spectral = "wavelengths" in fields
         names = ["phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance", "spectra" if spectral else "rgb"]
@@ -60,7 +60,7 @@ class Rgl(Format):
         return Adaptive(parts, jacobian, where, title, {"format": self.name}, wavelengths)
 
     def write(self, table: Measurement) -> bytes:
-        assert isinstance(table, Adaptive), "`resampled` made it so"
+        assert isinstance(table, Adaptive), "ensured by `resampled`"
         values = {"rgb": table.values}
         if table.wavelengths is not None:
             values = {"wavelengths": table.wavelengths, "spectra": table.values}
@@ -80,12 +80,12 @@ class Rgl(Format):
         })  # fmt: skip
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The table itself where it is adaptive; else one with a warp of its own (`tables.adapted`)."""
+        """The table itself if it is adaptive; else one with a warp computed for it (`tables.adapted`)."""
         return source if isinstance(source, Adaptive) else adapted(source)
 
 
 def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The fields of a tensor file, as views into its bytes: nothing is allocated that the file does not hold."""
+    """The fields of a tensor file, as views into its bytes: nothing is allocated beyond the file's size."""
     place = len(MAGIC)
 
     def take(form: str) -> tuple[int, ...]:
@@ -93,21 +93,21 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
         size = struct.calcsize(form)
         if place + size > len(data):
             raise InputError(f"the list of fields ends at byte {len(data)}", where, "the file is truncated")
-        found = struct.unpack_from(form, data, place)
+        fields = struct.unpack_from(form, data, place)
         place += size
-        return found
+        return fields
 
     major, minor, count = take("<BBI")
     if (major, minor) != (1, 0):
         raise InputError(f"version {major}.{minor} of tensor files, 1.0 expected", where)
     if not 0 < count <= FIELDS:
         raise InputError(f"{count} fields, 1 to {FIELDS} expected", where, "the file is damaged")
-    found: dict[str, NDArray[np.generic]] = {}
+    fields: dict[str, NDArray[np.generic]] = {}
     end = 0
     for _ in range(count):
         (length,) = take("<H")
         if not 0 < length <= NAME or place + length > len(data):
-            raise InputError(f"a field's name of {length} letters", where, "the file is damaged")
+            raise InputError(f"a field's name of {length} characters", where, "the file is damaged")
         name = data[place : place + length].decode("utf-8", "replace")
         place += length
         rank, kind, offset = take("<HBQ")
@@ -121,13 +121,13 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
         if size == 0 or offset + size > len(data):
             what = f"the field '{name}' claims {' x '.join(map(str, shape))} values at byte {offset}"
             raise InputError(f"{what}, the file has {len(data)} bytes", where, "the file is truncated or damaged")
-        if name in found:
-            raise InputError(f"the field '{name}' stands twice", where, "the file is damaged")
-        found[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
+        if name in fields:
+            raise InputError(f"the field '{name}' occurs twice", where, "the file is damaged")
+        fields[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
         end = max(end, offset + size)
     if len(data) > end + ALIGNED or data[end:].strip(b"\0"):
         raise InputError(f"{len(data)} bytes, the fields end at {end}", where, "the file is longer than its fields")
-    return found
+    return fields
 
 
 def written(fields: Mapping[str, NDArray[np.generic]]) -> bytes:

@@ -1,4 +1,4 @@
-"""Reading numbers from text, strictly."""
+"""Strict parsing of numbers in text files."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 
-LONGEST = 1 << 20  # letters of a line
+LONGEST = 1 << 20  # characters of a line
 
 
 def lines(data: bytes, where: str) -> list[str]:
-    """The lines of a text file, without ends of lines; InputError where it is no text."""
+    """The lines of a text file, without line ends; raises InputError if it is not text."""
     if b"\0" in data:
-        raise InputError("no text: it has bytes of 0 in it", where)
+        raise InputError("not a text file: it contains zero bytes", where)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # comments of an older age; numbers are the same
-    found = text.splitlines()
-    if any(len(line) > LONGEST for line in found):
-        raise InputError(f"a line of more than {LONGEST} letters", where)
-    return found
+        text = data.decode("latin-1")  # comments in an older encoding; numbers are the same
+    rows = text.splitlines()
+    if any(len(line) > LONGEST for line in rows):
+        raise InputError(f"a line of more than {LONGEST} characters", where)
+    return rows
 
 
 def numbers(words: list[str], where: str, line: int) -> list[float]:
     """Words as finite numbers."""
-    found = []
+    values = []
     for word in words:
         try:
             number = float(word)
@@ -36,12 +36,12 @@ def numbers(words: list[str], where: str, line: int) -> list[float]:
             raise InputError(f"'{word[:40]}' given, a number expected", f"{where}:{line}") from None
         if not math.isfinite(number):
             raise InputError(f"'{word[:40]}' given, a finite number expected", f"{where}:{line}")
-        found.append(number)
-    return found
+        values.append(number)
+    return values
 
 
 def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[np.float64]:
-    """Rows of `width` numbers each, (N, width); rows come with their lines."""
+    """Rows of `width` numbers each, (N, width); rows are given with their line numbers."""
     for line, row in rows:
         if len(row) != width:
             raise InputError(f"{len(row)} numbers in a row, {width} expected", f"{where}:{line}")
@@ -56,5 +56,5 @@ def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[
 
 
 def written(values: NDArray[np.float64], separator: str = " ") -> str:
-    """Rows of numbers with as many digits as float64 has."""
+    """Rows of numbers with all digits of float64."""
     return "\n".join(separator.join(f"{x:.17g}" for x in row) for row in values) + "\n"

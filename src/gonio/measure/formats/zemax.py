@@ -18,6 +18,86 @@ BLOCKS = {"monochrome": ("Monochrome",), "xyz": ("TristimulusX", "TristimulusY",
 MOST = 100_000  # nodes of an axis that are believed before they are counted
 
 
+class _Lines:
+    """The numbered lines of a file, without comments and empty lines, read one after the other."""
+
+    def __init__(self, rows: list[tuple[int, str]], where: str) -> None:
+        self._rows, self.where = iter(rows), where
+
+    def left(self) -> tuple[int, str] | None:
+        """The next line; None at the end of the file."""
+        return next(self._rows, None)
+
+    def following(self, what: str) -> tuple[int, str]:
+        """The next line. Raises InputError at the end of the file, where `what` is expected."""
+        row = self.left()
+        if row is None:
+            raise InputError(f"the file ends where {what} is expected", self.where, "the file is truncated")
+        return row
+
+    def keyword(self, word: str, first_only: bool = True, hint: str = "") -> tuple[int, str]:
+        """The next line, which must be this keyword, or begin with it."""
+        number, line = self.following(f"'{word}'")
+        if (line.split()[0] if first_only else line).lower() != word.lower():
+            raise InputError(f"'{line[:40]}' where '{word}' is expected", f"{self.where}:{number}", hint)
+        return number, line
+
+
+def _head(rest: _Lines) -> tuple[dict[str, str], dict[str, Floats]]:
+    """The keywords and the axes, in radians."""
+    head: dict[str, str] = {}
+    axes: dict[str, Floats] = {}
+    where = rest.where
+    while len(axes) < len(AXES):
+        number, line = rest.following(f"'{AXES[len(axes)]}'")
+        word, _, value = line.partition(" " if " " in line else "\t")
+        if word in AXES:
+            claimed = numbers([value], where, number)[0]
+            if claimed != int(claimed) or not 1 <= claimed <= MOST:
+                raise InputError(f"{word} {value.strip()[:20]}, a count from 1 expected", f"{where}:{number}")
+            angles: list[float] = []
+            while len(angles) < claimed:
+                number, line = rest.following(f"{claimed:g} angles of {word}")
+                angles += numbers(line.split(), where, number)
+            if len(angles) != claimed:
+                raise InputError(f"{len(angles)} angles of {word}, {claimed:g} expected", f"{where}:{number}")
+            axes[word] = np.radians(angles)
+        elif len(head) < 32 and word:
+            head[word[:80]] = value.strip()[:400]
+        else:
+            raise InputError("no list of angles where one is expected", f"{where}:{number}")
+    return head, axes
+
+
+def _blocks(head: dict[str, str], axes: dict[str, Floats], where: str) -> tuple[str, ...]:
+    """The names of the blocks of values. Raises InputError for files of another kind."""
+    for word in AXES:
+        if word not in axes:
+            raise InputError(f"no axis {word}", where)
+    if head.get("ScatterType", "BRDF").upper() != "BRDF":
+        raise InputError(f"ScatterType {head['ScatterType'][:20]}, BRDF expected", where, "reflection only")
+    if len(axes["SampleRotation"]) != 1:
+        raise InputError(f"{len(axes['SampleRotation'])} sample rotations, one expected", where, "isotropic only")
+    blocks = BLOCKS.get(head.get("SpectralContent", "Monochrome").lower())
+    if blocks is None:
+        raise InputError(f"SpectralContent {head['SpectralContent'][:20]}, Monochrome or XYZ expected", where)
+    return blocks
+
+
+def _channel(rest: _Lines, block: str, incidences: int, azimuths: int, radials: int) -> Floats:
+    """One block of values, (incidences, azimuths, radials)."""
+    for word in (block, "DataBegin"):
+        rest.keyword(word)
+    values = []
+    for _ in range(incidences):
+        number, line = rest.keyword("TIS")
+        numbers(line.split()[1:2], rest.where, number)
+        rows = [rest.following(f"{azimuths} rows of azimuth") for _ in range(azimuths)]
+        values.append(table([(n, line.split()) for n, line in rows], radials, rest.where))
+    rest.keyword("DataEnd", first_only=False, hint="too many rows?")
+    return np.stack(values)
+
+
 class Zemax(Format):
     """Zemax BSDF: a head of keywords with the axes in degrees, then a block of values for each channel.
 
@@ -36,72 +116,19 @@ class Zemax(Format):
     def read(self, data: bytes, where: str, item: str = "") -> Specular:
         rows = [(n, line.strip()) for n, line in enumerate(lines(data, where), 1)]
         comments = [line.strip("# ") for _, line in rows if line.startswith("#")]
-        rest = iter([(n, line) for n, line in rows if line and not line.startswith("#")])
-
-        def following(what: str) -> tuple[int, str]:
-            found = next(rest, None)
-            if found is None:
-                raise InputError(f"the file ends where {what} is expected", where, "the file is truncated")
-            return found
-
-        head: dict[str, str] = {}
-        axes: dict[str, Floats] = {}
-        while len(axes) < len(AXES):
-            number, line = following(f"'{AXES[len(axes)]}'")
-            word, _, value = line.partition(" " if " " in line else "\t")
-            if word in AXES:
-                claimed = numbers([value], where, number)[0]
-                if claimed != int(claimed) or not 1 <= claimed <= MOST:
-                    raise InputError(f"{word} {value.strip()[:20]}, a count from 1 expected", f"{where}:{number}")
-                angles: list[float] = []
-                while len(angles) < claimed:
-                    number, line = following(f"{claimed:g} angles of {word}")
-                    angles += numbers(line.split(), where, number)
-                if len(angles) != claimed:
-                    what = f"{len(angles)} angles of {word}, {claimed:g} expected"
-                    raise InputError(what, f"{where}:{number}")
-                axes[word] = np.radians(angles)
-            elif len(head) < 32 and word:
-                head[word[:80]] = value.strip()[:400]
-            else:
-                raise InputError("no list of angles where one is expected", f"{where}:{number}")
-        for word in AXES:
-            if word not in axes:
-                raise InputError(f"no axis {word}", where)
-        if head.get("ScatterType", "BRDF").upper() != "BRDF":
-            raise InputError(f"ScatterType {head['ScatterType'][:20]}, BRDF expected", where, "reflection only")
-        if len(axes["SampleRotation"]) != 1:
-            raise InputError(f"{len(axes['SampleRotation'])} sample rotations, one expected", where, "isotropic only")
-        blocks = BLOCKS.get(head.get("SpectralContent", "Monochrome").lower())
-        if blocks is None:
-            raise InputError(f"SpectralContent {head['SpectralContent'][:20]}, Monochrome or XYZ expected", where)
-        i, a, r = (len(axes[word]) for word in AXES[1:])
-        channels = []
-        for block in blocks:
-            for word in (block, "DataBegin"):
-                number, line = following(f"'{word}'")
-                if line.split()[0].lower() != word.lower():
-                    raise InputError(f"'{line[:40]}' where '{word}' is expected", f"{where}:{number}")
-            values = []
-            for _ in range(i):
-                number, line = following("'TIS'")
-                if line.split()[0].upper() != "TIS":
-                    raise InputError(f"'{line[:40]}' where 'TIS' is expected", f"{where}:{number}")
-                numbers(line.split()[1:2], where, number)
-                found = [following(f"{a} rows of azimuth") for _ in range(a)]
-                values.append(table([(n, line.split()) for n, line in found], r, where))
-            number, line = following("'DataEnd'")
-            if line.lower() != "dataend":
-                raise InputError(f"'{line[:40]}' where 'DataEnd' is expected", f"{where}:{number}", "too many rows?")
-            channels.append(np.stack(values))
-        if (left := next(rest, None)) is not None:
+        rest = _Lines([(n, line) for n, line in rows if line and not line.startswith("#")], where)
+        head, axes = _head(rest)
+        blocks = _blocks(head, axes, where)
+        shape = [len(axes[word]) for word in AXES[1:]]
+        channels = [_channel(rest, block, *shape) for block in blocks]
+        if (left := rest.left()) is not None:
             raise InputError(f"'{left[1][:40]}' after the end of the data", f"{where}:{left[0]}")
-        whole = np.stack(channels, -1)
+        values = np.stack(channels, -1)
         if len(channels) == 3:
-            whole = whole @ colours.XYZ_TO_RGB.T
+            values = values @ colours.XYZ_TO_RGB.T
         title = next((text.partition(":")[2].strip() for text in comments if text.lower().startswith("model")), "")
         return Specular(
-            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], whole, where,
+            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], values, where,
             title or (comments[0] if comments else ""), {"format": self.name, **head},
         )  # fmt: skip
 
@@ -135,8 +162,8 @@ def scattered(table: Specular) -> list[float]:
     rng = np.random.default_rng(1)
     u, v = (np.arange(4096) + 0.5) / 4096, rng.random(4096)
     wo = np.stack([np.sqrt(u) * np.cos(2 * np.pi * v), np.sqrt(u) * np.sin(2 * np.pi * v), np.sqrt(1.0 - u)], -1)
-    found = []
+    fractions = []
     for angle in np.minimum(table.theta_i, np.radians(89.9)):
         wi = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], wo.shape)
-        found.append(float(np.mean(table.rgb(wo, wi) @ colours.LUMINANCE) * np.pi / np.cos(angle)))
-    return found
+        fractions.append(float(np.mean(table.rgb(wo, wi) @ colours.LUMINANCE) * np.pi / np.cos(angle)))
+    return fractions

@@ -1,1 +1,1 @@
-"""What is measured, as it is stored: one file a kind. Each can be evaluated, sampled and written into a shader."""
+"""Measured tables as stored, one file per kind. Each can be evaluated, sampled and written into a shader."""

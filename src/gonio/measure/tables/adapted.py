@@ -1,4 +1,4 @@
-"""An adaptive table of any isotropic material: the warp of Dupuy2018, found from values instead of by measuring."""
+"""An adaptive table of any isotropic material: the warp of Dupuy2018, computed from values instead of measured."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from .. import colours
 from .adaptive import Adaptive
 from .base import Floats, Measurement
 
-VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; of the normals' square a side; of the values' square a side
+VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; per side of the normals' square; per side of the values' square
 
 
 def adapted(source: Measurement) -> Adaptive:
-    """An adaptive table of a measurement that is alike under turns and mirrors.
+    """An adaptive table of a measurement with rotational and mirror symmetry.
 
     D comes from retro-reflection, where half vector and direction coincide: f(w, w) = D F G / (4 cos^2), so that
-    D ~ f cos^2 up to what masking does (Dupuy2018, sec. 3.2, without its iteration: any D will do for a warp, what it
-    misses stays in the values). sigma is its projected area, vndf = D max(0, wo.m) / sigma.
+    D ~ f cos^2 up to masking (Dupuy2018, sec. 3.2, without its iteration: a warp works with any D, and its errors are
+    compensated by the values). sigma is its projected area, vndf = D max(0, wo.m) / sigma.
     """
     theta_m = np.linspace(0.0, 1.0, NORMALS) ** 2 * (0.5 * np.pi)
     held = np.minimum(theta_m, 0.5 * np.pi - 0.02)
@@ -25,7 +25,7 @@ def adapted(source: Measurement) -> Adaptive:
     ndf = np.maximum(retro, 1e-4 * max(float(retro.max()), 1e-12))
     phi_m = np.linspace(-np.pi, np.pi, NORMALS)
     theta = 0.5 * np.pi * (1.0 - (1.0 - np.linspace(0.0, 1.0, VIEWS)) ** 1.4)
-    theta[-1] -= 1e-3  # at the horizon there is no eval
+    theta[-1] -= 1e-3  # eval is undefined at the horizon
     weight = 2.0 * np.pi**2 * np.sqrt(theta_m * (2.0 / np.pi)) * np.sin(theta_m)  # d omega_m over du
     mean = np.gradient(np.linspace(0.0, 1.0, NORMALS))
 
@@ -34,14 +34,14 @@ def adapted(source: Measurement) -> Adaptive:
         along = np.sin(angle)[:, None, None] * np.sin(theta_m) * np.cos(phi_m)[:, None]
         return np.maximum(along + np.cos(angle)[:, None, None] * np.cos(theta_m), 0.0)
 
-    around = np.full(NORMALS, 1.0 / (NORMALS - 1))
-    around[[0, -1]] *= 0.5
+    azimuth_weights = np.full(NORMALS, 1.0 / (NORMALS - 1))
+    azimuth_weights[[0, -1]] *= 0.5
 
     def area(angle: Floats) -> Floats:
         """The projected area of the facets, int D max(0, wo.m) dm."""
-        return np.einsum("vpt,p,t->v", cosines(angle), around, ndf * weight * mean)
+        return np.einsum("vpt,p,t->v", cosines(angle), azimuth_weights, ndf * weight * mean)
 
-    ndf = ndf / float(area(np.zeros(1))[0])  # seen from above, facets are as large as the surface
+    ndf = ndf / float(area(np.zeros(1))[0])  # at normal incidence the facets' projected area is the surface's
     sigma = area(theta_m)
     vndf = cosines(theta) * (ndf * weight) / np.maximum(area(theta), 1e-9)[:, None, None]
     warp = {"phi_i": np.zeros(1), "theta_i": theta, "vndf": vndf[None]}
@@ -49,7 +49,7 @@ def adapted(source: Measurement) -> Adaptive:
 
 
 def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
-    """The table whose values are those of `source` where each node of it stands."""
+    """The table with the values of `source` at each of its nodes."""
     from scipy.ndimage import distance_transform_edt
 
     blank = np.ones((1, len(warp["theta_i"]), PLACES, PLACES))
@@ -58,10 +58,10 @@ def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
     values = np.zeros((*lit.shape, 3))
     values[lit] = source.rgb(wo[lit], wi[lit]) / factor[lit][:, None]
-    for one, seen in zip(values, lit, strict=True):  # below the horizon the nearest, so that none above turns dark
-        if seen.any():
-            one[:] = one[tuple(distance_transform_edt(~seen, return_distances=False, return_indices=True))]
+    for one, valid in zip(values, lit, strict=True):  # below the horizon the nearest value, to preserve those above
+        if valid.any():
+            one[:] = one[tuple(distance_transform_edt(~valid, return_distances=False, return_indices=True))]
     luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
-    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # what is black at a node need not be beside it
-    found = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
-    return Adaptive({**warp, **found}, title=source.title, source=source.source)
+    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # light between nodes that are black
+    arrays = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
+    return Adaptive({**warp, **arrays}, title=source.title, source=source.source)

@@ -18,20 +18,20 @@ from ..angles import azimuth, direction
 from ..warp import Nodes, Slices, Warp, named
 from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
 
-ROUNDING = 1e-6  # densities below 0 by such a share of the largest are noise: one of nine files has -1e-10
-TINY_JACOBIAN = 1e-6  # as Mitsuba's `measured`, so that densities agree at the normal too
+ROUNDING = 1e-6  # negative densities smaller than this fraction of the largest are noise: one of nine files has -1e-10
+TINY_JACOBIAN = 1e-6  # as in Mitsuba's `measured`, so that densities agree at the normal too
 
 
 class Adaptive(Measurement):
     """A table over warped half vectors, for each direction of view (Dupuy2018, sec. 4).
 
-    A half vector m is a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). Of each direction of
-    view the visible normals have a density `vndf` there; the numbers s that would draw m from it are the coordinates of
-    the values: f cos theta_i = rgb(s) ndf(u) / (4 sigma). So the table is dense where the lobe is.
+    A half vector m is a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). For each direction of
+    view the visible normals have a density `vndf` there; the numbers s that would sample m from it are the coordinates
+    of the values: f cos theta_i = rgb(s) ndf(u) / (4 sigma). The table is therefore dense where the lobe is.
 
     arrays: phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
     luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all bilinear between nodes on the edges.
-    Isotropic where phi_i has 2 entries or fewer. Beyond the last angle of view the last one's values are taken.
+    Isotropic if phi_i has at most 2 entries. Beyond the last angle of view the values of the last one are used.
     """
 
     name = "adaptive"
@@ -86,7 +86,7 @@ class Adaptive(Measurement):
 
     @cached_property
     def _reduction(self) -> int:
-        """How many times the measured azimuths go into a turn: the others are mirrored into them."""
+        """How many times the measured azimuths fit into a turn; the others are mirrored into them."""
         span = self.phi[-1] - self.phi[0]
         return 1 if self.isotropic else max(1, round(2.0 * np.pi / span))
 
@@ -128,7 +128,7 @@ class Adaptive(Measurement):
         return vec3(wo.x * flip_x, wo.y * flip_y, wo.z), vec3(wi.x * flip_x, wi.y * flip_y, wi.z)
 
     def _slices(self, wo: Direction) -> tuple[Slices, Scalar]:
-        """The views around wo with their weights, and wo's azimuth."""
+        """The views adjacent to wo with their weights, and wo's azimuth."""
         theta, phi = polar(wo), azimuth(wo)
         row, t = self._thetas.find(theta)
         if len(self.phi) == 1:
@@ -163,7 +163,7 @@ class Adaptive(Measurement):
 
     @ops.function
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the visible normal, times that of its place in the luminance, per solid angle of wi."""
+        """The density of the visible normal, times that of its position in the luminance, per solid angle of wi."""
         wo, wi = self._folded(wo, wi)
         m = ops.normalize(wo + wi)
         slices, phi = self._slices(wo)
@@ -173,30 +173,30 @@ class Adaptive(Measurement):
 
     @ops.function
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        """A place by luminance, from it a normal by its density, at which wo is mirrored."""
+        """A position by luminance, then the normal with its density, at which wo is mirrored."""
         folded, _ = self._folded(wo, wo)
         slices, phi = self._slices(folded)
         bright = self._bright.sample(slices, u.y, u.z)
-        seen = self._visible.sample(slices, bright.x, bright.y)
-        turn = (2.0 * seen.y - 1.0) * ops.pi
-        m = direction(seen.x * seen.x * (0.5 * ops.pi), turn + phi if self.isotropic else turn)
+        visible = self._visible.sample(slices, bright.x, bright.y)
+        turn = (2.0 * visible.y - 1.0) * ops.pi
+        m = direction(visible.x * visible.x * (0.5 * ops.pi), turn + phi if self.isotropic else turn)
         mirrored = reflect(folded, m)
-        pdf = seen.pdf * bright.pdf / _jacobian(seen.x, m, mirrored)
+        pdf = visible.pdf * bright.pdf / _jacobian(visible.x, m, mirrored)
         _, wi = self._folded(wo, mirrored)  # mirroring is its own inverse
         return wi, where(dot(folded, m) > 0.0, pdf, 0.0)
 
     # ------------------------------------------------------------------ as numbers
 
     def nodes(self) -> tuple[Floats, Floats, Floats]:
-        """wo and wi of every value of an isotropic table, (theta_i, y, x, 3), and the factor before it."""
+        """wo and wi of every value of an isotropic table, (theta_i, y, x, 3), and the factor of the value."""
         types = backend.types("float64")
         shape = (len(self.theta), *self.luminance.shape[2:])
         view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))
         row, at_x, at_y = (backend.float_of(a, types) for a in (view, x / (shape[2] - 1), y / (shape[1] - 1)))
         wo = direction(backend.float_of(self.theta[view], types), row * 0.0)
-        seen = self._visible.sample([(row, 1.0 + 0.0 * row)], at_x, at_y)
-        m = direction(seen.x * seen.x * (0.5 * ops.pi), (2.0 * seen.y - 1.0) * ops.pi)
-        factor = self._factor(wo, seen.x, seen.y, 0.0 * row)
+        visible = self._visible.sample([(row, 1.0 + 0.0 * row)], at_x, at_y)
+        m = direction(visible.x * visible.x * (0.5 * ops.pi), (2.0 * visible.y - 1.0) * ops.pi)
+        factor = self._factor(wo, visible.x, visible.y, 0.0 * row)
         o, i = (backend.to_numpy(w, len(view)).reshape(*shape, 3) for w in (wo, reflect(wo, m)))
         return o, i, backend.to_numpy(factor, len(view)).reshape(shape)
 
@@ -245,14 +245,15 @@ def _jacobian(x: Scalar, m: Direction, wi: Direction) -> Scalar:
 
 
 def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = None) -> tuple[Scalar, ...]:
-    """Every channel of a table with nodes on the edges of the unit square, of some slices mixed, or of the only one."""
+    """Every channel of a table with nodes on the edges of the unit square, for a mixture of slices or the only
+    slice."""
     rows, columns = table.shape[-2:]
     at_x, at_y = ops.clamp(x, 0.0, 1.0) * (columns - 1.0), ops.clamp(y, 0.0, 1.0) * (rows - 1.0)
     column, row = ops.minimum(floor(at_x), columns - 2.0), ops.minimum(floor(at_y), rows - 2.0)
     tx, ty = at_x - column, at_y - row
     total: list[ops.Value] = [0.0] * table.channels
-    whole: list[tuple[Scalar | None, ops.Value]] = [(None, 1.0)]
-    for one, weight in slices or whole:
+    unsliced: list[tuple[Scalar | None, ops.Value]] = [(None, 1.0)]
+    for one, weight in slices or unsliced:
         for dy, wy in ((0.0, 1.0 - ty), (1.0, ty)):
             for dx, wx in ((0.0, 1.0 - tx), (1.0, tx)):
                 place = (row + dy, column + dx) if one is None else (one, row + dy, column + dx)

@@ -1,4 +1,4 @@
-"""Tables over the angles themselves: theta_i, theta_r and |phi_r - phi_i|, as the course first proposes."""
+"""Tables over the angles themselves: theta_i, theta_r and |phi_r - phi_i|, as first proposed by the course."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from ..warp import Nodes, named
 from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
-SAME = 1e-6  # two values that differ by less, as shares of the larger, are reciprocal: files keep six digits
+SAME = 1e-6  # relative difference below which values count as reciprocal: files have six digits
 
 
 class Angles(Guided, Measurement):
     """f at nodes of (theta_i, theta_r, |phi_r - phi_i|), linear between them (course notes, part B).
 
-    theta_i is the light's angle. Beyond the first and the last node the values there are held. Where both angles have
-    the same nodes and the values do not change when they are swapped, half of them is stored: those of
-    theta_i <= theta_r.
+    theta_i is the light's angle. Values are constant beyond the first and the last node. If both angles have the same
+    nodes and the values are symmetric, only half of them is stored: those of theta_i <= theta_r.
     """
 
     name = "angles"
@@ -62,7 +61,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def reciprocal(self) -> bool:
-        """Whether swapping both angles changes nothing."""
+        """Whether exchanging both angles changes nothing."""
         if not np.array_equal(self.theta_i, self.theta_r):
             return False
         swapped = np.swapaxes(self.values, 0, 1)
@@ -75,7 +74,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def _table(self) -> Table:
-        """(pair of angles, phi): of a reciprocal table the pairs with i <= r."""
+        """(pair of angles, phi): for a reciprocal table the pairs with i <= r."""
         rgb = padded(in_rgb(self.values, self.wavelengths))
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -110,7 +109,7 @@ class Angles(Guided, Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The values of theta_i <= theta_r only, as (pair, phi, channel), where reciprocity gives the others."""
+        """The values, as (pair, phi, channel) of theta_i <= theta_r only, if reciprocity gives the others."""
         values = self.values
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -142,10 +141,10 @@ class Angles(Guided, Measurement):
 
 
 def nodes(thetas: int = 46, phis: int = 73) -> tuple[Floats, Floats]:
-    """Angles to tabulate over, the last a little above the horizon: f has a limit there, eval is 0."""
+    """Angles to tabulate, the last slightly above the horizon: f has a limit there, eval is 0."""
     theta = np.linspace(0.0, 0.5 * np.pi, thetas)
     theta[-1] -= 1e-3
-    # closer together around the mirror direction, |phi| = pi
+    # denser around the mirror direction, |phi| = pi
     t = np.linspace(0.0, 1.0, phis)
     return theta, np.pi * np.sin(0.5 * np.pi * t)
 
@@ -158,7 +157,7 @@ def pairs(theta_i: Floats, theta_r: Floats, phi: Floats) -> tuple[Floats, Floats
 
 
 def sampled(value: ops.Value, thetas: int = 46, phis: int = 73, **about: ops.Value) -> Angles:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes."""
     theta, phi = nodes(thetas, phis)
     wo, wi = pairs(theta, theta, phi)
     f = value(wo, wi) / wi[:, 2:]

@@ -1,4 +1,4 @@
-"""What the kinds of tables share."""
+"""The base of all kinds of tables."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ Floats = NDArray[np.float64]
 
 
 class Measurement:
-    """Values of a BRDF over directions, as they were stored, with what is known of them.
+    """Values of a BRDF over directions, as stored, with their metadata.
 
     name         of the kind: "half-difference", ...
-    title        what was measured, as the file says
-    source       where it comes from: format, and what else the file tells
-    wavelengths  nm, one a channel; None where the channels are red, green and blue, or one grey
-    beside       arrays of the values' shape that an instrument found too, and `.gonio` files keep: "error", the
-                 standard error of each value, and "first", its part that met one facet only
+    title        of the measured material, from the file
+    source       origin: the format, and other metadata of the file
+    wavelengths  nm, one per channel; None if the channels are red, green and blue, or a single gray one
+    beside       further arrays of the values' shape from an instrument, stored in `.gonio` files: "error", the standard
+                 error of each value, and "first", its single-bounce part
 
-    A kind gives `value`, `pdf` and `sample` in the words of `gonio.ops`, so that it runs in a render and in a shader.
+    A kind defines `value`, `pdf` and `sample` with the functions of `gonio.ops`, so that it runs in renders and
+    shaders.
     """
 
     family: ClassVar[Family[type[Measurement]]]
     name: ClassVar[str] = ""
-    axes: ClassVar[Mapping[str, str]] = {}  # of its arrays: name -> what it is and in which unit
+    axes: ClassVar[Mapping[str, str]] = {}  # of its arrays: name -> description with unit
 
     def __init__(
         self, title: str = "", source: Mapping[str, str] | None = None, wavelengths: Floats | None = None
@@ -55,7 +56,7 @@ class Measurement:
         raise NotImplementedError
 
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        """A direction, and its density; what lies below the surface has failed."""
+        """A direction, and its density; a direction below the surface is a failed sample."""
         raise NotImplementedError
 
     @property
@@ -65,26 +66,26 @@ class Measurement:
 
     @property
     def mirrored(self) -> bool:
-        """Whether it is its own mirror image to the last digits, between the stored values too."""
+        """Whether it is mirror-symmetric to the last digits, between the stored values too."""
         return False
 
-    sums: ClassVar[bool] = False  # whether the place of a value is found by cumulative sums
+    sums: ClassVar[bool] = False  # whether lookups search cumulative sums
 
     @cached_property
     def _albedos(self) -> Floats:
         return albedo(self, np.radians(ANGLES))
 
     def albedos(self) -> Floats:
-        """The directional albedo at `ANGLES` of view, (N, 3): by 4096 draws each, which err by some thousandths."""
+        """The directional albedo at `ANGLES` of view, (N, 3), by 4096 samples each, with errors of some thousandths."""
         return self._albedos
 
     @property
     def angular_range(self) -> AngularRange:
-        """The angles that were measured; beyond, the nearest values are held."""
+        """The measured angles; beyond, the nearest values are used."""
         return EVERYWHERE
 
     def prepare(self) -> None:
-        """Find what formulas need and is expensive; while a renderer records its kernels nothing could be computed."""
+        """Compute expensive data for the formulas, which is impossible while a renderer records its kernels."""
 
     @property
     def isotropic(self) -> bool:
@@ -93,17 +94,17 @@ class Measurement:
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """What it is made of, as `.gonio` files hold it: axes in radians, values in 1/sr."""
+        """Its arrays, as `.gonio` files hold them: axes in radians, values in 1/sr."""
         raise NotImplementedError
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: object) -> Measurement:
-        """The inverse of `arrays`. InputError where they do not fit together."""
+        """The inverse of `arrays`. Raises InputError if they do not fit together."""
         raise NotImplementedError
 
     @property
     def flaws(self) -> dict[str, float]:
-        """What is odd in the numbers, as shares of them: "negative", "invalid"; it is kept as it is."""
+        """Defects of the values, as fractions of their number: "negative", "invalid"; they are preserved."""
         return {}
 
     @property
@@ -119,34 +120,34 @@ class Measurement:
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
         """f cos theta_i of pairs, (N, 3), in float64; 0 below the surface."""
         types = backend.types("float64")
-        found = np.empty((len(wo), 3))
+        rgb = np.empty((len(wo), 3))
         for start in range(0, len(wo), CHUNK):
             part = slice(start, start + CHUNK)
             o, i = (backend.vector_of(w[part], 3, types) for w in (wo, wi))
             above = (o.z > 0.0) & (i.z > 0.0)
-            found[part] = backend.to_numpy(ops.where(above, self.value(o, i), 0.0), len(wo[part]))
-        return found
+            rgb[part] = backend.to_numpy(ops.where(above, self.value(o, i), 0.0), len(wo[part]))
+        return rgb
 
 
 ANGLES = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0, 85.0, 88.0])  # degrees
-POINTS = 4096  # draws for an albedo
+POINTS = 4096  # samples per albedo
 
 
 def albedo(table: Measurement, theta: Floats) -> Floats:
-    """int f cos theta_i d omega_i at angles of view, (N, 3), by the table's own draws of a lattice."""
+    """int f cos theta_i d omega_i at angles of view, (N, 3), by the table's own samples on a lattice."""
     types = backend.types("float64")
     lattice = r_sequence(POINTS, 3, shift=0.5)
-    found = []
+    albedos = []
     for angle in theta:
         wo = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], (POINTS, 3))
         drawn = table.draw(backend.vector_of(wo, 3, types), backend.vector_of(lattice, 3, types))
         wi, pdf = (backend.to_numpy(part, POINTS) for part in drawn)
-        kept = (pdf > 0.0) & (wi[:, 2] > 0.0)
-        found.append((table.rgb(wo[kept], wi[kept]) / pdf[kept, None]).sum(axis=0) / POINTS)
-    return np.array(found)
+        upper = (pdf > 0.0) & (wi[:, 2] > 0.0)
+        albedos.append((table.rgb(wo[upper], wi[upper]) / pdf[upper, None]).sum(axis=0) / POINTS)
+    return np.array(albedos)
 
 
-CHUNK = 1 << 19  # pairs at a time, so that memory stays flat
+CHUNK = 1 << 19  # pairs at once, which bounds memory
 
 
 def _named(thing: object) -> tuple[str, type[Measurement]] | None:
@@ -162,7 +163,7 @@ def above(wo: Direction, wi: Direction) -> Mask:
 
 
 def in_rgb(values: Floats, wavelengths: Floats | None, where: str = "") -> Floats:
-    """Values with channels last as red, green, blue: spectra are seen under D65, one channel is grey."""
+    """Values with channels last as red, green, blue: spectra are viewed under D65, a single channel is gray."""
     channels = values.shape[-1]
     if wavelengths is not None:
         return values @ colours.to_rgb(wavelengths)
@@ -174,21 +175,21 @@ def in_rgb(values: Floats, wavelengths: Floats | None, where: str = "") -> Float
 
 
 def of_channels(channels: tuple[Scalar, ...]) -> Spectrum:
-    """The first three of a texel's channels, as a colour."""
+    """The first three of a texel's channels, as a color."""
     colour: ops.Value = vec3(*channels[:3])
     return colour
 
 
 def padded(values: Floats) -> Floats:
-    """Colours with a fourth channel of 0: four come in one fetch."""
+    """Colors with a fourth channel of 0: one fetch reads four."""
     return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
 
 
 def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: float) -> Floats:
-    """An axis as float64: finite, increasing, within its range up to rounding. InputError where not."""
+    """An axis as float64: finite, increasing, within its range up to rounding. Raises InputError otherwise."""
     nodes = np.asarray(values, np.float64)
     if nodes.ndim != 1 or len(nodes) < 1 or not np.all(np.isfinite(nodes)):
-        raise InputError(f"the axis {name} is no list of finite numbers", where)
+        raise InputError(f"the axis {name} is not a list of finite numbers", where)
     if np.any(np.diff(nodes) <= 0.0):
         raise InputError(f"the axis {name} does not increase", where)
     if nodes[0] < low - 1e-4 or nodes[-1] > high + 1e-4:
@@ -197,7 +198,7 @@ def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: f
 
 
 def finite(values: NDArray[np.generic], name: str, where: str) -> Floats:
-    """Values as float64. InputError where one is no finite number."""
+    """Values as float64. Raises InputError if one is not finite."""
     array = np.asarray(values, np.float64)
     bad = int(np.size(array) - np.count_nonzero(np.isfinite(array)))
     if bad:

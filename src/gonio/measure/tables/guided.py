@@ -1,4 +1,4 @@
-"""Tables that bring no density of their own: they are sampled by a guide found from their values."""
+"""Tables without a density of their own: they are sampled by a guide computed from their values."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .base import Measurement, above
 
 
 class Guided(Measurement):
-    """What is sampled by a guide (`gonio.material.guide`) found from its own values."""
+    """A table sampled by a guide (`gonio.material.guide`) computed from its own values."""
 
     transmits = False
 
     def eval(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f cos theta_i, 0 below the surface: what the guide is found from."""
+        """f cos theta_i, 0 below the surface, from which the guide is computed."""
         return where(above(wo, wi), self.value(wo, wi), 0.0)
 
     @cached_property

@@ -23,14 +23,14 @@ GRAZING = 0.03  # cosine of light under which a value f cos theta_i tells nothin
 class HalfDifference(Guided, Measurement):
     """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
 
-    Cell (i, j, k) of (n, m, l) holds theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns, theta_d in equal steps of
-    a quarter turn, phi_d in equal steps of half a turn, or of a whole one. Half a turn is what reciprocity leaves:
-    swapping wo and wi adds pi to phi_d. Values stand at the middle of cells, in the square root too, and are linear
-    between them; phi_d goes round. Before the first middle and beyond the last values are held: theta_h > 89.0 and
-    theta_d > 89.5 degrees are extrapolated so in a table of MERL's size.
+    Cell (i, j, k) of (n, m, l) covers theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns, theta_d in equal steps
+    of a quarter turn, phi_d in equal steps of half a turn, or of a full one. Half a turn suffices by reciprocity:
+    exchanging wo and wi adds pi to phi_d. Values belong to the centers of cells, in the square root too, and are linear
+    between them; phi_d is periodic. Before the first center and beyond the last, values are constant: in a table of
+    MERL's size theta_h > 89.0 and theta_d > 89.5 degrees are extrapolated.
 
-    A cell that is negative is invalid: no light, and no negative light either. It keeps its numbers; where the
-    interpolation needs it, it takes those of the valid cell before it along theta_d, where both directions are higher.
+    A negative cell is invalid: its value is 0. Its number is preserved; the interpolation replaces it by the number of
+    the preceding valid cell along theta_d, where both directions are higher.
     """
 
     name = "half-difference"
@@ -49,7 +49,7 @@ class HalfDifference(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """values  (theta_h, theta_d, phi_d, channel); turn: pi or 2 pi, what the axis phi_d spans"""
+        """values  (theta_h, theta_d, phi_d, channel); turn: pi or 2 pi, the range of the axis phi_d"""
         super().__init__(title, source, wavelengths)
         self.values = finite(values, "the table", where)
         self.turn = float(turn)
@@ -60,11 +60,11 @@ class HalfDifference(Guided, Measurement):
         if not min(abs(self.turn - np.pi), abs(self.turn - 2.0 * np.pi)) < 1e-6:
             raise InputError(f"phi_d spans {self.turn:g}, pi or 2 pi expected", where)
         if not np.any(self.valid):
-            raise InputError("every cell is invalid (negative)", where, "there is nothing to be shown")
+            raise InputError("every cell is invalid (negative)", where, "the table contains no data")
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
-        """Which cells are not negative."""
+        """Which cells are valid (not negative)."""
         return np.asarray(self.values.min(axis=-1) >= 0.0)
 
     @cached_property
@@ -74,7 +74,7 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def reciprocal(self) -> bool:
-        """By its coordinates, over half a turn of phi_d."""
+        """Whether its coordinates ensure reciprocity: with half a turn of phi_d."""
         return self.turn < 4.0
 
     # ------------------------------------------------------------------ as formulas
@@ -90,20 +90,20 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def _folded(self) -> bool:
-        """Whether half of it, up to phi_d of a quarter turn, says all: fewer bytes are faster to fetch from."""
+        """Whether half of it, up to a phi_d of a quarter turn, suffices: fewer bytes are faster to fetch."""
         return self.mirrored and self.reciprocal and self.values.shape[2] % 2 == 0
 
     def _held(self, values: Floats) -> Floats:
-        """Invalid cells with the numbers of the last valid one at a smaller theta_d, as both directions rise with it;
-        where there is none, of the nearest, a step along theta_h being taken as four of the others."""
+        """Invalid cells replaced by the last valid one at a smaller theta_d, since both directions rise with it; if
+        there is none, by the nearest, with a step along theta_h counted as four of the others."""
         step = np.arange(values.shape[1])[None, :, None]
         last = np.maximum.accumulate(np.where(self.valid, step, -1), axis=1)
         held = np.take_along_axis(values, np.maximum(last, 0)[..., None], axis=1)
         if last.min() < 0:
-            from scipy.ndimage import distance_transform_edt  # here: a render that needs none of it starts faster
+            from scipy.ndimage import distance_transform_edt  # imported here to speed up renders that do not need it
 
-            found = last >= 0
-            nearest = distance_transform_edt(~found, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
+            has_values = last >= 0
+            nearest = distance_transform_edt(~has_values, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
             held = held[tuple(nearest)]
         return held
 
@@ -115,7 +115,7 @@ class HalfDifference(Guided, Measurement):
         x = clamp(sqrt(maximum(theta_h * (2.0 / ops.pi), 0.0)) * n - 0.5, 0.0, n - 1.0)
         y = clamp(theta_d * (2.0 / ops.pi) * m - 0.5, 0.0, m - 1.0)
         i, j = minimum(floor(x), max(n - 2.0, 0.0)), minimum(floor(y), max(m - 2.0, 0.0))
-        (first, second), tz = self._around(phi_d * (count / self.turn), count)
+        (first, second), tz = self._azimuth_cell(phi_d * (count / self.turn), count)
         tx, ty = x - i, y - j
         total: ops.Value = 0.0
         for di, wx in ((0.0, 1.0 - tx), (1.0, tx)):
@@ -124,8 +124,8 @@ class HalfDifference(Guided, Measurement):
                     total = total + of_channels(ops.fetch(self._table, i + di, j + dj, cell)) * (wx * wy * wz)
         return total * wi.z
 
-    def _around(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
-        """The cells on both sides of a phi_d counted in cells, and the way from one middle to the other."""
+    def _azimuth_cell(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
+        """The cells on both sides of a phi_d in units of cells, and the fraction of the way between their centers."""
         if self._folded:
             at = at - floor(at * (1.0 / count)) * count
             z = clamp(minimum(at, count - at) - 0.5, 0.0, 0.5 * count - 1.0)
@@ -155,12 +155,12 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def range(self) -> tuple[float, float]:
-        kept = self.values[self.valid]
-        return float(kept.min()), float(kept.max())
+        valid = self.values[self.valid]
+        return float(valid.min()), float(valid.max())
 
 
 def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, Floats]:
-    """wo and wi at the middle of every cell, (N, 3) each, in the order of the table; some lie below the surface."""
+    """wo and wi at the center of every cell, (N, 3) each, in the order of the table; some lie below the surface."""
     n, m, count = shape
     theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)
     theta_d = (np.arange(m) + 0.5) / m * (0.5 * np.pi)
@@ -180,24 +180,23 @@ def pair_at(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Fl
 def sampled(
     value: ops.Value, shape: tuple[int, int, int] = (90, 90, 180), turn: float = np.pi, **about: ops.Value
 ) -> HalfDifference:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at the middles of the cells.
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at the centers of the cells.
 
-    A cell whose middle lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
-    exchange, whose values are f cos theta_i and f cos theta_o where reciprocity holds: least squares of both give
+    A cell whose center lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
+    exchange, whose values are f cos theta_i and f cos theta_o if the material is reciprocal. Least squares of both give
 
         f = (v cos theta_i + v' cos theta_o) / (cos^2 theta_i + cos^2 theta_o).
 
-    A mean of the quotients would divide what a measurement is off by at grazing light by a cosine of about 0.
+    The mean of the quotients would divide the error of a value at grazing light by a cosine close to 0.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
     values = np.full((len(wo), 3), -1.0)
     lit = lowest > 1e-9
     cosine_o, cosine_i = wo[lit, 2:], wi[lit, 2:]
-    there = value(wo[lit], wi[lit])
-    both = there * cosine_i + value(wi[lit], wo[lit]) * cosine_o
-    f = both / (cosine_i**2 + cosine_o**2)
-    if turn > 4.0:  # each has its own value, but where its light grazes
-        f = np.where(cosine_i > GRAZING, there / cosine_i, f)
+    forward = value(wo[lit], wi[lit])
+    f = (forward * cosine_i + value(wi[lit], wo[lit]) * cosine_o) / (cosine_i**2 + cosine_o**2)
+    if turn > 4.0:  # a cell of its own for each, but the quotient is unreliable at grazing light
+        f = np.where(cosine_i > GRAZING, forward / cosine_i, f)
     values[lit] = np.maximum(f, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

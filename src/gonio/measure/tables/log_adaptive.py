@@ -1,4 +1,4 @@
-"""Adaptive tables whose values are stored as rounded cosines."""
+"""Adaptive tables with values stored as rounded cosine coefficients."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from .base import Floats
 from .log_table import COLOURS, from_cosines, head, unpacked
 from .rebuilt import Rebuilt
 
-LEAST = 0.02  # of a view's mean luminance: what is black at a node need not be beside it
+MIN_LUMINANCE = 0.02  # of a view's mean luminance: light between nodes that are black
 
 
 class LogAdaptive(Rebuilt):
-    """An adaptive table of asinh(value / offset) as cosines over (view, y, x), each a multiple of `step`.
+    """An adaptive table of asinh(value / offset) as cosine coefficients over (view, y, x), each a multiple of `step`.
 
-    asinh is a logarithm of what is large, of either sign, as real files have small negative values. Samples follow the
-    luminance of these values, so that `luminance` need not be stored.
+    asinh is logarithmic for large values of either sign, since real files have small negative values. Samples follow
+    the luminance of these values, so `luminance` need not be stored.
     """
 
     name = "adaptive-log"
     axes: ClassVar[Mapping[str, str]] = {
         **Rebuilt.axes,
         "cells": "views, y and x",
-        "codes": "whole numbers, times `step` the cosines of asinh(value / offset)",
+        "codes": "integers, times `step` the cosine coefficients of asinh(value / offset)",
     }
 
     def __init__(self, stored: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
-        """stored  its arrays: those of `Rebuilt` but luminance and values; cells, scale (1, step, offset)"""
+        """stored  its arrays: those of `Rebuilt` without luminance and values; cells, scale (1, step, offset)"""
         self.stored = dict(stored)
         shape, _, step, offset = head(stored, where)
         views = np.size(stored["phi_i"]), np.size(stored["theta_i"])
         if views[0] * views[1] != shape[0]:
             raise InputError(f"{shape[0]} views, {views[0]} x {views[1]} expected", where, "the file is damaged")
-        turned = from_cosines(unpacked(stored["codes"], shape, where) * step) @ COLOURS
+        logs = from_cosines(unpacked(stored["codes"], shape, where) * step) @ COLOURS
         with np.errstate(over="ignore"):
-            values = (offset * np.sinh(turned)).reshape(*views, *shape[1:], 3)
+            values = (offset * np.sinh(logs)).reshape(*views, *shape[1:], 3)
         luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
-        luminance = luminance + LEAST * luminance.mean(axis=(2, 3), keepdims=True) + 1e-12
+        luminance = luminance + MIN_LUMINANCE * luminance.mean(axis=(2, 3), keepdims=True) + 1e-12
         super().__init__({**stored, "luminance": luminance, "values": np.moveaxis(values, -1, 2)}, where, **about)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         return dict(self.stored)
 
 
-def turned(values: Floats, offset: float) -> Floats:
-    """asinh(value / offset) in brightness and two differences, (view, y, x, 3), of (phi_i, theta_i, 3, y, x)."""
+def log_values(values: Floats, offset: float) -> Floats:
+    """asinh(value / offset) as brightness and two differences, (view, y, x, 3), of (phi_i, theta_i, 3, y, x)."""
     last = np.moveaxis(values, 2, -1)
     return np.arcsinh(last.reshape(-1, *last.shape[2:]) / offset) @ COLOURS.T

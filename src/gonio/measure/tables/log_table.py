@@ -1,4 +1,4 @@
-"""Half-difference tables that are stored as logarithms, transformed and quantised."""
+"""Half-difference tables stored as logarithms, transformed and quantized."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ from .half_difference import HalfDifference, centres
 
 Ints = NDArray[np.int64]
 
-LARGEST = 90 * 90 * 360  # cells: what a file of some bytes may claim to hold is what MERL's files hold at most
-PLANES = 3  # bytes of a whole number
-# Raw streams without a head: nothing in them can ask for more memory than these do. Bytes of whole numbers are no text.
+LARGEST = 90 * 90 * 360  # cells: the limit for a compressed file, the largest of MERL's sizes
+PLANES = 3  # bytes of an integer
+# Raw streams without a header, so a file cannot request more memory than these settings. Bytes of integers are not
+# text.
 CODER = [{"id": lzma.FILTER_LZMA2, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}]
-# Brightness, and two differences: channels of most materials differ by a factor that hardly varies. Orthonormal.
+# Brightness and two differences: the channels of most materials differ by a nearly constant factor. Orthonormal.
 COLOURS = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [0.5, -1.0, 0.5]])
 COLOURS = COLOURS / np.linalg.norm(COLOURS, axis=1, keepdims=True)
 
 
 class LogTable(HalfDifference):
-    """A table of log(f + offset) as cosines, each rounded to a multiple of `step`.
+    """A table of log(f + offset) as cosine coefficients, each rounded to a multiple of `step`.
 
-    The discrete cosine transform over (theta_h, theta_d, phi_d) gathers what is smooth in few numbers; of the rest most
-    become 0. Rounding errs by about as much everywhere of a logarithm, so relatively of f. Cells whose middle lies
-    below the surface are invalid again; others that were invalid hold what the cosines say of them.
+    The discrete cosine transform over (theta_h, theta_d, phi_d) concentrates smooth parts in few numbers; most others
+    become 0. Rounding causes a uniform error of the logarithm, hence a relative error of f. Cells whose center lies
+    below the surface are invalid again; other invalid cells hold the values of the cosine series.
     """
 
     name = "log-table"
     axes: ClassVar[Mapping[str, str]] = {
-        "cells": "theta_h (by its square root), theta_d, phi_d, and turn: what phi_d spans, rad",
-        "codes": "whole numbers, times `step` the cosines of log(f + offset), by frequency",
+        "cells": "theta_h (by its square root), theta_d, phi_d, and turn: the range of phi_d, rad",
+        "codes": "integers, times `step` the cosine coefficients of log(f + offset), by frequency",
     }
 
     def __init__(self, stored: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
@@ -51,11 +52,11 @@ class LogTable(HalfDifference):
         super().__init__(values, turn, where=where, **about)
 
     def frequencies(self, stored: Mapping[str, NDArray[np.generic]], shape: tuple[int, ...], where: str) -> Shape:
-        """How many numbers there are along each axis."""
+        """The number of coefficients along each axis."""
         return shape[0], shape[1], shape[2]
 
     def synthesis(self, numbers: Floats, shape: Shape) -> Floats:
-        """The logarithms, (theta_h, theta_d, phi_d, 3), of numbers by frequency."""
+        """The logarithms, (theta_h, theta_d, phi_d, 3), from numbers by frequency."""
         return from_cosines(numbers)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
@@ -70,7 +71,7 @@ Shape = tuple[int, int, int]
 
 
 def head(stored: Mapping[str, NDArray[np.generic]], where: str) -> tuple[Shape, float, float, float]:
-    """(cells along each axis, turn, step, offset); InputError where they are not sound."""
+    """(cells along each axis, turn, step, offset); raises InputError if they are invalid."""
     cells = [int(x) for x in np.asarray(stored["cells"]).ravel()]
     scale = np.asarray(stored["scale"], np.float64).ravel()
     if len(cells) != 3 or min(cells) < 2 or cells[0] * cells[1] * cells[2] > LARGEST:
@@ -84,38 +85,38 @@ def to_cosines(logs: Floats) -> Floats:
     """The discrete cosine transform over the first three axes, orthonormal."""
     from scipy.fft import dctn
 
-    found: Floats = dctn(logs, axes=(0, 1, 2), norm="ortho", workers=2)
-    return found
+    transformed: Floats = dctn(logs, axes=(0, 1, 2), norm="ortho", workers=2)
+    return transformed
 
 
 def from_cosines(numbers: Floats) -> Floats:
     """The inverse of `to_cosines`."""
     from scipy.fft import idctn
 
-    found: Floats = idctn(numbers, axes=(0, 1, 2), norm="ortho", workers=2)
-    return found
+    transformed: Floats = idctn(numbers, axes=(0, 1, 2), norm="ortho", workers=2)
+    return transformed
 
 
 @lru_cache(maxsize=4)
 def above(shape: Shape, turn: float) -> NDArray[np.bool_]:
-    """The cells at whose middle both directions are above the surface."""
+    """The cells at whose center both directions are above the surface."""
     wo, wi = centres(shape, turn)
     return np.asarray(np.minimum(wo[:, 2], wi[:, 2]) > 1e-9).reshape(shape)
 
 
-# --------------------------------------------------------------------------- whole numbers as bytes
+# --------------------------------------------------------------------------- integers as bytes
 
 
 @lru_cache(maxsize=8)
 def _order(shape: Shape) -> Ints:
-    """Frequencies from low to high, so that the zeros of most lie together."""
+    """Frequencies from low to high, so that most zeros are contiguous."""
     along = np.meshgrid(*(np.arange(n) / n for n in shape), indexing="ij")
     return np.argsort(np.sum(along, axis=0).ravel(), kind="stable")
 
 
 def packed(numbers: Ints) -> NDArray[np.uint8]:
-    """Whole numbers by frequency, (..., 3), as bytes: their absolute values and signs folded into one, of that all low
-    bytes, all middle ones and all high ones, without the zeros at the end."""
+    """Integers by frequency, (..., 3), as bytes: absolute values and signs folded into one, then all low bytes, all
+    middle ones and all high ones, without the zeros at the end."""
     shape = numbers.shape[0], numbers.shape[1], numbers.shape[2]
     inline = numbers.reshape(-1, 3)[_order(shape)]
     used = np.flatnonzero(inline.any(axis=1))
@@ -126,7 +127,7 @@ def packed(numbers: Ints) -> NDArray[np.uint8]:
 
 
 def unpacked(codes: NDArray[np.generic], shape: Shape, where: str = "") -> Floats:
-    """The numbers of `packed`, (..., 3). InputError for bytes that are not such."""
+    """The numbers of `packed`, (..., 3). Raises InputError for other bytes."""
     row = 3 * PLANES
     most = row * shape[0] * shape[1] * shape[2]
     try:

@@ -16,17 +16,17 @@ BASES = ("basis_theta_h", "basis_theta_d", "basis_phi_d")
 
 
 class LowRank(LogTable):
-    """A table of log(f + offset) as core x basis x basis x basis, a basis an axis (Tucker1966).
+    """A table of log(f + offset) as core x basis x basis x basis, one basis per axis (Tucker1966).
 
-    The bases are the leading singular vectors of the slices along each axis, of one material or of several: then one
-    file holds them once. The core's numbers are whole, times `step`.
+    The bases are the leading singular vectors of the slices along each axis, of one material or of several, which then
+    share them in one file. The core's numbers are integers, times `step`.
     """
 
     name = "low-rank"
     axes: ClassVar[Mapping[str, str]] = {
-        "cells": "theta_h (by its square root), theta_d, phi_d, and turn: what phi_d spans, rad",
+        "cells": "theta_h (by its square root), theta_d, phi_d, and turn: the range of phi_d, rad",
         "basis_theta_h, basis_theta_d, basis_phi_d": "(cells along the axis, rank)",
-        "codes": "whole numbers, times `step` the core of log(f + offset)",
+        "codes": "integers, times `step` the core of log(f + offset)",
     }
 
     def frequencies(self, stored: Mapping[str, NDArray[np.generic]], shape: tuple[int, ...], where: str) -> Shape:
@@ -49,5 +49,5 @@ def expanded(core: Floats, bases: list[Floats]) -> Floats:
 
 
 def projected(logs: Floats, bases: list[Floats]) -> Floats:
-    """The core that is nearest to logarithms, for bases of orthonormal columns."""
+    """The core closest to given logarithms, for bases of orthonormal columns."""
     return expanded(logs, [basis.T for basis in bases])

@@ -1,4 +1,4 @@
-"""Small networks in the place of tables (Sztrajman2021)."""
+"""Small networks in place of tables (Sztrajman2021)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ SHAPES = {"kernel0": (6, 21), "bias0": (21,), "kernel1": (21, 21), "bias1": (21,
 class Network(Guided, Measurement):
     """f = exp(network(half vector, difference vector)) - 1 with 6 -> 21 -> 21 -> 3 rectified units, 675 weights.
 
-    The half vector is turned above x, the difference vector is the light's direction seen from there, on the side of
-    y >= 0: so exchanging both directions changes nothing. What the network says below 0 is 0. It is evaluated as it is
-    wherever f is: in a render, in a shader.
+    The half vector is rotated above x, the difference vector is the light's direction in its frame, on the side of
+    y >= 0, so exchanging both directions changes nothing. Negative outputs are 0. The network itself is evaluated
+    wherever f is: in renders and in shaders.
     """
 
     name = "network"

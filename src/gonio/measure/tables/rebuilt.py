@@ -1,4 +1,4 @@
-"""Adaptive tables that are stored without their visible normals."""
+"""Adaptive tables stored without their visible normals."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ...errors import InputError
 from .adaptive import Adaptive
 from .base import Floats, axis, finite
 
-LARGEST = 1 << 23  # values of a `vndf` that is rebuilt: six times the largest of the RGL's
-ROUNDS = 12  # of finding the normals and the scale of each view in turn
+LARGEST = 1 << 23  # values of a rebuilt `vndf`: six times the largest of the RGL's
+ROUNDS = 12  # of alternately solving for the normals and the scale of each view
 
 
 class Rebuilt(Adaptive):
     """An adaptive table whose `vndf` is D max(0, wo.m) d omega_m / du, and not stored (Dupuy2018, eq. 5).
 
-    `normals` are D over (phi_m, theta_m), or over theta_m alone; they are `ndf` in most files. Each view's density is
-    normalized when it is used, so the projected area that it is divided by need not be known.
+    `normals` are D over (phi_m, theta_m), or over theta_m only; in most files they equal `ndf`. Each view's density is
+    normalized on use, so its projected area is not needed.
     """
 
     name = "adaptive-rebuilt"
-    axes: ClassVar[Mapping[str, str]] = {**Adaptive.axes, "normals": "D, by its place in the square, up to a factor"}
+    axes: ClassVar[Mapping[str, str]] = {**Adaptive.axes, "normals": "D over the unit square, up to a factor"}
 
     def __init__(self, arrays: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
         self.normals = finite(arrays["normals"], "normals", where)
@@ -42,12 +42,12 @@ class Rebuilt(Adaptive):
         super().__init__(own, bool(arrays["jacobian"].ravel()[0]), where=where, **about)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        kept = {name: array for name, array in super().arrays().items() if name != "vndf"}
-        found: dict[str, NDArray[np.generic]] = {
-            name: array.astype(np.float32) if array.dtype.kind == "f" else array for name, array in kept.items()
+        own = {name: array for name, array in super().arrays().items() if name != "vndf"}
+        arrays: dict[str, NDArray[np.generic]] = {
+            name: array.astype(np.float32) if array.dtype.kind == "f" else array for name, array in own.items()
         }
         shape = np.array(self.vndf.shape[2:], np.int32)
-        return {**found, "normals": self.normals.astype(np.float32), "shape": shape}
+        return {**arrays, "normals": self.normals.astype(np.float32), "shape": shape}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Rebuilt:
@@ -57,7 +57,7 @@ class Rebuilt(Adaptive):
 def facing(phi: Floats, theta: Floats, rows: int, columns: int) -> Floats:
     """max(0, wo.m) d omega_m / du at the nodes of the square, (phi_i, theta_i, phi_m, theta_m).
 
-    Of an isotropic table phi_m counts from the view's azimuth.
+    For an isotropic table phi_m is relative to the view's azimuth.
     """
     x = np.linspace(0.0, 1.0, columns)
     theta_m, phi_m = x * x * (0.5 * np.pi), np.linspace(-np.pi, np.pi, rows)
@@ -69,35 +69,35 @@ def facing(phi: Floats, theta: Floats, rows: int, columns: int) -> Floats:
 
 
 def scaled(densities: Floats) -> Floats:
-    """Each view's with a mean of 1."""
+    """The densities with a mean of 1 per view."""
     mean = densities.mean(axis=(2, 3), keepdims=True)
     return densities / np.where(mean > 0.0, mean, 1.0)
 
 
 def normals_of(table: Adaptive) -> Floats:
-    """D by its place in the square, such that `vndf` is D max(0, wo.m) d omega_m / du as nearly as can be.
+    """D over the unit square, such that `vndf` approximates D max(0, wo.m) d omega_m / du.
 
-    Least squares over all views, each up to a factor; over theta_m alone where the table is isotropic.
+    Least squares over all views, each up to a factor; over theta_m only if the table is isotropic.
     """
     rows, columns = table.vndf.shape[2:]
     cosines = facing(table.phi, table.theta, rows, columns)
     over = (0, 1, 2) if table.isotropic else (0, 1)
     wanted = scaled(table.vndf)
-    # from `ndf`, which in most files it is: one round shows it
+    # start from `ndf`, which in most files is the solution
     normals = np.stack([np.interp(_places(columns), _places(table.ndf.shape[1]), row) for row in table.ndf])
     normals = np.stack([np.interp(_places(rows), _places(len(normals)), column) for column in normals.T], axis=1)
     normals = normals.mean(axis=0) if table.isotropic else normals
     for _ in range(ROUNDS):
-        seen = cosines * normals
-        below = (seen * seen).sum(axis=(2, 3), keepdims=True)
-        weight = cosines * (seen * wanted).sum(axis=(2, 3), keepdims=True) / np.where(below > 0.0, below, 1.0)
+        projected = cosines * normals
+        below = (projected * projected).sum(axis=(2, 3), keepdims=True)
+        weight = cosines * (projected * wanted).sum(axis=(2, 3), keepdims=True) / np.where(below > 0.0, below, 1.0)
         below = (weight * weight).sum(axis=over)
         normals = np.where(below > 0.0, (weight * wanted).sum(axis=over) / np.where(below > 0.0, below, 1.0), normals)
     return np.maximum(normals, 0.0)
 
 
 def rebuilding(table: Adaptive) -> dict[str, NDArray[np.generic]]:
-    """What `Rebuilt` asks for in the place of `vndf`."""
+    """The arrays that `Rebuilt` requires in place of `vndf`."""
     return {"normals": normals_of(table), "shape": np.array(table.vndf.shape[2:], np.int32)}
 
 

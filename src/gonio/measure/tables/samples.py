@@ -1,4 +1,4 @@
-"""Values at scattered pairs of directions, as a gonioreflectometer visits them."""
+"""Values at scattered pairs of directions, as measured by a gonioreflectometer."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from .base import Floats, Measurement, finite, in_rgb
 from .guided import Guided
 from .half_difference import HalfDifference, centres
 
-CELLS = (45, 30, 30)  # of the table that stands for the samples
-NEIGHBOURS = 24  # samples that a cell is found from
-DARK = 1e-3  # of the median value: below it differences are differences, above it ratios
-SAME = 1e-6  # samples nearer to each other than this, in the features, are one measured twice
+CELLS = (45, 30, 30)  # of the table that interpolates the samples
+NEIGHBORS = 24  # samples from which a cell is interpolated
+DARK = 1e-3  # of the median value: separates absolute from relative differences
+SAME = 1e-6  # distance in the features below which samples are repeated measurements
 
 
 class Samples(Guided, Measurement):
     """f at pairs of directions (theta_i, phi_i, theta_r, phi_r), in no order.
 
     Between them f is interpolated linearly over the distance in theta_h by its square root, theta_d and phi_d, among
-    the 24 nearest samples, of the logarithm of the values: once, at the middles of a half-difference table, which is
-    evaluated from then on. The mirror image of a pair has its value, and so has its exchange: material without a
-    direction, and reciprocity.
+    the 24 nearest samples, in the logarithm of the values. This is done once, at the centers of a half-difference
+    table, which is evaluated from then on. A pair shares its value with its mirror image and its exchange: isotropy and
+    reciprocity are assumed.
     """
 
     name = "samples"
-    reciprocal, mirrored = True, True  # as they are interpolated
+    reciprocal, mirrored = True, True  # by interpolation
     axes: ClassVar[Mapping[str, str]] = {"directions": "theta_i, phi_i, theta_r, phi_r of a sample, rad"}
 
     def __init__(
@@ -60,7 +60,7 @@ class Samples(Guided, Measurement):
             what = f"sample {row + 1} has angles {np.degrees(theta[row])} degrees, 0 to 90 expected"
             raise InputError(what, where, "reflection is above the surface; are the angles in radians?")
         if wavelengths is not None and len(wavelengths) != self.values.shape[1]:
-            raise InputError(f"{self.values.shape[1]} values a sample for {len(wavelengths)} wavelengths", where)
+            raise InputError(f"{self.values.shape[1]} values per sample for {len(wavelengths)} wavelengths", where)
 
     def pairs(self) -> tuple[Floats, Floats]:
         """wo and wi of every sample, (N, 3) each."""
@@ -73,7 +73,7 @@ class Samples(Guided, Measurement):
 
     @property
     def angular_range(self) -> AngularRange:
-        """Of both directions together, as a pair stands for its exchange."""
+        """The range of both directions together, since a pair also represents its exchange."""
         ends = np.sort(self.directions[:, [0, 2]], axis=None)
         return of_nodes(ends, ends, np.zeros(0))
 
@@ -81,7 +81,7 @@ class Samples(Guided, Measurement):
 
     @cached_property
     def table(self) -> HalfDifference:
-        """What stands for the samples between them."""
+        """The table that interpolates the samples."""
         from scipy.interpolate import RBFInterpolator
 
         features = _features(*self.pairs())
@@ -92,11 +92,11 @@ class Samples(Guided, Measurement):
         wo, wi = centres(CELLS)
         lit = np.minimum(wo[:, 2], wi[:, 2]) > 1e-9
         at = _features(wo[lit], wi[lit])
-        count = min(NEIGHBOURS, len(rgb))
-        found = RBFInterpolator(features, np.log(rgb + dark), kernel="linear", degree=0, neighbors=count)(at)
+        count = min(NEIGHBORS, len(rgb))
+        logs = RBFInterpolator(features, np.log(rgb + dark), kernel="linear", degree=0, neighbors=count)(at)
         low, high = np.log(rgb.min(axis=0) + dark), np.log(rgb.max(axis=0) + dark)
         values = np.full((len(wo), 3), -1.0)
-        values[lit] = np.maximum(np.exp(np.clip(found, low, high)) - dark, 0.0)
+        values[lit] = np.maximum(np.exp(np.clip(logs, low, high)) - dark, 0.0)
         return HalfDifference(values.reshape(*CELLS, 3), title=self.title, source=self.source)
 
     def prepare(self) -> None:
@@ -129,9 +129,9 @@ class Samples(Guided, Measurement):
 
 
 def _features(wo: Floats, wi: Floats) -> Floats:
-    """Where a pair stands, (N, 4): theta_h by its square root, theta_d, and phi_d as far as theta_d makes it matter.
+    """The coordinates of a pair, (N, 4): theta_h by its square root, theta_d, and phi_d weighted by theta_d.
 
-    cos 2 phi_d and |sin 2 phi_d| do not tell a pair from its mirror image or from its exchange.
+    cos 2 phi_d and |sin 2 phi_d| are the same for a pair, its mirror image and its exchange.
     """
     h, d = wo + wi, wi - wo
     flat, length = np.hypot(h[:, 0], h[:, 1]), np.linalg.norm(h, axis=1)
@@ -146,21 +146,21 @@ def _features(wo: Floats, wi: Floats) -> Floats:
 
 
 def plan() -> Floats:
-    """Directions of a goniometer for isotropic materials, (N, 4): light from 10 to 80 degrees, views all round."""
+    """Directions of a goniometer for isotropic materials, (N, 4): light from 10 to 80 degrees, views all around."""
     theta_i = np.radians(np.arange(10.0, 81.0, 10.0))
     theta_r = np.radians(np.concatenate([np.arange(0.0, 76.0, 5.0), [79.0]]))
     phi = np.radians(np.arange(-170.0, 181.0, 10.0))
     i, r, p = (a.ravel() for a in np.meshgrid(theta_i, theta_r, phi, indexing="ij"))
-    # and the mirror direction of each, finely: there lobes are
+    # plus fine steps around each mirror direction, where lobes are
     steps = np.radians(np.arange(-8.0, 9.0, 1.0))
     near_i, step = (a.ravel() for a in np.meshgrid(theta_i, steps, indexing="ij"))
-    around = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
-    whole = np.concatenate([np.stack([i, 0.0 * i, r, p], -1), around])
-    return whole[whole[:, 2] <= np.radians(85.0)]
+    near_mirror = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
+    rows = np.concatenate([np.stack([i, 0.0 * i, r, p], -1), near_mirror])
+    return rows[rows[:, 2] <= np.radians(85.0)]
 
 
 def sampled(value: ops.Value, directions: Floats | None = None, **about: ops.Value) -> Samples:
-    """Samples of any f cos theta_i (wo, wi) -> (N, 3) at some directions, those of `plan` if not given."""
+    """Samples of any f cos theta_i (wo, wi) -> (N, 3) at given directions, by default those of `plan`."""
     directions = plan() if directions is None else directions
     blank = Samples(directions, np.zeros((len(directions), 3)))
     wo, wi = blank.pairs()

@@ -1,4 +1,4 @@
-"""Tables about the mirror direction, as instruments for optical design store them."""
+"""Tables about the mirror direction, as stored by instruments for optical design."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ from .guided import Guided
 class Specular(Guided, Measurement):
     """f at nodes of (theta_i, azimuth, radial), the view's polar angles about the mirror direction of the light.
 
-    Radial 0 is the mirror direction; azimuth 0 leads from there to the normal (Zemax's tabular BSDF). Linear between
-    nodes, held beyond the first and the last; an azimuth that ends at pi is mirrored, one that ends at 2 pi goes round.
+    Radial 0 is the mirror direction; azimuth 0 points from there to the normal (Zemax's tabular BSDF). Linear between
+    nodes, constant beyond the first and the last; an azimuth that ends at pi is mirrored, one that ends at 2 pi is
+    periodic.
     """
 
     name = "specular"
@@ -60,7 +61,7 @@ class Specular(Guided, Measurement):
 
     @property
     def mirrored(self) -> bool:
-        """By its azimuth, which ends at pi."""
+        """Whether it is mirror-symmetric: its azimuth ends at pi."""
         return bool(self.azimuth[-1] < 1.5 * np.pi)
 
     # ------------------------------------------------------------------ as formulas
@@ -114,11 +115,11 @@ class Specular(Guided, Measurement):
 
 
 @ops.function
-def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Scalar]:
-    """Azimuth and radial angle of wo about the mirror direction of wi; the azimuth in [0, pi], or [0, 2 pi) if `whole`.
+def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scalar]:
+    """Azimuth and radial angle of wo about the mirror direction of wi; the azimuth in [0, pi], or [0, 2 pi) if `full`.
 
-    With the light above x, the mirror direction is s = (-sin, 0, cos), the way to the normal (cos, 0, sin), and y
-    completes them.
+    With the light above x, the mirror direction is s = (-sin, 0, cos), the direction to the normal (cos, 0, sin), and y
+    completes the frame.
     """
     sin = ops.safe_sqrt(wi.x * wi.x + wi.y * wi.y)
     pole = sin == 0.0
@@ -128,14 +129,14 @@ def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Sca
     up = wi.z * x + sin * wo.z
     along = wi.z * wo.z - sin * x
     none = (up == 0.0) & (y == 0.0)
-    turn = where(none, 0.0, ops.atan2(y if whole else ops.abs(y), where(none, 1.0, up)))
-    if whole:
+    turn = where(none, 0.0, ops.atan2(y if full else ops.abs(y), where(none, 1.0, up)))
+    if full:
         turn = where(turn < 0.0, turn + 2.0 * ops.pi, turn)
     return turn, ops.atan2(ops.safe_sqrt(up * up + y * y), along)
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes, or above where those lie too low."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes, or above those that lie too low."""
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
     radial = np.radians(

@@ -1,4 +1,4 @@
-"""Fresnel reflectance. A kind, exact or approximate, is one file in this folder: discovery finds it."""
+"""Fresnel reflectance. Each Fresnel kind, exact or approximate, is one file in this folder."""
 
 from __future__ import annotations
 

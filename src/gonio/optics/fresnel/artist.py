@@ -1,4 +1,4 @@
-"""Metals as artists mean them: reflectivity and edge tint, and a fit of F_avg in these."""
+"""Artist-friendly parameters of metals, reflectivity and edge tint, and a fit of F_avg in them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def edge_tint(eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
 
 
 def index_of(r: Reals, g: Reals) -> tuple[Reals, Reals]:
-    """(eta, k) of the metal that an artist means by reflectivity r and edge tint g, in (0, 1) (Gulbrandsen2014, eq. 2
+    """(eta, k) of the metal with reflectivity r and edge tint g, both in (0, 1) (Gulbrandsen2014, eq. 2
     and 3): `go.Conductor(*index_of(np.array([0.944, 0.776, 0.373]), np.array([0.998, 0.981, 0.751])))` is about gold.
     """
     root = r**0.5
@@ -37,7 +37,7 @@ def index_of(r: Reals, g: Reals) -> tuple[Reals, Reals]:
 
 @function
 def imageworks(r: Spectrum, g: Spectrum) -> Spectrum:
-    """Fit of F_avg in reflectivity r and edge tint g (Kulla2017, p. 26), held in [0, 1]."""
+    """Fit of F_avg in reflectivity r and edge tint g (Kulla2017, p. 26), clamped to [0, 1]."""
     fit = (
         0.087237
         + g * (0.0230685 + g * (-0.0864902 + g * 0.0774594))

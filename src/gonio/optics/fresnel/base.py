@@ -1,7 +1,7 @@
-"""What every Fresnel kind offers; a member must give `curve`, or both `conductor` and `dielectric`.
+"""The base of all Fresnel kinds; a member must define `curve`, or both `conductor` and `dielectric`.
 
-`eta` is the index on the far side over the index on the side of the incident direction; for conductors eta and k are
-those of the metal over the index of the dielectric outside. Cosines, >= 0, are to the facet's normal.
+`eta` is the index on the far side divided by the index on the incident side; for conductors eta and k are those of the
+metal divided by the index of the outer dielectric. Cosines, >= 0, are relative to the facet's normal.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ..special import gauss
 R = TypeVar("R", Scalar, Spectrum)
 N = TypeVar("N", float, Scalar, Spectrum)
 
-# Gauss-Legendre in sqrt(mu). Metals: 2e-7 from the integral over every preset; glass of eta 1.05 to 3: 4e-8
+# Gauss-Legendre in sqrt(mu). Errors: 2e-7 over every metal preset, 4e-8 for glass with eta 1.05 to 3
 NODES = 10
 
 
 class Fresnel(Part):
-    """Reflectance of unpolarized light at a smooth interface, at an angle and on average.
+    """Reflectance of unpolarized light at a smooth interface, per angle and on average.
 
     The first line of a member's docstring is its title in the manual.
 
-    white  whether everything is reflected, at any angle and index: the kind that furnaces and tables need
+    white  whether it reflects everything at any angle and index: the kind used for furnace tests and tables
     """
 
     name: ClassVar[str] = ""
@@ -41,29 +41,29 @@ class Fresnel(Part):
     def missing(self) -> str:
         own = type(self)
         written = (own.curve, own.conductor, own.dielectric) != (Fresnel.curve, Fresnel.conductor, Fresnel.dielectric)
-        return "" if written else "curve(self, cos_i, r0)"  # a kind may be for metals alone
+        return "" if written else "curve(self, cos_i, r0)"  # a kind may be defined for metals only
 
     def curve(self, cos_i: Scalar | float, r0: R) -> R:
-        """Reflectance under cos_i of an interface that reflects r0 at normal incidence."""
+        """Reflectance at cos_i of an interface that reflects r0 at normal incidence."""
         raise self.lacks("neither `curve` nor `conductor` and `dielectric`", "curve(self, cos_i, r0)")
 
     def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """Reflectance of a metal of complex index eta + i k; here the curve from R0."""
+        """Reflectance of a metal with complex index eta + i k; by default the curve from R0."""
         return self.curve(cos_i, r0_conductor(eta, k))
 
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """Reflectance of a dielectric, with transmitted cosine cos_t (0: total reflection); here the curve from R0.
+        """Reflectance of a dielectric with transmitted cosine cos_t (0: total reflection); default: the curve from R0.
 
-        From the denser side the curve's angle is the transmitted one: it is 1 at the critical angle.
+        From the denser side the curve is evaluated at the transmitted angle, so it is 1 at the critical angle.
         """
         return where(cos_t > 0.0, self.curve(where(eta < 1.0, cos_t, cos_i), r0_dielectric(eta)), 1.0)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """F_avg = 2 int F mu dmu of a metal: Gauss's rule in sqrt(mu), error 2e-7."""
+        """F_avg = 2 int F mu dmu of a metal by Gauss's rule in sqrt(mu), error 2e-7."""
         return average(lambda mu: self.conductor(mu, eta, k))
 
     def dielectric_average(self, eta: Scalar) -> Scalar:
-        """F_avg of a dielectric from its less dense side, eta or 1 / eta: Gauss's rule in sqrt(mu), error 4e-8.
+        """F_avg of a dielectric from its less dense side, eta or 1 / eta, by Gauss's rule in sqrt(mu), error 4e-8.
 
         From the denser side it is 1 - (1 - F_avg) / eta^2, eta > 1, by reciprocity.
         """
@@ -80,13 +80,13 @@ Fresnel.family = Family("Fresnel kind", "gonio.fresnels", (__package__,), instan
 
 
 def kind(name: str) -> Fresnel:
-    """The Fresnel kind of that name; InputError where there is none."""
+    """The Fresnel kind of that name; raises InputError if there is none."""
     return Fresnel.family.get(name)
 
 
 def average(reflectance: Callable[[float], R]) -> R:
     """2 int F(mu) mu dmu of a function of the cosine; a static sum, so it can be recorded."""
-    rule = [(float(x), float(w)) for x, w in zip(*gauss(NODES), strict=True)]  # plain: NumPy's would swallow Dr.Jit's
+    rule = [(float(x), float(w)) for x, w in zip(*gauss(NODES), strict=True)]  # NumPy floats would absorb Dr.Jit values
     (x, w), *others = rule
     total = reflectance(x * x) * (4.0 * w * x**3)
     for x, w in others:
@@ -98,7 +98,7 @@ def average(reflectance: Callable[[float], R]) -> R:
 def cos_transmitted(cos_i: Scalar, eta: Scalar) -> Scalar:
     """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
 
-    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels nowhere but at the critical angle.
+    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels at the critical angle only.
     """
     return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
 

@@ -27,8 +27,8 @@ class Exact(Fresnel):
 def dielectric(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
     """Exact reflectance of a dielectric: mean of R_s and R_p; 1 where cos_t = 0 (total reflection).
 
-    r_s = (cos_i - eta cos_t) / (cos_i + eta cos_t),  r_p = (eta cos_i - cos_t) / (eta cos_i + cos_t), multiplied above
-    and below by the denominator: where eta is near 1 the differences would cancel, but by Snell's law
+    r_s = (cos_i - eta cos_t) / (cos_i + eta cos_t),  r_p = (eta cos_i - cos_t) / (eta cos_i + cos_t), numerator and
+    denominator multiplied by the denominator: near eta = 1 the differences would cancel, but by Snell's law
     cos_i^2 - eta^2 cos_t^2 = 1 - eta^2,  eta^2 cos_i^2 - cos_t^2 = (eta^2 - 1) ((eta^2 + 1) cos_i^2 - 1) / eta^2.
     """
     minus_r_s, r_p = amplitudes(cos_i, cos_t, eta)
@@ -36,7 +36,7 @@ def dielectric(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
 
 
 def amplitudes(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> tuple[Scalar, Scalar]:
-    """(-r_s, r_p) of a dielectric, where it is no total reflection; see `dielectric`."""
+    """(-r_s, r_p) of a dielectric outside total reflection; see `dielectric`."""
     contrast = (eta - 1.0) * (eta + 1.0)
     minus_r_s = contrast / sqr(cos_i + eta * cos_t)
     r_p = contrast * ((sqr(eta) + 1.0) * sqr(cos_i) - 1.0) / sqr(eta * (eta * cos_i + cos_t))
@@ -44,13 +44,13 @@ def amplitudes(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> tuple[Scalar, Scala
 
 
 def transmittance(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-    """1 - R of a dielectric as mean of T_s and T_p: the difference has no digits left at grazing angles."""
+    """1 - R of a dielectric as the mean of T_s and T_p: at grazing angles the difference would lose all digits."""
     across, along = cos_i + eta * cos_t, eta * cos_i + cos_t
     return 2.0 * eta * cos_i * cos_t * (1.0 / sqr(across) + 1.0 / sqr(along))
 
 
 def dielectric_array(cos_i: NDArray[np.floating], eta: float) -> NDArray[np.floating]:
-    """`dielectric` in NumPy, from the less dense side, as the books have it: mean of r_s^2 and r_p^2."""
+    """`dielectric` in NumPy, from the less dense side, in the textbook form: mean of r_s^2 and r_p^2."""
     cos_t = np.sqrt(1.0 - (1.0 - cos_i**2) / eta**2)
     r_s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t)
     r_p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
@@ -62,12 +62,12 @@ def dielectric_array(cos_i: NDArray[np.floating], eta: float) -> NDArray[np.floa
 def conductor(cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
     """Exact reflectance of a conductor with complex index n = eta + i k: mean of R_s and R_p (Born1999, ch. 14).
 
-    The fused form of `polarized`, which is the textbook's. With w = sqrt(n^2 - sin^2) = a + i b:
-    R_s = |cos - w|^2 / |cos + w|^2, which is |n^2 - 1|^2 / |cos + w|^4, as cos^2 - w^2 = 1 - n^2, so nothing cancels;
-    R_p = R_s (p - q) / (p + q),  p = cos^2 |w|^2 + sin^4,  q = 2 a cos sin^2.  Their mean is R_s p / (p + q), here as
-    one quotient.
+    The fused form of `polarized`, which follows the textbook. With w = sqrt(n^2 - sin^2) = a + i b:
+    R_s = |cos - w|^2 / |cos + w|^2 = |n^2 - 1|^2 / |cos + w|^4, since cos^2 - w^2 = 1 - n^2, so nothing cancels;
+    R_p = R_s (p - q) / (p + q),  p = cos^2 |w|^2 + sin^4,  q = 2 a cos sin^2.  Their mean is R_s p / (p + q), written
+    as one quotient.
     """
-    # with R_s, R_p and their mean apart, as in `polarized`, a conductor's eval takes 17 % longer, its sample 5 %
+    # with separate R_s, R_p and mean, as in `polarized`, a conductor's eval takes 17 % longer, its sample 5 %
     cos2, sin2 = cos_i * cos_i, 1.0 - cos_i * cos_i
     w2, a = _refracted(sin2, eta, k)
     contrast = fma(eta - 1.0, eta - 1.0, sqr(k)) * fma(eta + 1.0, eta + 1.0, sqr(k))
@@ -76,13 +76,13 @@ def conductor(cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
     return fma(contrast, p, VANISHING) / fma(sqr(sum2), p + q, VANISHING)
 
 
-# Makes 0/0 a 1, of index 0 at normal incidence, which reflects all. Index 1e-4 has 1e-8 there, so it is lost beside any
-# other value; its inverse squared, in the gradient, stays in float32 times the peak of D.
+# Makes 0/0 equal 1, for index 0 at normal incidence, which reflects everything. At index 1e-4 the other terms are 1e-8,
+# so it is negligible; the square of its inverse, in the gradient, times the peak of D does not overflow float32.
 VANISHING = 1e-15
 
 
 def polarized(cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
-    """(R_s, R_p) of a conductor with complex index n = eta + i k, as the books have them (Born1999, ch. 14).
+    """(R_s, R_p) of a conductor with complex index n = eta + i k, in the textbook form (Born1999, ch. 14).
 
     With w = sqrt(n^2 - sin^2):  R_s = |cos - w|^2 / |cos + w|^2,  R_p = R_s |cos w - sin^2|^2 / |cos w + sin^2|^2.
     """
@@ -94,9 +94,9 @@ def polarized(cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> tuple[Spectr
 
 
 def _refracted(sin2: Scalar | float, eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
-    """(|w|^2, Re w) of w = a + i b = sqrt(n^2 - sin^2), n times the complex cosine of the refracted wave."""
+    """(|w|^2, Re w) of w = a + i b = sqrt(n^2 - sin^2), which is n times the complex cosine of the refracted wave."""
     t, eta_k = sqr(eta) - sqr(k) - sin2, eta * k  # a^2 - b^2 and a b
     w2 = sqrt(maximum(fma(t, t, 4.0 * sqr(eta_k)), 1e-30))
-    # the larger of a^2 and b^2; the other would cancel. The gradient of rsqrt, its cube, must stay in float32
+    # the larger of a^2 and b^2; the other would cancel. The gradient of rsqrt, its cube, must not overflow float32
     larger = maximum(0.5 * (w2 + abs(t)), 1e-24)
     return w2, rsqrt(larger) * where(t > 0.0, larger, eta_k)

@@ -1,4 +1,4 @@
-"""Schlick's curve, bent to meet a second value near grazing: the F82 of Adobe's standard material."""
+"""Schlick's curve through a second value near grazing: the F82 model of Adobe Standard Material."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from . import exact
 from .base import Fresnel, R, cos_transmitted, r0_conductor, r0_dielectric
 from .schlick import schlick
 
-GRAZING = 1.0 / 7.0  # the cosine of 82 degrees, nearly: where x (1 - x)^6 is greatest
+GRAZING = 1.0 / 7.0  # the cosine of about 82 degrees: the maximum of x (1 - x)^6
 GREATEST = GRAZING * (1.0 - GRAZING) ** 6
 
 
@@ -21,7 +21,7 @@ class F82(Fresnel):
         return f82(cos_i, r0_conductor(eta, k), exact.conductor(GRAZING, eta, k))
 
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """The curve through the exact reflectances of a dielectric; from the denser side at the transmitted angle."""
+        """The curve through the exact reflectances of a dielectric; from the denser side, at the transmitted angle."""
         mu = where(eta < 1.0, cos_t, cos_i)
         return where(cos_t > 0.0, f82(mu, r0_dielectric(eta), _edge(eta)), 1.0)
 
@@ -35,8 +35,8 @@ def _edge(eta: Scalar) -> Scalar:
 
 @function
 def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
-    """Schlick's curve from r0, less c x (1 - x)^6 with the c that makes it `edge` at cosine 1/7 (Kutz2021), held
-    above 0, where a dark edge over a dark r0 would pull it."""
+    """Schlick's curve from r0 minus c x (1 - x)^6, with c such that the value at cosine 1/7 is `edge` (Kutz2021);
+    clamped to >= 0, since a dark edge with a dark r0 would make it negative."""
     x = minimum(maximum(cos_i, 0.0), 1.0)
     dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)
-    return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)  # in this order black has a slope
+    return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)  # this order has a gradient at r0 = 0

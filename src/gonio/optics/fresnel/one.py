@@ -1,4 +1,4 @@
-"""No loss at all."""
+"""Total reflection at every angle."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .base import Fresnel
 
 
 class One(Fresnel):
-    """F = 1: a perfect mirror, for furnaces and tables."""
+    """F = 1: a perfect mirror, for furnace tests and tables."""
 
     name = "one"
     white = True

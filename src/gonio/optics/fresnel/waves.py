@@ -1,12 +1,12 @@
-"""The Fresnel equations in full: amplitudes, phases and Mueller matrices of both polarizations, in NumPy.
+"""The complete Fresnel equations: amplitudes, phases and Mueller matrices of both polarizations, in NumPy.
 
-Fields turn as exp(-i omega t), so an index that absorbs is n = eta + i k with k >= 0. With w = n cos_t =
+Fields vary as exp(-i omega t), so an absorbing medium has n = eta + i k with k >= 0. With w = n cos_t =
 sqrt(n^2 - sin^2), the root that decays into the surface (Born1999, sec. 1.5 and 14.2; Hecht2017, sec. 4.6):
 
     r_s = (cos - w) / (cos + w)              t_s = 2 cos / (cos + w)
     r_p = (n^2 cos - w) / (n^2 cos + w)      t_p = 2 n cos / (n^2 cos + w)
 
-s points along normal x direction, and p is s turned toward the surface, on both rays: at normal incidence r_p = -r_s.
+s points along normal x direction, and p is s rotated toward the surface, on both rays: at normal incidence r_p = -r_s.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ Waves: TypeAlias = NDArray[np.complex128]
 
 
 class Interface(NamedTuple):
-    """What a smooth interface does with a plane wave: arrays of the shape that angle, eta and k have together.
+    """The response of a smooth interface to a plane wave: arrays of the common shape of angle, eta and k.
 
-    r_s, r_p      complex amplitudes of the reflected field over the arriving one
-    t_s, t_p      of the refracted field; in a metal just below the surface
-    R_s, R_p, R   reflectances: shares of the power, R their mean, that of unpolarized light
-    T_s, T_p, T   transmittances, R + T = 1; in a metal what is absorbed
-    phase_s, phase_p  by how much the reflected field is late, radians in (-pi, pi]: the angle of r_s and r_p
-    brewster      angle of the least R_p, radians: arctan(eta) where k = 0, there R_p = 0; of a metal the
+    r_s, r_p      complex amplitudes of the reflected field relative to the incident one
+    t_s, t_p      those of the refracted field; in a metal just below the surface
+    R_s, R_p, R   reflectances: fractions of the power; R, their mean, is that of unpolarized light
+    T_s, T_p, T   transmittances, R + T = 1; in a metal the absorbed fraction
+    phase_s, phase_p  phase lag of the reflected field, radians in (-pi, pi]: the angle of r_s and r_p
+    brewster      angle of the smallest R_p, radians: arctan(eta) where k = 0, with R_p = 0; for a metal the
                   pseudo-Brewster angle
-    critical      angle from which on all is reflected, radians: arcsin(eta) where eta < 1 and k = 0, else NaN
+    critical      critical angle of total reflection, radians: arcsin(eta) where eta < 1 and k = 0, else NaN
     """
 
     r_s: Waves
@@ -52,24 +52,24 @@ class Interface(NamedTuple):
 
     @property
     def reflection(self) -> Reals:
-        """Mueller matrix of the reflection, (..., 4, 4): of Stokes vectors (I, Q, U, V) whose Q is s minus p.
+        """Mueller matrix of the reflection, (..., 4, 4), for Stokes vectors (I, Q, U, V) with Q = s minus p.
 
-        As `mi.mueller.specular_reflection` has it: U is the difference between the diagonals, seen toward the source.
+        Same convention as `mi.mueller.specular_reflection`: U is the difference between the diagonals, seen toward
         """
         return mueller(self.R_s, self.R_p, self.r_s * np.conj(self.r_p))
 
     @property
     def refraction(self) -> Reals:
-        """Mueller matrix of the refraction, (..., 4, 4), of power: as `mi.mueller.specular_transmission` has it."""
+        """Mueller matrix of the refraction, (..., 4, 4), in power, as in `mi.mueller.specular_transmission`."""
         cross = self.t_s * np.conj(self.t_p)
         size = np.abs(cross)
-        # the beam's width and the index change both parts alike: sqrt(T_s T_p) with the phase between them
+        # beam width and index change both parts by the same factor: sqrt(T_s T_p) with the phase between them
         turn = np.divide(cross, size, out=np.ones_like(cross), where=size > 0.0)
         return mueller(self.T_s, self.T_p, np.sqrt(np.maximum(self.T_s * self.T_p, 0.0)) * turn)
 
 
 def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
-    """The exact Fresnel equations of a smooth interface, in 64 bits.
+    """The exact Fresnel equations of a smooth interface, in float64.
 
         at = go.fresnel(np.radians(60), eta=1.5)
         at.R_s, at.R_p, np.degrees(at.brewster)
@@ -77,26 +77,26 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
 
     theta   angle of incidence from the normal, radians, 0 to pi/2
     eta     real part of the index on the far side over the index on the near side, > 0: glass from inside is 1 / 1.5
-    k       imaginary part, >= 0; the sign of the fields is that of n = eta + i k, exp(-i omega t)
-    The three are numbers or arrays that go together. Returns an `Interface`. Raises InputError where one is
-    out of range. Not for thin films, nor for light that arrives through an absorbing medium.
+    k       imaginary part, >= 0; sign convention n = eta + i k, exp(-i omega t)
+    The three are numbers or arrays that broadcast. Returns an `Interface`. Raises InputError for values out of range.
+    Not for thin films, nor for light that arrives through an absorbing medium.
     """
     angle, eta, k = (_real(x, name) for x, name in ((theta, "theta"), (eta, "eta"), (k, "k")))
     if np.any((angle < 0.0) | (angle > np.pi / 2 * (1.0 + 1e-15))):
-        raise InputError("an angle outside of 0 to pi/2", "fresnel: theta", "give radians from the normal")
+        raise InputError("an angle outside 0 to pi/2", "fresnel: theta", "give radians from the normal")
     check_index(eta, k, "fresnel")
     brewster = brewster_angle(eta, k)
     try:
         angle, eta, k = np.broadcast_arrays(angle, eta, k)
     except ValueError:
         shapes = f"{angle.shape}, {eta.shape} and {k.shape}"
-        raise InputError(f"arrays of shapes {shapes}, which do not go together", "fresnel") from None
+        raise InputError(f"arrays of shapes {shapes}, which do not broadcast", "fresnel") from None
     cos = np.maximum(np.cos(angle), 0.0)
     square = (eta**2 - k**2) + 2j * eta * k
     # n^2 - sin^2 with n^2 - 1 as a product: near n = 1 it would cancel
     w = np.sqrt((eta - 1.0) * (eta + 1.0) - k**2 + cos**2 + 2j * eta * k)
     s, p = cos + w, square * cos + w
-    grazing = s == 0.0  # index 1 along the surface: nothing is there
+    grazing = s == 0.0  # index 1 at grazing incidence: there is no interface
     s, p = np.where(grazing, 1.0, s), np.where(p == 0.0, 1.0, p)
     r_s, r_p = (cos - w) / s, (square * cos - w) / p
     t_s: Waves = np.divide(2.0 * cos, s)
@@ -112,7 +112,7 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
 
 
 def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
-    """The angle at which R_p is least, radians: arctan(eta), where it is 0; of a metal by a cubic in sin^2.
+    """The angle of the smallest R_p, radians: arctan(eta) for k = 0; for a metal by a cubic in sin^2.
 
     With e = n^2 and u = sin^2: 2 (|e|^2 + Re e) u^3 + |e|^2 (|e|^2 - 3) u^2 - 2 |e|^4 u + |e|^4 = 0
     (HumphreysOwen1961).
@@ -124,7 +124,7 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
     if np.any(metal):
         e = (eta[metal] + 1j * k[metal]) ** 2
         size = np.abs(e) ** 2
-        companion = np.zeros((*e.shape, 3, 3))  # of the polynomial in 1 / u, whose leading term does not vanish
+        companion = np.zeros((*e.shape, 3, 3))  # of the polynomial in 1 / u, whose leading coefficient is never 0
         companion[..., 1, 0] = companion[..., 2, 1] = 1.0
         for row, coefficient in enumerate((2.0 * (size + e.real), size * (size - 3.0), -2.0 * size**2)):
             companion[..., row, 2] = -coefficient / size**2
@@ -136,8 +136,8 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
 
 
 def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
-    """The Mueller matrix, (..., 4, 4), of what keeps s and p apart: the shares of both, and the product of their
-    amplitudes, the first times the conjugate of the second."""
+    """The Mueller matrix, (..., 4, 4), of an interface that does not mix s and p, from the power fractions of both and
+    the product of their amplitudes, the first times the conjugate of the second."""
     half_sum, half_difference, zero = 0.5 * (along_s + along_p), 0.5 * (along_s - along_p), 0.0 * along_s
     rows = [
         [half_sum, half_difference, zero, zero],
@@ -149,17 +149,17 @@ def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
 
 
 def check_index(eta: Reals, k: Reals, location: str) -> None:
-    """Raise InputError for an index that no medium has."""
+    """Raise InputError for an index that no medium can have."""
     if np.any(eta <= 0.0):
         raise InputError(f"eta = {np.min(eta):g}, a positive index expected", f"{location}: eta", "that of air is 1")
     if np.any(k < 0.0):
-        what = f"k = {np.min(k):g}, which would give light"
-        raise InputError(what, f"{location}: k", "an index that absorbs is eta + i k with k >= 0")
+        what = f"k = {np.min(k):g}, which would amplify light"
+        raise InputError(what, f"{location}: k", "an absorbing medium has eta + i k with k >= 0")
 
 
 def _real(value: ArrayLike, name: str) -> Reals:
     if np.iscomplexobj(value):
-        raise InputError("a complex number given, a real one expected", f"fresnel: {name}", "give eta and k apart")
+        raise InputError("a complex number given, a real one expected", f"fresnel: {name}", "give eta and k separately")
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Masking and shadowing: the share G of facets that are seen from wo and lit from wi. A term is one file here."""
+"""Masking and shadowing: the fraction G of facets visible from both wo and wi. Each term is one file in this folder."""
 
 from __future__ import annotations
 

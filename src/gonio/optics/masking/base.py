@@ -1,4 +1,4 @@
-"""What every masking term offers; a member must give `reflected`, all else has a default."""
+"""The base of all masking terms; a member must define `reflected`, everything else has a default."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..part import Part
 
 
 class Masking(Part):
-    """Masking and shadowing G of a pair of directions, made from a distribution of normals and its widths.
+    """Masking and shadowing G of a pair of directions, for a distribution of normals and its widths.
 
     The first line of a member's docstring is its title in the manual.
 
     smith  whether G follows from the distribution's slopes, as Smith's does; False: it sets in as slowly as a rational
-           function of the cosine. Tables of what single scattering misses choose their axes by it
+           function of the cosine. The axes of energy-compensation tables depend on it
     """
 
     name: ClassVar[str] = ""
@@ -39,11 +39,11 @@ class Masking(Part):
         raise self.lacks("no `reflected`", "reflected(self, ndf, wo, wi, m, alpha)")
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G of two directions on opposite sides, m the normal that refracts one into the other; here as `reflected`."""
+        """G of directions on opposite sides, m the refracting normal; by default as `reflected`."""
         return self.reflected(ndf, wo, wi, m, alpha)
 
     def onset(self, alpha: Scalar) -> Scalar:
-        """The cosine about which masking sets in, at an isotropic width; Smith's is alpha."""
+        """The cosine at which masking sets in for an isotropic width; alpha for Smith's."""
         return alpha
 
 
@@ -51,7 +51,7 @@ Masking.family = Family("masking term", "gonio.maskings", (__package__,), instan
 
 
 def term(name: str) -> Masking:
-    """The masking term of that name; InputError where there is none."""
+    """The masking term of that name; raises InputError if there is none."""
     return Masking.family.get(name)
 
 
@@ -59,13 +59,13 @@ def term(name: str) -> Masking:
 def masking_shadowing(
     kind: str, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair, transmits: bool = False
 ) -> Scalar:
-    """Masking and shadowing G, by name; 0 where wo or wi sees the facet from its back.
+    """Masking and shadowing G, by name; 0 if wo or wi sees the facet's back side.
 
     m          the facet's normal, m.z > 0
-    transmits  wi lies on the other side of the surface than wo
+    transmits  whether wi and wo lie on opposite sides of the surface
     """
     chosen = term(kind)
     g = (chosen.transmitted if transmits else chosen.reflected)(ndf, wo, wi, m, alpha)
-    # v.m and v.n must agree in sign, or the facet is seen through the surface
+    # v.m and v.n must have the same sign, or the facet would be seen through the surface
     visible = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
     return where(visible, g, 0.0)

@@ -1,4 +1,4 @@
-"""Schlick's rational form of Smith's masking, for analytic lights."""
+"""Schlick's rational form of Smith's masking, for punctual lights."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .schlick_ibl import SchlickIBL
 class SchlickDirect(SchlickIBL):
     """Schlick-Smith, k = (roughness + 1)^2 / 8 (Karis2013).
 
-    G does not tend to 1 as alpha -> 0: made for point lights and plain shading, not for compensation.
+    G does not tend to 1 as alpha -> 0: intended for point lights and plain shading, not for compensation.
     """
 
     name = "schlick-direct"

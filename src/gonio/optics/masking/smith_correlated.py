@@ -1,4 +1,4 @@
-"""Smith's masking with correlated heights."""
+"""Smith's height-correlated masking."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .base import Masking
 class SmithCorrelated(Masking):
     """Smith with correlated heights (Heitz2014).
 
-    Masking and shadowing share the facet's height. A ray that leaves through the other side needs the facet to be low
-    where the first needs it to be high: transmission is Euler's beta function, not 1 / (1 + L(wo) + L(wi)).
+    Masking and shadowing depend on the same facet height. A ray that leaves through the other side needs a low facet
+    where the first ray needs a high one: transmission is Euler's beta function, not 1 / (1 + L(wo) + L(wi)).
     """
 
     name = "smith-correlated"

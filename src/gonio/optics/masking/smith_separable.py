@@ -1,4 +1,4 @@
-"""Smith's separable masking, as it is customarily computed."""
+"""Smith's separable masking in its customary form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .base import Masking
 class SmithSeparable(Masking):
     """Smith G1 G1 (Walter2007); Beckmann by its rational fit.
 
-    The course sheet's and Mitsuba's: G1 is the distribution's customary one, for Beckmann eq. 8 of the sheet.
+    As in the course sheet and Mitsuba: G1 is the distribution's customary form, for Beckmann eq. 8 of the sheet.
     """
 
     name = "smith-separable"

@@ -1,4 +1,4 @@
-"""Smith's separable masking by the exact Lambda."""
+"""Smith's separable masking with the exact Lambda."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Distributions of microfacet normals. One is a file in this folder: discovery finds it."""
+"""Distributions of microfacet normals. Each is one file in this folder."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ def distributions() -> dict[str, NDF]:
 
 
 def distribution(name: str) -> NDF:
-    """The distribution of that name; InputError where there is none."""
+    """The distribution of that name; raises InputError if there is none."""
     return NDF.family.get(name)

@@ -1,4 +1,4 @@
-"""What every distribution of normals offers: `NDF`, and `Stretched` for those that are one surface of width 1."""
+"""The base of all distributions of normals, `NDF`, and `Stretched` for stretch-invariant ones."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ from . import tabulated
 class NDF(Part):
     """Distribution of microfacet normals with widths alpha = (alpha_x, alpha_y).
 
-    A member must give `D`; a member that is one surface, stretched, derives from `Stretched`. Without closed forms
-    `Lambda`, `sample` and visible normals come from tables that are found from D once (`tabulated`), 1 + Lambda within
-    1e-4. They hold for a D that at equal widths looks the same from all sides; at unequal ones it must be the
-    stretched surface, or ignore alpha.y. All methods take unit vectors of the local frame. m lies above the surface
-    (m.z > 0); a direction v may lie on either side, Smith's terms depend on |v.z|. The first line of a member's
-    docstring is its title in the manual.
+    A member must define `D`; a member that is one surface, stretched by alpha, derives from `Stretched`. Without closed
+    forms, `Lambda`, `sample` and visible normals come from tables computed once from D (`tabulated`), 1 + Lambda within
+    1e-4. The tables require a D that is isotropic at equal widths, and at unequal widths either is the stretched
+    surface or ignores alpha.y. All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a
+    direction v may lie on either side, Smith's terms depend on |v.z|. The first line of a member's docstring is its
+    title in the manual.
 
-    long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that something is masked at any angle
-                 (GGX); False: a few alpha from grazing nothing is. Tables of what single scattering misses choose their
-                 axes by it, and err by 1e-4; with the wrong one by 2e-3 (long) to 8e-3
+    long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that masking is noticeable at all
+                 angles (GGX); False: it is confined to within a few alpha of grazing. The axes of energy-compensation
+                 tables depend on it: their error is 1e-4, with the wrong choice 2e-3 (long) to 8e-3
     """
 
     name: ClassVar[str] = ""
@@ -61,9 +61,9 @@ class NDF(Part):
         return "" if type(self).D is not NDF.D else "D(self, m, alpha)"
 
     def check_widths(self, alpha: object, where: str = "alpha") -> None:
-        """Raise InputError for widths as a user gives them, (alpha_x, alpha_y), that Lambda or `sample` cannot have.
+        """Raise InputError for user-given widths, (alpha_x, alpha_y), that Lambda or `sample` does not support.
 
-        Where these are tabulated, the tables are found here, before a loop of Dr.Jit's is recorded.
+        If these are tabulated, the tables are computed here, before Dr.Jit records a loop.
         """
         if not (self.tabulated or self._tabulates_area):
             return
@@ -75,36 +75,36 @@ class NDF(Part):
             what = (
                 f"two widths, at which D of {type(self).__name__} is neither one surface stretched nor free of alpha.y"
             )
-            hint = f"give one, or write Lambda(self, v, alpha) and sample(self, u1, u2, alpha); see {GUIDE}"
+            hint = f"give one width, or write Lambda(self, v, alpha) and sample(self, u1, u2, alpha); see {GUIDE}"
             raise InputError(what, where, hint)
 
     def D(self, m: Direction, alpha: Pair) -> Scalar:
-        """Density of normals, 1/sr: its integral over D(m) m.z is 1."""
+        """Density of normals, 1/sr: the integral of D(m) m.z is 1."""
         raise self.lacks("no `D`", "D(self, m, alpha)")
 
     @function
     def sample(self, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal with density D(m) m.z; by a table of the inverse of its integral where no closed form is given."""
+        """A normal with density D(m) m.z; from a table of the inverse of its integral if there is no closed form."""
         s, c = sincos((2.0 * ops.pi) * u2)
         return self._sloped(tabulated.ALL, u1, c, s, alpha)
 
     def pdf(self, m: Direction, alpha: Pair) -> Scalar:
-        """Density of `sample`, D(m) m.z."""
+        """Density of `sample`: D(m) m.z."""
         return self.D(m, alpha) * maximum(m.z, 0.0)
 
     # ------------------------------------------------------------------ Smith's terms
 
     @function
     def Lambda(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's Lambda, masked over visible projected area (Heitz2014); by a table where no closed form is given."""
-        return self._area_seen(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
+        """Smith's Lambda, masked over visible projected area (Heitz2014); from a table if there is no closed form."""
+        return self._visible_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
-    def _area_seen(self, v: Direction, alpha: Pair) -> Scalar:
-        """Area of the facets that face v, seen from there, from a table; never less than the surface's."""
+    def _visible_area(self, v: Direction, alpha: Pair) -> Scalar:
+        """Projected area of the facets that face v, from a table; never less than the surface's."""
         tables = tabulated.tables_of(self)
-        seen = stretch(v, tables.pair(alpha))
-        length = norm(seen)
-        level2 = seen.x * seen.x + seen.y * seen.y
+        stretched = stretch(v, tables.pair(alpha))
+        length = norm(stretched)
+        level2 = stretched.x * stretched.x + stretched.y * stretched.y
         place = safe_sqrt(level2 / (length * (length + abs(v.z))))
         area = length * tables.read(tabulated.AREA, alpha, place)
         return maximum(area, abs(v.z))
@@ -114,19 +114,19 @@ class NDF(Part):
         return 1.0 / (1.0 + self.Lambda(v, alpha))
 
     def G1_customary(self, v: Direction, alpha: Pair) -> Scalar:
-        """G1 as `smith-separable` means it; the exact one unless the field customarily uses a fit."""
+        """The G1 of `smith-separable`: exact, unless the field customarily uses a fit."""
         return self.G1(v, alpha)
 
-    # ------------------------------------------------------------------ normals as a direction sees them
+    # ------------------------------------------------------------------ visible normals
 
     @property
     def tabulated(self) -> bool:
-        """Whether normals are drawn by tables found from D: no `sample` is given."""
+        """Whether normals are sampled by tables computed from D, because there is no `sample`."""
         return type(self).sample is NDF.sample
 
     @property
     def falls_slowly(self) -> bool:
-        """`long_tailed`, or what the table says where Lambda is tabulated."""
+        """`long_tailed`, or what the table shows if Lambda is tabulated."""
         return self.long_tailed or (self._tabulates_area and tabulated.tables_of(self).long_tailed)
 
     @property
@@ -134,31 +134,31 @@ class NDF(Part):
         return type(self).Lambda is NDF.Lambda
 
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal as v (v.z >= 0) sees them, from tables; where a `sample` is given without this, all normals
-        instead."""
+        """A normal visible from v (v.z >= 0), from tables; if `sample` is defined but not this method, one of all
+        normals."""
         return self._visible(v, u1, u2, alpha) if self.tabulated else self.sample(u1, u2, alpha)
 
     @function
     def _visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal as v sees them, by v.m = v.z m.z + v_h.m_h with h the part along the surface.
+        """A visible normal, by v.m = v.z m.z + v_h.m_h with h the component along the surface.
 
-        A share of the samples has the density D m.z, the others D max(0, v_h.m_h), as a grazing direction sees them.
-        Where v_h.m_h < 0 that is more than v sees, so that up to a sixth of the samples fail.
+        A fraction of the samples has the density D m.z, the others D max(0, v_h.m_h), the limit at grazing v. Where
+        v_h.m_h < 0 this exceeds the visible area, so that up to a sixth of the samples fail.
         """
-        seen = stretch(v, tabulated.tables_of(self).pair(alpha))
-        level = safe_sqrt(seen.x * seen.x + seen.y * seen.y)
+        stretched = stretch(v, tabulated.tables_of(self).pair(alpha))
+        level = safe_sqrt(stretched.x * stretched.x + stretched.y * stretched.y)
         share = 0.5 * level / (v.z + 0.5 * level)
         grazing = u1 < share
         u1 = where(grazing, safe_div(u1, share), safe_div(u1 - share, 1.0 - share))
         s, c = sincos((2.0 * ops.pi) * u2)
         across = 2.0 * u2 - 1.0
         toward = safe_sqrt(1.0 - across * across)
-        x, y = safe_div(seen.x, level), safe_div(seen.y, level)
+        x, y = safe_div(stretched.x, level), safe_div(stretched.y, level)
         steep = self._sloped(tabulated.GRAZING, u1, x * toward - y * across, y * toward + x * across, alpha)
         return where(grazing, steep, self._sloped(tabulated.ALL, u1, c, s, alpha))
 
     def _sloped(self, column: int, u: Scalar, c: Scalar, s: Scalar, alpha: Pair) -> Direction:
-        """The normal in the azimuth (c, s) of the unstretched surface whose slope a share u stays below."""
+        """The normal in the azimuth (c, s) of the unstretched surface whose slope is the quantile u."""
         tables = tabulated.tables_of(self)
         low, high = safe_sqrt(u), safe_sqrt(1.0 - u)
         tau = tables.read(column, alpha, low / (low + high))
@@ -178,14 +178,14 @@ class NDF(Part):
     @function
     def _visible_pdf(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
         """Density of `_visible`."""
-        seen = stretch(v, tabulated.tables_of(self).pair(alpha))
-        level = safe_sqrt(seen.x * seen.x + seen.y * seen.y)
+        stretched = stretch(v, tabulated.tables_of(self).pair(alpha))
+        level = safe_sqrt(stretched.x * stretched.x + stretched.y * stretched.y)
         upward = where(v.z < 0.0, -1.0, 1.0)
         facing = abs(v.z) * m.z + maximum(upward * (v.x * m.x + v.y * m.y), 0.0)
         return where(m.z > 0.0, self.D(m, alpha) * facing / (abs(v.z) + 0.5 * level), 0.0)
 
     def sample_bounded(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A visible normal whose reflection is less likely to fall below the surface; else `sample_visible`."""
+        """A visible normal whose reflection is less likely to fall below the surface; by default `sample_visible`."""
         return self.sample_visible(v, u1, u2, alpha)
 
     def bounded_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
@@ -203,12 +203,12 @@ def stretch(w: Direction, alpha: Pair) -> Direction:
 
 
 class Stretched(NDF):
-    """An isotropic surface of width 1, whose slopes alpha multiplies along x and y (Heitz2014, sec. 5.3).
+    """A stretch-invariant distribution: a surface of width 1, its slopes scaled by alpha (Heitz2014, sec. 5.3).
 
-    A member describes the surface of width 1, by `density` and, where there are closed forms, `area`, `slope` and
-    `visible_normal`; without, tables serve as for any `NDF`.
-    `density` and `area` are asked of vectors of any length: with D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm they
-    are homogeneous, of degree -4 and 1, so a linear map is all that stretching is, without a Jacobian.
+    A member describes the surface of width 1 by `density` and, if there are closed forms, `area`, `slope` and
+    `visible_normal`; otherwise tables serve as for any `NDF`. `density` and `area` are called with vectors of any
+    length: with D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm they are homogeneous of degree -4 and 1, so stretching
+    is a linear map without a Jacobian.
     """
 
     name: ClassVar[str] = ""
@@ -233,11 +233,11 @@ class Stretched(NDF):
         raise self.lacks("no `area`", "area(self, v)")
 
     def slope(self, u: Scalar) -> Scalar:
-        """The length of slope, at width 1, that a share u of the surface stays below."""
+        """The length of slope, at width 1, below which a fraction u of the surface lies."""
         raise self.lacks("no `slope`", "slope(self, u)")
 
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """A normal at width 1, of any length, as v (unit, v.z >= 0) sees them; optional."""
+        """A visible normal at width 1, of any length, from v (unit, v.z >= 0); optional."""
         raise NotImplementedError
 
     @property
@@ -249,29 +249,29 @@ class Stretched(NDF):
         return type(self).Lambda is Stretched.Lambda and type(self).area is Stretched.area
 
     @property
-    def _sees(self) -> bool:
+    def _has_visible(self) -> bool:
         return type(self).visible_normal is not Stretched.visible_normal
 
     @function
     def D(self, m: Direction, alpha: Pair) -> Scalar:
-        """Density of normals, 1/sr: that of the normal on the surface of width 1."""
+        """Density of normals, 1/sr, from that of the surface of width 1."""
         over = 1.0 / (alpha.x * alpha.y)
         n = vec3(m.x * (alpha.y * over), m.y * (alpha.x * over), m.z)
         return where(m.z > 0.0, self.density(n) * over, 0.0)
 
     @function
     def projected_area(self, v: Direction, alpha: Pair) -> Scalar:
-        """Area of the facets that face v, seen from there: int D(m) max(0, v.m) dm = |v.z| (1 + Lambda) (Heitz2014)."""
-        return self._area_seen(v, alpha) if self._tabulates_area else self.area(stretch(v, alpha))
+        """Projected area of the facets that face v: int D(m) max(0, v.m) dm = |v.z| (1 + Lambda) (Heitz2014)."""
+        return self._visible_area(v, alpha) if self._tabulates_area else self.area(stretch(v, alpha))
 
     @function
     def Lambda(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's Lambda: masked over visible projected area (Heitz2014); at the normal 0, rounded either way."""
+        """Smith's Lambda: masked over visible projected area (Heitz2014); 0 at the normal, within rounding."""
         return self.projected_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
     @function
     def G1(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's masking of one direction, 1 / (1 + Lambda): visible over all area that faces v."""
+        """Smith's masking of one direction, 1 / (1 + Lambda): visible area over all area that faces v."""
         return abs(v.z) / self.projected_area(v, alpha)
 
     @function
@@ -285,14 +285,14 @@ class Stretched(NDF):
 
     @function
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A visible normal: what the stretched v sees on the surface of width 1, stretched (Heitz2014b)."""
-        if not self._sees:
+        """A visible normal: sampled for the stretched v on the surface of width 1, then stretched (Heitz2014b)."""
+        if not self._has_visible:
             return super().sample_visible(v, u1, u2, alpha)
         return normalize(stretch(self.visible_normal(normalize(stretch(v, alpha)), u1, u2), alpha))
 
     @function
     def visible_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
         """Density of visible normals over |v.m|: D over the area that v sees (Heitz2014b), finite at grazing."""
-        if not self._sees:
+        if not self._has_visible:
             return super().visible_per_cosine(v, m, alpha)
         return self.D(m, alpha) / self.projected_area(v, alpha)

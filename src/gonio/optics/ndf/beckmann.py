@@ -27,7 +27,7 @@ from ..frame import sin2
 from ..special import SQRT_PI, erfinv, gaussian_ramp
 from .base import Stretched, stretch
 
-B_LIMIT = 0.99999988  # the last float32 but one below 1
+B_LIMIT = 0.99999988  # the second-largest float32 below 1
 
 
 class Beckmann(Stretched):
@@ -42,7 +42,7 @@ class Beckmann(Stretched):
     @function
     def density(self, n: Direction) -> Scalar:
         """exp(-tan^2) / (pi n_z^4)."""
-        # beyond tan^2 = 1000 exp is 0 in float64 too, while n_z^4 leaves float32
+        # beyond tan^2 = 1000 exp is 0 even in float64, while n_z^4 underflows float32
         over = 1.0 / maximum(sqr(n.z), 1e-3 * sin2(n))
         return exp(-sin2(n) * over) * sqr(over) * ops.inv_pi
 
@@ -66,10 +66,10 @@ class Beckmann(Stretched):
 
     @function
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """Slopes of the unit Gaussian as v sees them (Heitz2014b, sec. 3 and 5).
+        """Visible slopes of the unit Gaussian (Heitz2014b, sec. 3 and 5).
 
-        Along v the slope x has the cumulated density c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
-        x = cot, which is inverted from a guess by two steps, first in b = erf x (Jakob2014): met to 5e-8. Across v the
+        Along v the slope x has the cumulative density c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
+        x = cot. It is inverted to 5e-8 from a guess by two steps, the first in b = erf x (Jakob2014). Across v the
         slope is Gaussian.
         """
         sin_v, cos_v = sqrt(sin2(v)), maximum(v.z, 1e-6)
@@ -82,19 +82,19 @@ class Beckmann(Stretched):
         cot = minimum(1.0 / maximum(tan_v, 1e-6), 4.0)
         b_high, b_low = erf(cot), -B_LIMIT
         target = u1 * (0.5 * (1.0 + b_high) + tan_v * exp(-sqr(cot)) * (0.5 / SQRT_PI))
-        # where the root lies, to a few percent: Jakob2014's fit in the angle of incidence
+        # approximate root, to a few percent: Jakob2014's fit in the angle of incidence
         theta = atan2(sin_v, cos_v)
         exponent = 1.0 + theta * (-0.876 + theta * (0.4265 - 0.0594 * theta))
         b = clamp(b_high - (1.0 + b_high) * pow(1.0 - u1, exponent), b_low, b_high)
 
-        # Halley's step in b, in which c has the derivatives (1 - x tan) / 2 and -tan sqrt(pi) exp(x^2) / 4
+        # Halley's step in b, where c has the derivatives (1 - x tan) / 2 and -tan sqrt(pi) exp(x^2) / 4
         x = erfinv(b)
         gauss, facing = exp(-sqr(x)), 1.0 - x * tan_v
         move = (0.5 * (1.0 + b) + tan_v * gauss * (0.5 / SQRT_PI) - target) / maximum(0.5 * facing, 1e-4)
         curvature = -0.25 * SQRT_PI * tan_v / maximum(gauss, 1e-12)
         b = clamp(b - move / clamp(1.0 - move * curvature / maximum(facing, 2e-4), 0.5, 2.0), b_low, b_high)
 
-        # Newton's step in x, as erf x is known to be b; far in the tail and at the cot, where c is flat, it is rounding
+        # Newton's step in x with erf x = b; far in the tail and at the cotangent, where c is flat, it is rounding
         x = erfinv(b)
         gauss = exp(-sqr(x)) * (1.0 / SQRT_PI)
         facing = 1.0 - x * tan_v
@@ -105,6 +105,6 @@ class Beckmann(Stretched):
 
 
 def _sine_and_cotangent(v: Direction) -> tuple[Scalar, Scalar]:
-    """(sin times |v|, |cot|) of a vector of any length; at the normal the cotangent ends at 1e9."""
+    """(sin times |v|, |cot|) of a vector of any length; the cotangent is limited to 1e9 at the normal."""
     sin = sqrt(maximum(sin2(v), 1e-18))
     return sin, abs(v.z) / sin

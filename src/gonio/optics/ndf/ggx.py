@@ -29,7 +29,7 @@ class GGX(Stretched):
     """GGX (Trowbridge-Reitz).
 
     D = 1 / (pi alpha_x alpha_y (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2 + m_z^2)^2) (Heitz2014; isotropic: Walter2007,
-    eq. 33). At width 1 it is a hemisphere: every normal is as frequent as any other.
+    eq. 33). At width 1 it is a hemisphere: all normals are equally frequent.
     """
 
     name = "ggx"
@@ -37,7 +37,7 @@ class GGX(Stretched):
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi |n|^4): a hemisphere's. From all three components: of n_z alone it would cancel at the peak."""
+        """1 / (pi |n|^4), a hemisphere's, from all three components: with n_z alone it would cancel at the peak."""
         return ops.inv_pi / sqr(dot(n, n))
 
     @function
@@ -52,17 +52,17 @@ class GGX(Stretched):
 
     @function
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """The half vector with a uniform point of a spherical cap (Dupuy2023)."""
+        """The half vector with a uniformly distributed point of a spherical cap (Dupuy2023)."""
         return self._from_cap(v, v.z, u1, u2)
 
     def _from_cap(self, v: Direction, depth: Scalar, u1: Scalar, u2: Scalar) -> Direction:
-        # the cap reaches down to z = -depth; heights are counted from there, so that nothing cancels at its rim
+        # the cap reaches down to z = -depth; heights are measured from there, so that nothing cancels at its rim
         height = 1.0 + depth
         lift = (1.0 - u2) * height
         r = safe_sqrt((height - lift) * (1.0 - depth + lift))
         phi = (2.0 * ops.pi) * u1
         s, c = sincos(phi)
-        # grazing view and the lowest point of the cap add up to zero length; any facet upright then
+        # at a grazing view and the lowest point of the cap the sum has length 0; any facet with z > 0 will do
         return vec3(r * c + v.x, r * s + v.y, maximum(lift + (v.z - depth), 1e-12))
 
     @function
@@ -73,13 +73,13 @@ class GGX(Stretched):
 
     @function
     def bounded_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of `sample_bounded` over |v.m|: D over the area that the part of the cap shows (Eto2023)."""
+        """Density of `sample_bounded` over |v.m|: D over the area of this part of the cap (Eto2023)."""
         stretched = stretch(v, alpha)
         depth = self._bound(v, alpha) * abs(v.z)
         return self.D(m, alpha) / (0.5 * (depth + norm(stretched)))
 
     def _bound(self, v: Direction, alpha: Pair) -> Scalar:
-        """k: how far the cap reaches down, as a share of the full depth (Eto2023)."""
+        """k: how far the cap extends downward, relative to its full depth (Eto2023)."""
         a2 = sqr(clamp(minimum(alpha.x, alpha.y), 0.0, 1.0))
         reach2 = sqr(1.0 + sqrt(sin2(v)))
         return (1.0 - a2) * reach2 / (reach2 + a2 * sqr(v.z))

@@ -12,14 +12,14 @@ class StudentT(Stretched):
     """Student-T with gamma = 3: a tail between GGX (gamma = 2) and Beckmann (gamma -> infinity).
 
     D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017). At
-    gamma = 3 all is algebraic.
+    gamma = 3 all formulas are algebraic.
     """
 
     name = "student-t"
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), multiplied through by n_z^6: nothing vanishes at grazing."""
+        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), expanded by n_z^6 so that nothing vanishes at grazing."""
         z2 = sqr(n.z)
         spread = z2 + 0.5 * sin2(n)
         return ops.inv_pi * z2 / (spread * sqr(spread))
@@ -30,7 +30,7 @@ class StudentT(Stretched):
 
         Smith's int_cot^inf (x cot^-1 - 1) P(x) dx, P(x) = 3 / (4 s) (1 + x^2 / s^2)^(-5/2) with s^2 = 2 the density of
         slopes along v: Lambda = c^3 / (4 t) - 1/2 + 3/4 (t c - (t c)^3 / 3) for t = cot / s and c = 1 / sqrt(1 + t^2),
-        which is |v.z| / h = t c put into the above.
+        which is |v.z| / h = t c substituted into the above.
         """
         z = abs(v.z)
         h = sqrt(sqr(z) + 2.0 * sin2(v))

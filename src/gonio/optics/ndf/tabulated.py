@@ -1,17 +1,17 @@
-"""What follows from D alone: Smith's Lambda and samples of the normals, from tables that are found once.
+"""Smith's Lambda and samples of normals from D alone, by tables that are computed once.
 
-With the length of slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the share of the surface with such a
+With the length of slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with such a
 slope. A direction v sees the area
 
     int D(m) max(0, v.m) dm = int P(s) a(s) ds,   a(s) = int max(0, |v.z| + s sin theta_v cos phi) dphi / (2 pi),
 
 with a in closed form, so one quadrature over s is enough (trapezoidal in log s; Heitz2014, sec. 3 and 4). Slopes are
-counted in units of w, twice the area that a grazing direction sees: of GGX that is alpha. The area over |v'|, with
+measured in units of w, twice the area that a grazing direction sees; for GGX, w = alpha. The area over |v'|, with
 v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes 1 + Lambda is
-within 1e-5 of the closed forms of GGX, Beckmann and Student-T, and within 1e-4 where the shape changes with the width,
-as GTR's does.
+within 1e-5 of the closed forms of GGX, Beckmann and Student-T, and within 1e-4 for distributions whose shape depends on
+the width, such as GTR.
 
-Normals are drawn by tables of the inverse of int P ds, and of int s P ds for the slopes that a grazing direction sees.
+Normals are sampled by tables of the inverse of int P ds, and of int s P ds for the slopes seen at grazing angles.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ Floats: TypeAlias = NDArray[np.float64]
 Density: TypeAlias = Callable[[Floats, Floats], Floats]
 
 NODES = 256  # of the projected area over v'.z / |v'|, and of the inverse functions
-ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; those at which w is kept
-LEAST, STEEPEST = 0.1, 1e6  # fourth root of the smallest width; largest slope: beyond, D / 1e6 is left of the area
+ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; finer steps, at which w is stored
+MIN_ROOT, MAX_SLOPE = 0.1, 1e6  # fourth root of the smallest width; slopes beyond have a share of D / 1e6 of the area
 STEP, LOWEST, HIGHEST = 0.01, -16.0, 30.0  # of log s
-SAME = 1e-4  # share of the surface on which two densities may differ and count as one
-PAIRS = ((0.1, 0.4), (0.6, 0.2), (0.05, 0.9))  # unequal widths at which D is looked at
-AZIMUTHS = np.arange(7) * (2.0 * np.pi / 7.0) + 0.35  # no multiples of a quarter turn, at which lobes may be alike
+SAME = 1e-4  # fraction of the surface on which two equal densities may differ
+PAIRS = ((0.1, 0.4), (0.6, 0.2), (0.05, 0.9))  # unequal widths at which D is tested
+AZIMUTHS = np.arange(7) * (2.0 * np.pi / 7.0) + 0.35  # not multiples of 90 degrees, at which lobes may be equal
 AREA, ALL, GRAZING = range(3)  # columns
 
 
 class Tables(NamedTuple):
-    """What is found from D, once for all widths.
+    """The tables of a distribution, for all widths.
 
-    values   over (fourth root of the width, node), or over nodes alone where all widths are one surface, stretched:
-             the area over |v'|; tau = s / (1 + s), s in units of w, by g(share of the normals), and by g(share of the
-             area that a grazing direction sees). g(u) = sqrt(u) / (sqrt(u) + sqrt(1 - u)) spreads both ends
-    scale    w / alpha, over the same widths; a plain number where it is one for all
-    widths   what two widths mean: "stretched" along x and y, "first" where alpha_y is ignored, "equal" where nothing
-             else is known
+    values   over (fourth root of the width, node), or over nodes only if all widths are one stretched surface: the
+             area over |v'|; tau = s / (1 + s), s in units of w, by g(fraction of the normals), and by g(fraction of
+             the area that a grazing direction sees). g(u) = sqrt(u) / (sqrt(u) + sqrt(1 - u)) refines both ends
+    scale    w / alpha, over the same widths; a plain number if it is constant
+    widths   the meaning of two widths: "stretched" along x and y, "first" if alpha_y is ignored, "equal" if neither
+             holds
     """
 
     values: Table
@@ -66,27 +66,27 @@ class Tables(NamedTuple):
     def read(self, column: int, alpha: Pair, x: Scalar) -> Scalar:
         """A column of `values` at x in [0, 1]."""
         along = inset(x, NODES)
-        found = (
+        columns = (
             lookup(self.values, along)
             if len(self.values.shape) == 1
             else lookup(self.values, _row_of(alpha, ROWS), along)
         )
-        return found[column]
+        return columns[column]
 
     @property
     def long_tailed(self) -> bool:
-        """Whether Lambda falls off so slowly that it is seen near the normal: where 0.8 % of the area is masked of
-        GGX's slopes, of Gaussian ones it is 1e-6, of Student-T's with gamma = 3 1e-3."""
+        """Whether Lambda falls off so slowly that it is noticeable near the normal. At the tested angle 0.8 % of the
+        area is masked for GGX, 1e-6 for Gaussian slopes, 1e-3 for Student-T with gamma = 3."""
         near = self.values.values[..., AREA].reshape(-1, NODES)[:, NODES // 8]
         return bool(np.median(near) - (1.0 - (NODES // 8 / (NODES - 1.0)) ** 2) > 4e-3)
 
 
 def _row_of(alpha: Pair, count: int) -> Scalar:
-    return inset((sqrt(sqrt(alpha.x)) - LEAST) * (1.0 / (1.0 - LEAST)), count)
+    return inset((sqrt(sqrt(alpha.x)) - MIN_ROOT) * (1.0 / (1.0 - MIN_ROOT)), count)
 
 
 class HasDensity(Protocol):
-    """What the tables are found from: a distribution of which D alone is written."""
+    """The input of the tables: a distribution with D."""
 
     name: ClassVar[str]
 
@@ -100,16 +100,16 @@ class HasDensity(Protocol):
 
 
 def tables_of(ndf: HasDensity) -> Tables:
-    """The tables of a distribution, found when they are first asked for and kept with its class, so that they are gone
-    when a user's file is run anew. InputError where D is not finite, or has no symmetry that they can have."""
+    """The tables of a distribution. They are computed on first use and stored in its class, so that they are discarded
+    when a user's file is run again. Raises InputError if D is not finite or lacks the required symmetry."""
     cls = type(ndf)
     if "_tables" not in vars(cls):
         cls._tables = {}  # type: ignore[attr-defined]
-    kept: dict[object, Tables] = vars(cls)["_tables"]
+    tables: dict[object, Tables] = vars(cls)["_tables"]
     key = tuple((name, _hashable(value)) for name, value in sorted(vars(ndf).items()))
-    if key not in kept:
-        kept[key] = _found(ndf)
-    return kept[key]
+    if key not in tables:
+        tables[key] = _build(ndf)
+    return tables[key]
 
 
 def _hashable(value: object) -> object:
@@ -125,27 +125,27 @@ class _Row(NamedTuple):
 
     width   alpha
     w       unit of its slopes
-    shares  of the surface by log(s / w), which sum to 1
-    whole   int D(m) m.z dm, which should be 1
+    shares  fractions of the surface by log(s / w), with sum 1
+    area    int D(m) m.z dm, which should be 1
     """
 
     width: float
     w: float
     shares: Floats
-    whole: float
+    area: float
 
 
-def _found(ndf: HasDensity) -> Tables:
+def _build(ndf: HasDensity) -> Tables:
     density = _density(ndf)
     log_s = np.arange(LOWEST, HIGHEST, STEP)
-    widths = np.linspace(LEAST, 1.0, ROWS) ** 4
+    widths = np.linspace(MIN_ROOT, 1.0, ROWS) ** 4
     rows = [row for width in widths if (row := _row(density, float(width), log_s)) is not None]
     if not rows:
         what = f"D of {type(ndf).__name__} is not finite, or negative, or 0, at every width"
-        raise InputError(what, ndf.place("D"), "int D(m) m.z dm = 1 over the normals above the surface")
+        raise InputError(what, ndf.place("D"), "int D(m) m.z dm over the upper hemisphere must be 1")
     middle = rows[len(rows) // 2]
-    if abs(middle.whole - 1.0) > 1e-3:
-        text = f"int D(m) m.z dm is {middle.whole:.4g} at alpha = {middle.width:.3g} where 1 is expected"
+    if abs(middle.area - 1.0) > 1e-3:
+        text = f"int D(m) m.z dm is {middle.area:.4g} at alpha = {middle.width:.3g} where 1 is expected"
         warnings.warn(f"{ndf.place('D')}: {text}", GonioWarning, stacklevel=3)
     kind = _meaning(ndf, density, [row.width for row in rows[:: max(len(rows) // 4, 1)]])
     scale = middle.w / middle.width
@@ -153,12 +153,14 @@ def _found(ndf: HasDensity) -> Tables:
     stem = ndf.name or type(ndf).__name__
     if alike and all(abs(row.w / row.width - scale) < SAME * scale for row in rows):
         return Tables(Table(f"normals_{stem}", _columns(middle.shares[None], log_s)[0]), scale, kind)
-    # a width at which D has a gap, such as (alpha^2 - 1) / log(alpha^2) at 1, has its neighbour's shape
+    # a width at which D has a gap, such as (alpha^2 - 1) / log(alpha^2) at 1, uses the shape of the nearest width
     shares = np.stack([min(rows, key=lambda row: abs(row.width - width)).shares for width in widths])
-    from scipy.interpolate import CubicSpline  # slow to import, and needed by few
+    from scipy.interpolate import CubicSpline  # slow to import and rarely needed
 
     logs = CubicSpline(np.log([row.width for row in rows]), np.log([row.w / row.width for row in rows]))
-    fine = np.exp(logs(np.log(np.clip(np.linspace(LEAST, 1.0, FINE) ** 4, 0.9 * rows[0].width, 1.1 * rows[-1].width))))
+    fine = np.exp(
+        logs(np.log(np.clip(np.linspace(MIN_ROOT, 1.0, FINE) ** 4, 0.9 * rows[0].width, 1.1 * rows[-1].width)))
+    )
     return Tables(Table(f"normals_{stem}", _columns(shares, log_s)), Table(f"widths_{stem}", fine[:, None]), kind)
 
 
@@ -168,13 +170,13 @@ def _columns(shares: Floats, log_s: Floats) -> Floats:
 
 
 def _density(ndf: HasDensity) -> Density:
-    """D on NumPy arrays, (3, N) and (2, N), in float64: from its recording, so that a loop of Dr.Jit's or a shader that
-    is being recorded may ask for the tables."""
+    """D on NumPy arrays, (3, N) and (2, N), in float64: evaluated from its recording, so that the tables are available
+    while a Dr.Jit loop or a shader is recorded."""
     try:
         graph = ops.record(lambda m, alpha: ndf.D(m, alpha), m="vec3", alpha="vec2", name="D")
     except Exception as error:
         what = f"no Lambda from D of {type(ndf).__name__}: {summary(error)}"
-        hint = "write D in the words of gonio.ops, or Lambda(self, v, alpha) and sample(self, u1, u2, alpha) too"
+        hint = "write D with the functions of gonio.ops, or add Lambda(self, v, alpha) and sample(self, u1, u2, alpha)"
         raise InputError(what, user_line(error) or ndf.place("D"), hint) from error
     return lambda m, alpha: np.broadcast_to(graph.evaluate(m=m, alpha=alpha), m.shape[1:])
 
@@ -185,33 +187,33 @@ def _normals(x: Floats, y: Floats) -> Floats:
 
 
 def _shares(density: Density, alpha: tuple[float, float], s: Floats, turn: float) -> Floats:
-    """P(s) s d log s at lengths of slope, along one azimuth."""
+    """P(s) s d log s at the given slopes, along one azimuth."""
     m = _normals(s * np.cos(turn), s * np.sin(turn))
     with np.errstate(all="ignore"):
         d = density(m, np.broadcast_to(np.array(alpha)[:, None], (2, len(s))))
-    return np.where(s < STEEPEST, 2.0 * np.pi * STEP * np.square(s * m[2] * m[2]) * d, 0.0)
+    return np.where(s < MAX_SLOPE, 2.0 * np.pi * STEP * np.square(s * m[2] * m[2]) * d, 0.0)
 
 
 def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
-    """The surface of a width; None where D cannot be used there."""
+    """The surface of one width; None if D cannot be used there."""
     w = width
     for last in (False, True):
         shares = _shares(density, (width, width), w * np.exp(log_s), float(AZIMUTHS[0]))
-        whole = float(shares.sum())
-        if not np.all(np.isfinite(shares)) or shares.min() < 0.0 or whole <= 0.0:
+        area = float(shares.sum())
+        if not np.all(np.isfinite(shares)) or shares.min() < 0.0 or area <= 0.0:
             return None
         if not last:
-            w *= float(shares @ np.exp(log_s)) / whole * (2.0 / np.pi)
-    return _Row(width, w, shares / whole, whole)
+            w *= float(shares @ np.exp(log_s)) / area * (2.0 / np.pi)
+    return _Row(width, w, shares / area, area)
 
 
 def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
-    """What two widths mean to D; see `Tables`."""
+    """The meaning of two widths for D; see `Tables`."""
     s = np.exp(np.arange(-8.0, 8.0, STEP))
     for width in widths:
         along = np.stack([_shares(density, (width, width), width * s, float(turn)) for turn in AZIMUTHS])
         if np.abs(along - along[0]).sum(1).max() > SAME * along[0].sum():
-            what = f"D of {type(ndf).__name__} depends on the azimuth at equal widths: no Lambda follows from it here"
+            what = f"D of {type(ndf).__name__} depends on the azimuth at equal widths: Lambda cannot be derived from it"
             raise InputError(what, ndf.place("D"), "write Lambda(self, v, alpha) and sample(self, u1, u2, alpha)")
     unit = _shares(density, (0.5, 0.5), 0.5 * s, float(AZIMUTHS[0]))
     stretched, first = True, True
@@ -219,7 +221,7 @@ def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
         one = _shares(density, (x, x), x * s, float(AZIMUTHS[0]))
         for turn in AZIMUTHS:
             c, sin = float(np.cos(turn)), float(np.sin(turn))
-            # along that azimuth of the stretched surface a slope is longer, and an element of area larger
+            # along this azimuth of the stretched surface slopes are longer and area elements larger
             longer = np.hypot(x * c, y * sin)
             there = _shares(density, (x, y), longer * s, float(np.arctan2(y * sin, x * c))) * (x * y / longer**2)
             stretched = stretched and bool(np.abs(there - unit).sum() < SAME * unit.sum())
@@ -233,14 +235,14 @@ def _areas(shares: Floats, log_s: Floats) -> Floats:
     x = 1.0 - np.linspace(0.0, 1.0, NODES)[:, None] ** 2
     long = np.exp(log_s) * np.sqrt(1.0 - x * x)
     over = np.maximum(long, np.maximum(x, 1e-300))
-    seen = (x * np.arccos(-x / over) + np.sqrt((over - x) * (over + x))) / np.pi
-    return np.asarray(shares @ np.where(long > x, seen, x).T)
+    visible = (x * np.arccos(-x / over) + np.sqrt((over - x) * (over + x))) / np.pi
+    return np.asarray(shares @ np.where(long > x, visible, x).T)
 
 
 def _inverses(shares: Floats, log_s: Floats) -> Floats:
-    """tau of the slope that a share of the surface stays below, by g."""
+    """tau of the slope below which a fraction of the surface lies, by g."""
     tau = 1.0 / (1.0 + np.exp(-log_s))
-    found = []
+    columns = []
     for row in shares:
         middle = 0.5 * (row[1:] + row[:-1])
         middle = middle / middle.sum()
@@ -248,5 +250,5 @@ def _inverses(shares: Floats, log_s: Floats) -> Floats:
         above = np.concatenate([np.cumsum(middle[::-1])[::-1], [0.0]])
         first, last = int(np.argmax(below > 1e-12)) - 1, int(np.argmax(above < 1e-12)) + 1
         low, high = np.sqrt(below[first:last]), np.sqrt(above[first:last])
-        found.append(np.interp(np.linspace(0.0, 1.0, NODES), low / (low + high), tau[first:last]))
-    return np.stack(found)
+        columns.append(np.interp(np.linspace(0.0, 1.0, NODES), low / (low + high), tau[first:last]))
+    return np.stack(columns)

@@ -1,4 +1,4 @@
-"""What a shader language is: what tells one from another."""
+"""The base class of shader languages: their differences."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from ...members import Family, instances_of
 
 
 class Language:
-    """A shader language. What stands here is what most languages say; a language changes what it says otherwise.
+    """A shader language. The defaults are common to most languages; a subclass overrides what differs.
 
-    name, title, suffix  as users name it, its full name, and the ending of its files
-    precision            what is said of precision in the head of a shader
-    types                type of a recording -> its name in the language, where that is another
+    name, title, suffix  name for users, full name, and file suffix
+    precision            sentence about precision in the head of a shader
+    types                type of a recording -> its name in the language, if different
     words                operation -> template; {0}, {1} stand for the arguments
-    compare              operation -> template of a comparison of vectors; absent where the operators serve
-    choice               templates of `where`: of a plain mask, and of a mask of each component
-    spread               template of a float, {1}, spread over a vector type, {0}
-    mix                  the word for a value between two
-    native               functions of the vocabulary for which the language has a word of its own
-    reserved             names that the language keeps for itself
+    compare              operation -> template of a comparison of vectors; absent if the operators apply to vectors
+    choice               templates of `where`: for a scalar mask, and for a mask per component
+    spread               template of a float, {1}, converted to a vector type, {0}
+    mix                  name of linear interpolation
+    native               functions of the vocabulary that the language provides itself
+    reserved             reserved names
     overloads            whether functions of one name may differ in their types
-    parameters_change    whether a function may give a parameter a new value
-    struct_literal       whether `Name(a, b)` makes a struct inside an expression
-    templates            whether `a < b, c > d` is read as a template's arguments
+    parameters_change    whether a function may assign to a parameter
+    struct_literal       whether `Name(a, b)` constructs a struct inside an expression
+    templates            whether `a < b, c > d` is parsed as template arguments
     """
 
     family: ClassVar[Family[Language]]
@@ -60,31 +60,31 @@ class Language:
     templates: ClassVar[bool] = False
 
     def type(self, name: str) -> str:
-        """A type's name in the language."""
+        """Name of a type in the language."""
         return self.types.get(name, name)
 
     def word(self, name: str) -> str:
-        """A name that the language does not keep for itself."""
+        """A name that the language does not reserve."""
         return PREFERRED.get(name, name + "_") if name in self.reserved else name
 
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
-        """A function's head, with its opening brace; parameters are (type, name)."""
+        """The head of a function, with its opening brace; parameters are (type, name)."""
         return f"{result} {name}({', '.join(f'{type_} {p}' for type_, p in parameters)}) {{"
 
     def local(self, type_: str, name: str, text: str) -> str:
-        """A local value."""
+        """The declaration of a local value."""
         return f"{type_} {name} = {text};"
 
     def changeable(self, line: str) -> str:
-        """The line of a local value that is given another value later."""
+        """The declaration of a local value that is assigned again later."""
         return line
 
     def constant(self, name: str, text: str) -> str:
-        """A constant of the shader."""
+        """The declaration of a constant."""
         return f"const float {name} = {text};"
 
     def struct(self, name: str, fields: list[tuple[str, str]]) -> list[str]:
-        """A struct with its fields, (type, name), a line each."""
+        """The lines of a struct with fields (type, name)."""
         return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
 
     def binding(self, name: str, dimension: int, place: int) -> list[str]:
@@ -92,11 +92,11 @@ class Language:
         raise NotImplementedError(f"{type(self).__name__} has no binding")
 
     def fetch(self, table: str, places: list[str]) -> str:
-        """A texel by its place along each axis."""
+        """A texel by its index along each axis."""
         raise NotImplementedError(f"{type(self).__name__} has no fetch")
 
     def offset(self, end: int, size: int) -> int:
-        """Where a field of that many bytes begins in a uniform buffer, after what ends at `end`."""
+        """Offset of a field of `size` bytes in a uniform buffer, after data that ends at `end`."""
         return end + -end % {4: 4, 8: 8, 12: 16, 16: 16}[size]
 
 
@@ -104,7 +104,7 @@ Language.family = Family(
     "language", "gonio.languages", ["gonio.shaders.languages"], instances_of(Language), "emit: lang"
 )
 
-# what a name becomes where the language keeps it for itself
+# substitutes for names that the language reserves
 PREFERRED = {
     "log": "ln",
     "sin": "sine",

@@ -34,7 +34,7 @@ class HLSL(Language):
     name = "hlsl"
     title = "HLSL 2021 (shader model 6)"
     suffix = ".hlsl"
-    precision = "float is 32 bits: min16float will not do."
+    precision = "float has 32 bits: min16float is not enough."
     types: ClassVar[Mapping[str, str]] = {
         "vec2": "float2",
         "vec3": "float3",
@@ -63,5 +63,5 @@ class HLSL(Language):
         return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
 
     def offset(self, end: int, size: int) -> int:
-        """Packed, but no vector crosses a row of 16 bytes."""
+        """Packed, except that a vector does not cross a row of 16 bytes."""
         return end if end % 16 + size <= 16 else end + -end % 16

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from .base import Language
 
-# keywords, and the words that the specification keeps for later
+# keywords, and words that the specification reserves
 _RESERVED = """
     alias break case const const_assert continue continuing default diagnostic discard else enable false fn for
     if let loop override requires return struct switch true var while NULL Self abstract active alignas alignof
@@ -35,7 +35,7 @@ class WGSL(Language):
     name = "wgsl"
     title = "WGSL (WebGPU)"
     suffix = ".wgsl"
-    precision = "f32 throughout: f16 will not do."
+    precision = "f32 throughout: f16 is not enough."
     types: ClassVar[Mapping[str, str]] = {
         "float": "f32",
         "int": "i32",

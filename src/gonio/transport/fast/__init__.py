@@ -1,14 +1,14 @@
-"""Acceleration only. Each file does faster what `transport` does without it:
+"""Acceleration only. Each file is a faster version of something in `transport`:
 
-    inline           rays against a few simple shapes by formulas in the kernel, without Embree
-    placements       surfaces of many spheres or rectangles from one table, without a call per shape
-    lamp_table       rectangles and balls among the lamps from one table, without a call per emitter
-    rectangle_light  a single rectangle by its solid angle; the last ray of a path is a shadow ray
-    light_grid       one of several lights by the light that it sends to the cell where one is
-    by_shape         one material for thousands that differ in their numbers alone
+    inline           intersects rays with a few simple shapes in the kernel, without Embree
+    placements       computes surfaces of many spheres or rectangles from one table, without a call per shape
+    lamp_table       samples rectangles and balls among the lamps from one table, without a call per emitter
+    rectangle_light  samples a single rectangle by its solid angle; the last ray of a path is a shadow ray
+    light_grid       chooses among several lights by the light that each sends to a cell of the scene
+    by_shape         uses one material for thousands that differ in numeric parameters only
 
-With GONIO_FAST=0 in the environment nothing here is used: pictures are the same within their noise (of scenes with
-nothing to accelerate: to the bit), and slower.
+GONIO_FAST=0 in the environment disables all of it: renders are slower, and their pictures are equal within the noise
+(bit-identical for scenes with nothing to accelerate).
 """
 
 from __future__ import annotations
@@ -17,5 +17,5 @@ import os
 
 
 def enabled() -> bool:
-    """Whether scenes that are prepared from now on use the acceleration; GONIO_FAST=0 in the environment says no."""
+    """Whether newly prepared scenes use the acceleration; GONIO_FAST=0 in the environment disables it."""
     return os.environ.get("GONIO_FAST", "1") != "0"

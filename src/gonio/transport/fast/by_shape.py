@@ -1,8 +1,8 @@
-"""One material in the place of thousands that differ in their numbers alone.
+"""One material instead of thousands that differ in numeric parameters only.
 
-Dr.Jit traces every material of a scene, .2 ms each at every vertex of the program. Where many shapes have materials of
-one structure, one plugin stands for all of them, and each number in which they differ is a texture that is looked up by
-the shape that was met.
+Dr.Jit traces every material of a scene, which takes 0.2 ms per material and vertex of the program. Where many shapes
+have materials of one structure, one plugin stands for all of them, and each parameter that differs is a texture indexed
+by the shape that was hit.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
-Place: TypeAlias = tuple[str, ...]  # of a property, through the plugins around it
+Place: TypeAlias = tuple[str, ...]  # path of a property: the names of the enclosing plugins, then its own
 
 PLUGIN = "gonio_by_shape"
-_WHOLE = ("absorption", "priority")  # of what is inside a shape: no texture
+_NO_TEXTURE = ("absorption", "priority")  # properties of the interior, which cannot be textures
 
 
 @dataclass
@@ -32,8 +32,8 @@ class Group:
     """Materials of one structure.
 
     prototype  the plugin of the first
-    rows       of each property in which they may differ, its value in each of the materials
-    shapes     for each shape, by name, which of the materials it has
+    rows       per material, the values of the properties that may differ
+    shapes     per shape name, the index of its material
     """
 
     prototype: PluginDict
@@ -42,7 +42,7 @@ class Group:
     textures: dict[Place, Texture] = field(default_factory=dict)
 
     def plugin(self, mi: ModuleType) -> PluginDict:
-        """One material for all shapes of the group; `bind` it once these are in a scene."""
+        """One material for all shapes of the group; call `bind` once these are in a scene."""
         _register(mi)
         for place, first in self.rows[0].items():
             if any(row[place] != first for row in self.rows):
@@ -52,7 +52,7 @@ class Group:
         return _replaced(self.prototype, self.textures)
 
     def bind(self, numbers: Mapping[str, int]) -> None:
-        """Tell the textures which number each shape has in kernels."""
+        """Tell the textures the number of each shape in kernels."""
         size = 1 + max(numbers.values())
         row = np.zeros(size, np.intp)
         row[[numbers[name] for name in self.shapes]] = list(self.shapes.values())
@@ -61,7 +61,7 @@ class Group:
 
 
 def structure(plugin: PluginDict) -> Hashable:
-    """Equal for plugins that differ in numbers alone; None for one that holds what is no number, such as an image."""
+    """Equal for plugins that differ only in numbers; None for one with other values, such as an image."""
     parts: list[Hashable] = []
     for name, value in plugin.items():
         if isinstance(value, dict) and value["type"] != "rgb":
@@ -69,7 +69,7 @@ def structure(plugin: PluginDict) -> Hashable:
             if inner is None:
                 return None
             parts.append((name, inner))
-        elif name not in _WHOLE and _numbers(value) is not None:
+        elif name not in _NO_TEXTURE and _numbers(value) is not None:
             parts.append(name)
         else:
             parts.append((name, repr(value)))
@@ -79,7 +79,7 @@ def structure(plugin: PluginDict) -> Hashable:
 def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, Numbers]]:
     """The numbers in which plugins of one structure may differ."""
     for name, value in plugin.items():
-        result = None if name in _WHOLE else _numbers(value)
+        result = None if name in _NO_TEXTURE else _numbers(value)
         if result is not None:
             yield (*outer, name), result
         elif isinstance(value, dict) and value["type"] != "rgb":
@@ -127,7 +127,7 @@ def _texture_class(mi: ModuleType) -> OfVariant:
     base: OfVariant = mi.Texture
 
     class ByShape(base):
-        """A number, or red, green and blue, for each shape."""
+        """A number, or red, green and blue, per shape."""
 
         def __init__(self, props: Properties) -> None:
             base.__init__(self, props)
@@ -143,7 +143,7 @@ def _texture_class(mi: ModuleType) -> OfVariant:
             return np.array([self.rows.min(axis=0), self.rows.max(axis=0)])
 
         def bind(self, row: NDArray[np.intp]) -> None:
-            """`row` of each shape, by its number in kernels."""
+            """Set the row of each shape, by its number in kernels."""
             self.table = own(mi.Float, self.rows[row].ravel().astype(np.float32))
 
         def is_spatially_varying(self) -> bool:

@@ -1,7 +1,7 @@
-"""The rectangles and balls of even radiance among a scene's lights, in tables: a formula each samples them all.
+"""Rectangles and balls of uniform radiance in tables: one formula per kind samples all of them.
 
-Asked by calls from the kernel, as lights of any other kind are, lamps cost a tenth of a render; and Mitsuba's own balls
-are sampled by positions in 32 bits, of which one of 4 mm three metres away is 2 % too bright.
+With calls from the kernel, as for other kinds of light, lamps cost a tenth of a render; and Mitsuba samples its own
+balls by positions in 32 bits, which makes one of 4 mm at a distance of 3 m 2 % too bright.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from ...bridge.types import (
 from ..lights.base import LightHit, LightSample, with_shadow_target
 from ..lights.directions import direction_sample
 from ..lights.lamps import Lamps
-from ..lights.solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap
+from ..lights.solid_angles import STRAIGHT, Ball, LampView, Rectangle, RectangularArea, SphericalCap
 from ..placement import placement_reader
 
 NONE, RECTANGLE, BALL = 0, 1, 2
 
 
 class LampTable:
-    """A row per emitter: rectangles and balls of even radiance; the others are not known here.
+    """A row per emitter: rectangles and balls of uniform radiance; other emitters are not in the table.
 
-    known  which of `emitters` are, a list of bool
+    known  for each of `emitters`, whether it is in the table
     """
 
     def __init__(self, mi: ModuleType, emitters: Sequence[Emitter], pointers: OfVariant):
@@ -65,15 +65,15 @@ class LampTable:
             self.radiance = own(mi.Float, sent.T.ravel())
 
     def row(self, index: UInt, active: Mask) -> OfVariant:
-        """The numbers of a lamp."""
+        """The table row of a lamp."""
         return dr.gather(self.mi.Matrix4f, self.table, index, active)
 
     def is_known(self, row: OfVariant) -> Mask:
         return row[3, 0] != NONE
 
-    def _seen(self, row: OfVariant, origin: Point) -> list[tuple[Mask, Seen]]:
-        """(lanes for which it holds, the lamp as it is seen from a point) for each kind that there is."""
-        mi, result = self.mi, list[tuple[Mask, Seen]]()
+    def _views(self, row: OfVariant, origin: Point) -> list[tuple[Mask, LampView]]:
+        """For each kind in the table: (lanes of that kind, the lamp as seen from a point)."""
+        mi, result = self.mi, list[tuple[Mask, LampView]]()
         if RECTANGLE in self.kinds:
             result.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
         if BALL in self.kinds:
@@ -84,31 +84,31 @@ class LampTable:
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
         """A direction toward a lamp: uniform in the solid angle of a ball, on the area of a rectangle.
 
-        Rectangles by solid angle have 6 % less error beside several near lamps, and take 25 % more time: a path that
-        meets a lamp has to measure it again.
+        Sampling rectangles by solid angle would reduce the error with several near lamps by 6 %, but takes 25 % more
+        time: a path that hits a lamp has to compute the solid angle again.
         """
         result: DirectionSample | None = None
-        for here, view in self._seen(row, it.p):
+        for here, view in self._views(row, it.p):
             ds = direction_sample(self.mi, view, u, it)
             result = ds if result is None else dr.select(here, ds, result)
         return result
 
     def pdf(self, row: OfVariant, origin: Point, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point met at `distance` under |cosine|."""
+        """Density (1/sr) of `sample` toward a point that a ray hits at `distance` under |cosine|."""
         result = self.mi.Float(0)
-        for here, view in self._seen(row, origin):
+        for here, view in self._views(row, origin):
             result = dr.select(here, view.pdf(distance, cosine), result)
         return result
 
     def sent(self, row: OfVariant, index: UInt, normal: Vector, direction: Vector, active: Mask) -> Radiance:
-        """Radiance of a lamp in `direction`, away from its surface; of rgb variants, the others' is not in a table."""
+        """Radiance of a lamp in `direction`, away from its surface; tabulated in RGB variants only."""
         mi = self.mi
         shines = (row[3, 1] != 0) | (dr.dot(normal, direction) > 0)
         return dr.select(shines & active, dr.gather(mi.Color3f, self.radiance, index, active), 0)
 
 
 class TabledLamps(Lamps):
-    """Lamps of which some, or all, are sampled from a table; the others are asked."""
+    """Lamps of which some, or all, are sampled from a table; the others by calls of Mitsuba's emitters."""
 
     table: LampTable
     index_of_pointer: UInt | None
@@ -124,10 +124,10 @@ class TabledLamps(Lamps):
         pointers: OfVariant,
         index_of_pointer: UInt | None,
     ) -> TabledLamps | None:
-        """None where no lamp is known.
+        """None if no lamp fits into a table.
 
-        pointers          Dr.Jit's to the emitters
-        index_of_pointer  their index by that pointer's number, where there are several
+        pointers          Dr.Jit's pointers to the emitters
+        index_of_pointer  the emitters' index by the number of that pointer, if there are several
         """
         table = LampTable(mi, emitters, pointers)
         if not table.kinds:
@@ -136,14 +136,14 @@ class TabledLamps(Lamps):
         lamps.table, lamps.index_of_pointer = table, index_of_pointer
         others = [i for i, known in enumerate(table.known) if not known and i != environment]
         lamps.asks = bool(others)
-        # whether a ray may meet a lamp whose radiance is not in the table
-        lamps.asks_met = any(emitters[i].get_shape() is not None for i in others) or table.radiance is None
+        # whether a ray may hit a lamp whose radiance is not in the table
+        lamps.asks_on_hit = any(emitters[i].get_shape() is not None for i in others) or table.radiance is None
         return lamps
 
-    asks = asks_met = False
+    asks = asks_on_hit = False
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
-        if self.asks_met or self.index_of_pointer is None:
+        if self.asks_on_hit or self.index_of_pointer is None:
             return super().emitted(si, active)
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, si.emitter(self.scene, active))
@@ -177,18 +177,18 @@ class TabledLamps(Lamps):
 
 
 def has_known_sides(emitter: Emitter) -> bool:
-    """Whether a light is a surface that shines from one side or both, one like the other."""
+    """Whether a light is a surface that emits from one side, or equally from both."""
     two_sided = getattr(emitter, "two_sided", False)
     return (two_sided or emitter.class_name() == "AreaLight") and emitter.get_shape() is not None
 
 
 def shines_evenly(mi: ModuleType, emitter: Emitter) -> bool:
-    """Whether a light is one with a surface that sends the same from everywhere on it."""
+    """Whether a light is a surface with the same radiance everywhere on it."""
     return has_known_sides(emitter) and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
 
 
 def rectangle_of(mi: ModuleType, shape: Shape) -> Rectangle | None:
-    """The rectangle that a shape is, as data of the kernel: moving it recompiles nothing. None where it is none."""
+    """The rectangle of a shape as kernel data, so that moving it recompiles nothing. None for other shapes."""
     row = np.zeros((4, 4))
     if shape.class_name() == "Rectangle":
         _fill(row, "Rectangle", np.array(placement_reader(mi)(shape)).reshape(4, 4), shape.has_flipped_normals())
@@ -204,7 +204,7 @@ def _rectangle(mi: ModuleType, row: OfVariant) -> Rectangle:
 
 
 def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> None:
-    """The row of a lamp: position and side of the normal; of rectangles axes and lengths, of balls the radius."""
+    """Fill a lamp's row: position and side of the normal, then axes and lengths of a rectangle or radius of a ball."""
     side = -1.0 if flipped else 1.0
     if kind == "Sphere":
         row[0], row[1, 3], row[3, 0] = (*to_world[:3, 3], side), np.linalg.norm(to_world[:3, 0]), BALL

@@ -1,7 +1,7 @@
-"""Which of many lamps to look at, from where one is.
+"""Chooses one of many lamps by position.
 
-The scene's box is cut into cells. For each there is a table of the lamps by the light that they would send there with
-nothing in between, so that distance and orientation count; a part of the choice is even.
+The scene's box is divided into cells. Each has a table of the lamps' probabilities: the unoccluded light that each
+lamp sends to the cell, which accounts for distance and orientation, plus a uniform part.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Mask, Point, Scene, UInt
 from ..lights.sky import Choice
 
-CELLS = 8  # a side, at most
-MAX_ENTRIES = 1 << 21  # of a table
-POINTS = 4  # of a cell, at which lamps are looked at
-EVEN = 0.25  # of the choice, or one over their number: of a lamp and a sky each gets a quarter of the samples at least
+CELLS = 8  # per axis, at most
+MAX_ENTRIES = 1 << 21  # entries of a table
+POINTS = 4  # per cell, at which the light of the lamps is evaluated
+# Uniform part of the probabilities, or 1 / count if that is more: a lamp and a sky get at least a quarter each.
+EVEN = 0.25
 
 
 class LightGrid:
-    """Probabilities of the lights, cell by cell."""
+    """Probabilities of the lights per cell."""
 
     def __init__(self, mi: ModuleType, scene: Scene, emitters: Sequence[Emitter]) -> None:
         self.mi, count = mi, len(emitters)
@@ -41,7 +42,8 @@ class LightGrid:
         index = dr.arange(mi.UInt32, n * POINTS)
         cell = index // POINTS
         corner = mi.Point3f(cell % self.cells, (cell // self.cells) % self.cells, cell // self.cells**2)
-        # multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time
+        # multiples of powers of the inverse of x^4 = x + 1 mod 1 (R3 sequence, M. Roberts): evenly spread and
+        # deterministic
         inside = mi.Point3f(*(_fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
         it = dr.zeros(mi.SurfaceInteraction3f, n * POINTS)
         it.p = self._low + (corner + inside) / self._scale
@@ -65,18 +67,18 @@ class LightGrid:
     def _row(self, p: Point) -> UInt:
         mi = self.mi
         at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
-        # NaN, which a clip lets through, becomes 2^32 - 1 on processors without AVX-512
+        # NaN, which passes through a clip, becomes 2^32 - 1 on processors without AVX-512
         x, y, z = (dr.minimum(mi.UInt32(v), self.cells - 1) for v in at)
         return x + self.cells * (y + self.cells * z)
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
-        """(number of a lamp, what is left of `u`, in [0, 1], the lamp's probability)."""
+        """(index of a lamp, `u` rescaled to [0, 1] for reuse, the lamp's probability)."""
         row = self._row(p)
         index, left = self._choice.of(row, u)
         return index, left, dr.gather(self.mi.Float, self._chance, row * self.columns + index)
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
-        """That `choose` gives this lamp."""
+        """The probability that `choose` returns this lamp."""
         return dr.gather(self.mi.Float, self._chance, self._row(p) * self.columns + index, active)
 
 

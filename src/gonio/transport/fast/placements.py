@@ -1,9 +1,9 @@
 """Surfaces of many spheres or rectangles, without a call per shape.
 
-Mitsuba asks the shape that was met by a virtual call, which Dr.Jit traces once for every shape there is: 0.1 ms each,
-at every vertex of the program. So where there are many spheres or rectangles their placements stand in one array, each
-lane reads that of the shape it has met, and the formula stands in the kernel once. Other shapes are called as before.
-Meshes need none of this: those of equal material are one.
+Mitsuba computes the surface of the shape that was hit by a virtual call, which Dr.Jit traces once per shape: 0.1 ms
+each, at every vertex of the program. For many spheres or rectangles the placements are therefore in one array, each
+lane reads that of the shape it has hit, and the formula appears in the kernel once. Other shapes are called as before.
+Meshes need no table: those of equal material are merged.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Hit, Mask, OfVariant, Ray, Scene, Shape, SurfaceInteraction, UInt, Vector
 from ..placement import placement_reader
 
-# From so many shapes of a kind on. Two spheres cost no more than one, since their code is the same; tracing 64 of them
-# takes about as long as the program around them.
+# Smallest number of shapes of a kind. Two spheres cost no more than one, since their code is the same; tracing 64 of
+# them takes about as long as the program around them.
 MANY = 64
 
 
 class Placements:
-    """The shapes of a scene whose placements are in a table; the others are asked."""
+    """The shapes of a scene whose placements are in a table; the others are called."""
 
     def __init__(self, mi: ModuleType, scene: Scene, kinds: dict[str, list[Shape]]) -> None:
         self.mi, self.kinds = mi, list(kinds)
         shapes, read = scene.shapes(), placement_reader(mi)
         self.others = [shape for shape in shapes if shape.class_name() not in self.kinds]
         numbers = dict(zip(map(id, shapes), np.array(dr.reinterpret_array(mi.UInt32, scene.shapes_dr())), strict=True))
-        size = 1 + max(numbers.values())  # what a pointer to a shape is in a kernel, a number from 1 on
+        size = 1 + max(numbers.values())  # in a kernel, a pointer to a shape is a number from 1 on
         kind_of, place = np.zeros(size, np.uint32), np.zeros(size, np.uint32)
         placement = np.zeros((size, 16))
         for index, kind in enumerate(self.kinds, start=1):
@@ -47,14 +47,14 @@ class Placements:
 
     @staticmethod
     def of(mi: ModuleType, scene: Scene, least: int) -> Placements | None:
-        """None where fewer than `least` shapes are of any kind that is known here."""
+        """None if there are fewer than `least` shapes of each supported kind."""
         shapes = scene.shapes()
         kinds = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
         kinds = {kind: members for kind, members in kinds.items() if len(members) >= least}
         return Placements(mi, scene, kinds) if kinds else None
 
     def interaction(self, hit: Hit, ray: Ray, active: Mask) -> SurfaceInteraction:
-        """The surface that was met, with all that Mitsuba's `compute_surface_interaction` tells by itself."""
+        """The surface that was hit, with everything that Mitsuba's `compute_surface_interaction` returns."""
         mi = self.mi
         active = active & hit.is_valid()
         number = dr.reinterpret_array(mi.UInt32, hit.shape)
@@ -66,7 +66,7 @@ class Placements:
         return si
 
     def _called(self, hit: Hit, ray: Ray, number: UInt, active: Mask) -> SurfaceInteraction:
-        """Ask the other shapes."""
+        """Surfaces of the other shapes, by calls."""
         mi = self.mi
 
         def ask(shape: Shape) -> Callable[[Hit, Ray, Mask], SurfaceInteraction]:
@@ -82,7 +82,7 @@ class Placements:
         return self._finished(result, hit, ray)
 
     def _placed(self, formula: Formula, hit: Hit, ray: Ray, placement: OfVariant) -> SurfaceInteraction:
-        """Ask a formula about the shape whose placement is given."""
+        """The surface by a formula of the shape with the given placement."""
         mi = self.mi
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.t = hit.t
@@ -91,7 +91,7 @@ class Placements:
         return self._finished(si, hit, ray)
 
     def _finished(self, si: SurfaceInteraction, hit: Hit, ray: Ray) -> SurfaceInteraction:
-        """What Mitsuba adds to any shape's answer: the frame, the way the ray came, and whose surface it is."""
+        """Complete the result as Mitsuba does for any shape: frame, incoming direction, and the shape that was hit."""
         valid = hit.is_valid()
         si.t = dr.select(valid, hit.t, dr.inf)
         si.time, si.wavelengths = ray.time, ray.wavelengths
@@ -106,18 +106,18 @@ Formula = Callable[[ModuleType, SurfaceInteraction, Hit, Ray, list[Vector], OfVa
 
 
 def _of_spheres(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Columns 0 to 2: the axes, as long as the radius; 3: the centre, and 1, or -1 where the normal points inward."""
+    """Columns 0 to 2: the axes, as long as the radius; 3: the center, and 1, or -1 where the normal points inward."""
     placement = to_world.copy()
     placement[:, 3, 3] = sign
     return placement
 
 
 def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: list[Vector], sign: OfVariant) -> None:
-    """A sphere's surface: u runs about its z axis from x, v from z, both in [0, 1]."""
-    x, y, z, centre = column
+    """A sphere's surface: u is the azimuth about its z axis from x, v from z, both in [0, 1]."""
+    x, y, z, center = column
     radius = dr.norm(x)
-    normal = dr.normalize(ray(hit.t) - centre)
-    si.p = dr.fma(normal, radius, centre)  # back onto the sphere, which the rounded distance has missed
+    normal = dr.normalize(ray(hit.t) - center)
+    si.p = dr.fma(normal, radius, center)  # project onto the sphere, which the rounded distance misses
     local = mi.Vector3f(dr.dot(normal, x), dr.dot(normal, y), dr.dot(normal, z)) / radius
     azimuth = dr.atan2(local.y, local.x)
     azimuth = dr.select(azimuth < 0, azimuth + 2 * dr.pi, azimuth)
@@ -131,13 +131,13 @@ def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: 
 
 
 def _angle_from_z(v: Vector) -> OfVariant:
-    """The angle of a unit vector with z, good to the last digits at both poles too."""
+    """The angle of a unit vector with z, accurate at both poles."""
     near = 2 * dr.asin(0.5 * dr.norm(v - dr.select(v.z >= 0, 1, -1) * type(v)(0, 0, 1)))
     return dr.select(v.z >= 0, near, dr.pi - near)
 
 
 def _of_rectangles(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Columns 0, 1: dp_du and dp_dv; 2: the unit normal; 3: the middle."""
+    """Columns 0, 1: dp_du and dp_dv; 2: the unit normal; 3: the center."""
     placement = to_world.copy()
     placement[:, :3, :2] *= 2  # from [-1, 1] to [0, 1]
     normal = np.cross(to_world[:, :3, 0], to_world[:, :3, 1])
@@ -150,14 +150,14 @@ def _rectangle(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, colum
     """A rectangle's surface, or a parallelogram's: u and v run along its edges, in [0, 1]."""
     si.dp_du, si.dp_dv, normal, middle = column
     point = ray(hit.t)
-    si.p = dr.fma(normal, dr.dot(middle - point, normal), point)  # back onto the plane
+    si.p = dr.fma(normal, dr.dot(middle - point, normal), point)  # project onto the plane
     offset, across, along = si.p - middle, dr.cross(normal, si.dp_du), dr.cross(si.dp_dv, normal)
     u, v = dr.dot(along, offset) / dr.dot(along, si.dp_du), dr.dot(across, offset) / dr.dot(across, si.dp_dv)
     si.uv = mi.Point2f(u + 0.5, v + 0.5)
     si.n = si.sh_frame.n = mi.Normal3f(normal)
 
 
-# class: (the placements as the kernel reads them, the formula)
+# class name: (function that packs the placements for the kernel, formula)
 _KINDS: dict[str, tuple[Callable[[Matrices, NDArray[np.float64]], Matrices], Formula]] = {
     "Sphere": (_of_spheres, _sphere),
     "Rectangle": (_of_rectangles, _rectangle),

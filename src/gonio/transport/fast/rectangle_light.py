@@ -1,8 +1,8 @@
-"""A scene lit by a single rectangle, as most of the lab's are.
+"""A scene lit by a single rectangle, like most of the lab's scenes.
 
-No choice of a light and no call from the kernel: the rectangle is sampled uniformly in its solid angle, whether the
-emitter is `gonio_area` or Mitsuba's one-sided `area`, and for the last ray of a path a hit test of one rectangle and a
-shadow ray take the place of the nearest surface.
+No light is chosen, and the kernel calls no emitter: the rectangle is sampled uniformly in its solid angle, for both
+`gonio_area` and Mitsuba's one-sided `area`. For the last ray of a path, a hit test of one rectangle and a shadow ray
+replace the search for the nearest surface.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class RectangleLight(Lamps):
         environment: int,
         surfaces: Surfaces,
     ) -> RectangleLight | None:
-        """None where the only light is no rectangle."""
+        """None if the only light is not a rectangle."""
         rectangle = rectangle_of(mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
         if rectangle is None:
             return None

@@ -1,4 +1,4 @@
-"""Integrators: what a picture shows, in passes that add up to the same picture to the bit.
+"""Integrators: the quantity that a picture shows, in passes that add up to a bit-identical picture.
 
     >>> render = Render(mi.load_dict(scene), Settings("path", max_depth=5))
     >>> while render.done < 256:
@@ -29,7 +29,7 @@ def __getattr__(name: str) -> object:
 
 
 class _Transport(Path):
-    """The base class of integrators that follow light, as it was called once: paths to `depth`, without roulette."""
+    """The former name of the base class of integrators that follow light: paths to `depth`, without roulette."""
 
     name = ""
     takes_depth = False

@@ -1,4 +1,4 @@
-"""What an integrator is: the program that the kernel runs for every sample of a pixel."""
+"""The base class of integrators: the program that the kernel runs for every sample of a pixel."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from ..surfaces import Surfaces
 Picture = NDArray[np.float32]
 
 SAMPLERS: dict[str, str] = {
-    "default": f"what measures best: {sampler.DEFAULT[0]} for pixels and lamps, {sampler.DEFAULT[1]} for directions",
+    "default": f"lowest error: {sampler.DEFAULT[0]} for pixels and lamps, {sampler.DEFAULT[1]} for directions",
     **sampler.SAMPLERS,
 }
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to render.
+    """Options of a render.
 
     integrator  the name of an `Integrator`
-    max_depth   for integrators that take a depth: the longest path in segments, so N gives N - 1 shaded vertices
+    max_depth   for integrators that take a depth: the longest path in segments, so that N gives N - 1 shaded vertices
     sampler     a name of `SAMPLERS`
     seed        any integer of 32 bits; the same seed gives the same picture to the bit
-    ambient     scene-wide ambient radiance (r, g, b): at every shaded vertex adds `ambient` times the BSDF's own
-                attribute "ambient", where it has one (Phong's ka)
-    radius      of an integrator that blurs: how wide it begins, over what it would choose
+    ambient     scene-wide ambient radiance (r, g, b): every shaded vertex adds `ambient` times the BSDF's own
+                attribute "ambient", if it has one (Phong's ka)
+    radius      for integrators that blur: factor of the initial radius that it would choose
     measures    whether such an integrator also measures its blur
     """
 
@@ -61,40 +61,41 @@ class Settings:
 
     @property
     def program(self) -> type[Integrator]:
-        """The integrator's class. InputError where there is none of that name."""
+        """The integrator's class. InputError for an unknown name."""
         return Integrator.family.get(self.integrator)
 
 
-def check_sampler(name: str, where: str = "sampler") -> None:
-    """Raise InputError where no sampler has that name."""
+def check_sampler(name: str, location: str = "sampler") -> None:
+    """Raise InputError if no sampler has that name."""
     if name not in SAMPLERS:
-        raise InputError(f"unknown sampler '{name}'", where, did_you_mean(name, list(SAMPLERS)))
+        raise InputError(f"unknown sampler '{name}'", location, did_you_mean(name, list(SAMPLERS)))
 
 
 class Integrator:
-    """What a picture shows. Its docstring's first line is its title.
+    """Computes what a picture shows. The first line of its docstring is its title.
 
         class Depth(Integrator):
-            '''The distance to what is seen, in units of the scene.'''
+            '''The distance to the visible surface, in units of the scene.'''
 
             name = "depth"
 
             def show(self, si, key, index):
                 return self.mi.Color3f(si.t)
 
-    A subclass writes `show`, which sees one surface, or `sample`, which may trace rays of its own; one that follows
-    light derives from `LightTransport` or from `Path`. Its parameters and the scene's must reach the kernel as data
-    (`dr.opaque`), not as Python numbers: else a changed value compiles again.
+    A subclass implements `show`, which gets one surface, or `sample`, which may trace rays; one that follows light
+    derives from `LightTransport` or from `Path`. Its parameters and the scene's must reach the kernel as data
+    (`dr.opaque`), not as Python numbers; otherwise a changed value compiles again.
 
-    name         as `--integrator` and a scene's "integrator" have it
-    takes_depth  whether `Settings.max_depth` means something: then a scene must give maxDepth
-    samples_lobes  whether BSDFs are sampled beside the lights
-    splats       whether a sample adds to other pixels than its own, in whole numbers of `unit` (`Sums.splats`)
-    blurs        whether its bias goes away with the number of samples, of which all pixels then need as many
-    shrinking    power of the number of samples by which the radius of a blur goes to 0
-    measured     how many numbers it finds per sample beside the color, see `differences`
+    name           value of `--integrator` and of a scene's "integrator"
+    takes_depth    whether `Settings.max_depth` applies: then a scene must give maxDepth
+    samples_lobes  whether BSDFs are sampled in addition to the lights
+    splats         whether a sample adds to pixels other than its own, as integers of size `unit` (`Sums.splats`)
+    blurs          whether it has a bias that vanishes with the number of samples, which must then be equal for all
+                   pixels
+    shrinking      exponent of the number of samples by which the radius of a blur goes to 0
+    measured       how many numbers it computes per sample besides the color, see `differences`
 
-    data, settings, mi  what it reads of the scene (`SceneData`), how to render, and Mitsuba with its variant
+    data, settings, mi  the scene's data (`SceneData`), the options, and Mitsuba with its variant
     """
 
     family: ClassVar[Family[type[Integrator]]]
@@ -102,7 +103,7 @@ class Integrator:
     takes_depth: ClassVar[bool] = False
     splats: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
-    unit: float = 1.0  # what one of its splats counts
+    unit: float = 1.0  # radiance of one unit of its splats
     shrinking: ClassVar[float] = 0.0
     samples_lobes: ClassVar[bool] = True
     measured: int = 0
@@ -110,10 +111,10 @@ class Integrator:
     def __init__(self, data: SceneData, settings: Settings):
         self.data, self.settings, self.mi = data, settings, data.mi
 
-    # ------------------------------------------------------------------ what a subclass writes, one of these two
+    # ------------------------------------------------------------------ a subclass implements one of these two
 
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
-        """The color (r, g, b) of the surface that a sample sees; where it sees none, what is returned is left out.
+        """The color (r, g, b) of the surface that a sample hits; ignored where it hits none.
 
         key, index  of the pixel and of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in [0, 1), and
                     `self.direction_pair(...)` two for a direction
@@ -121,20 +122,21 @@ class Integrator:
         raise NotImplementedError(f"{type(self).__name__} has neither show nor sample")
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
-        """[r, g, b] of a sample; with `aovs` also albedo and normal of what it sees first, three numbers each."""
+        """[r, g, b] of a sample; with `aovs`, followed by albedo and normal of its first surface, three numbers
+        each."""
         ray, _, hit = self.first_hit(pixel, key, index)
         si = self.surfaces.interaction(hit, ray)
         features = (0, 0, 0, *si.sh_frame.n) if self.data.aovs else ()
         return [dr.select(si.is_valid(), v, 0) for v in (*self.show(si, key, index), *features)]
 
-    # ------------------------------------------------------------------ what it has
+    # ------------------------------------------------------------------ provided by this class
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """`Render.differences`, from the mean of what so many samples have measured: (height, width, `measured`)."""
+        """`Render.differences`, from the mean of `measured` over so many samples: (height, width, `measured`)."""
         return []
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Samples [first, last) cut into what one kernel takes: what it needs is there when it is asked for."""
+        """Samples [first, last) divided into kernel launches; each prepares its data before it is returned."""
         yield first, last
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
@@ -156,7 +158,7 @@ class Integrator:
         return self.data.pair(key, index, dimension)
 
     def direction_pair(self, key: UInt, index: UInt, dimension: UInt) -> tuple[Float, Float]:
-        """The same for a direction."""
+        """Two numbers in [0, 1) for a decision about a direction."""
         return self.data.direction_pair(key, index, dimension)
 
     @property
@@ -171,11 +173,11 @@ class Integrator:
 
     @property
     def surfaces(self) -> Surfaces:
-        """What rays meet: `nearest`, `blocked`, `interaction`."""
+        """The surfaces that rays hit: `nearest`, `blocked`, `interaction`."""
         return self.data.surfaces
 
     def advice(self) -> str:
-        """What to tell a person who chose it for this scene; "" is nothing."""
+        """Advice to a user who chose it for this scene; "" if there is none."""
         return ""
 
 

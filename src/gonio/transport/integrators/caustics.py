@@ -1,4 +1,4 @@
-"""Path tracing with a progressive map of the light behind mirrors and smooth glass."""
+"""Path tracing with a progressive photon map of the light behind mirrors and smooth glass."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...bridge.types import BSDFSample, Float, Mask, Radiance, UInt
 from .. import delta_retrace
 from ..delta_retrace import Retrace
 from ..photon_maps import SAMPLES_PER_MAP, SHRINKING, PhotonMaps
-from ..photons import Photon
+from ..photons import Photon, Search
 from ..scattering import Vertex
 from ..scene_data import SceneData
 from ..sums import Sums
@@ -22,16 +22,16 @@ from .base import Picture, Settings
 from .light_transport import FIRST_VERTEX, ROULETTE, PathState, VertexNumbers
 from .path import Path
 
-INNER = 0.25  # part of the radius, against which blur is measured
+INNER = 0.25  # fraction of the radius, for the comparison that measures blur
 
 
 @dataclass
 class CausticPath:
-    """A path, and what it carries along of the mirrors and smooth glass on its way.
+    """A path with the state of its current chain of mirrors and smooth glass.
 
-    lobe    pdf over cosine with which the last lobe before them chose its direction; 0 where there was none
-    counts  part of the light behind them that it finds from that surface on, and particles do not bring
-    blur    how much more light particles have brought so far than those close by; None where nobody asks
+    lobe    pdf over cosine by which the last lobe before the chain chose its direction; 0 if there was none
+    counts  fraction of the light behind the chain that the path contributes, the rest being left to particles
+    blur    excess of the particles' light over that of the close ones; None if it is not measured
     """
 
     path: PathState
@@ -42,19 +42,19 @@ class CausticPath:
 
 
 class Caustics(Path):
-    """Path tracing, where light by way of mirrors and smooth glass comes from a map of particles, too.
+    """Path tracing, with light by way of mirrors and smooth glass also taken from a photon map.
 
-    Of the light that mirrors or glass throw upon a surface, paths from the camera find what comes from wide lamps,
-    particles from the lamps what comes from small ones: each is weighted by how likely it was to find it. A particle
-    counts for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first
-    and sharp in the end (consistent, not unbiased); all other light is that of `path`.
+    Light that mirrors or glass cast on a surface is found by paths from the camera if the lamps are large, by particles
+    from the lamps if they are small; both are weighted by their probability of finding it. A particle contributes
+    within a radius that shrinks, so the picture is blurred by about a pixel at first and converges to a sharp one
+    (consistent, not unbiased); all other light is that of `path`.
 
-    How likely: a path that leaves a surface with density p toward mirrors and meets the lamp behind them, and N
-    particles that come from there the other way, are as dense as p / cos and g N pi r^2 over the same étendue, with
-    the particles' density g at the lamp; what mirrors and lenses do to the width of the beam is the same for both.
-    Merging as one more way to sample a path is of Georgiev2012.
+    The weights: a path that leaves a surface with density p toward mirrors and hits the lamp behind them has density
+    p / cos over étendue, and N particles that come from there the other way have g N pi r^2, where g is their density
+    at the lamp; mirrors and lenses change the width of the beam equally for both. Georgiev2012 introduced merging as
+    one more way to sample a path.
 
-    Lamps that the camera itself sees by mirrors and glass are looked for by a retrace, see `delta_retrace`.
+    Lamps that the camera sees directly through mirrors and glass are sampled by a retrace, see `delta_retrace`.
     """
 
     name = "caustics"
@@ -63,7 +63,7 @@ class Caustics(Path):
 
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
-        self.last_ray_apart = self.one_vertex = False  # particles compete for the light that it meets
+        self.last_ray_apart = self.one_vertex = False  # its light is weighted against the particles
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         self.retraces = False
         if self.merging:
@@ -75,7 +75,7 @@ class Caustics(Path):
         return ""
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """The samples that share a map; the map is made before them."""
+        """Groups of samples that share a map; the map is made before they are returned."""
         if not self.merging:
             yield from super().stages(first, last)
             return
@@ -83,7 +83,7 @@ class Caustics(Path):
             number = first // SAMPLES_PER_MAP
             self.maps.prepare(number)
             for read in (self.maps.density, self.maps.current):
-                copy_arrays(read)  # after the sums, in every stage
+                copy_arrays(read)  # in every stage after the sums, so that kernels are equal
             end = min(last, (number + 1) * SAMPLES_PER_MAP)
             yield first, end
             first = end
@@ -91,7 +91,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ the loop
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        """Add samples [first, last) of every pixel to the sums, as `path` does; some are followed by a retrace."""
+        """Add samples [first, last) of every pixel to the sums, as `path` does; a retrace follows some of them."""
         if not self.merging:
             return super().accumulate(pixel, key, first, last, sums)
         mi = self.mi
@@ -117,7 +117,7 @@ class Caustics(Path):
         return CausticPath(path, mi.Float(0), mi.Float(1), Retrace.none(mi), blur)
 
     def regenerate(self, fresh: CausticPath, state: CausticPath, key: UInt, begins: Mask) -> tuple[CausticPath, Mask]:
-        """Where a path has ended, its retrace or the next sample's; and lanes of the latter."""
+        """On lanes whose path has ended, start its retrace or the next sample; also returns the lanes of the latter."""
         if not self.retraces:
             return dr.select(begins, fresh, state), begins
         retraced = begins & (state.retrace.phase == delta_retrace.DUE)
@@ -129,7 +129,7 @@ class Caustics(Path):
         return dr.select(begins, fresh, state), begins & ~retraced
 
     def merged_vertex(self, state: CausticPath, key: UInt) -> tuple[CausticPath, list[Float]]:
-        """A vertex of `path`, to which particles bring light, too."""
+        """A vertex of `path`, with the light of particles added."""
         path = state.path
         vertex, throughput = self.intersect(path)
         emitted = self.emitted(path, vertex)
@@ -148,7 +148,7 @@ class Caustics(Path):
         value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
         gathered = self.direct_light(vertex, light, value, pdf, active)
 
-        # Light of particles, beside that of the paths behind mirrors
+        # Light of particles, weighted against paths that go behind mirrors
         photons, excess, counts = self.gather_photons(state, vertex, u, active)
         gathered = gathered + dr.select(active, photons, 0)
         radiance = radiance + throughput * gathered
@@ -165,7 +165,7 @@ class Caustics(Path):
         return self.after_bounce(state, path, vertex, bs, counts, blur), features
 
     def values(self, state: CausticPath) -> list[Float]:
-        """[r, g, b] of a sample that is complete, and its blur by the even maps and by the odd ones."""
+        """[r, g, b] of a complete sample, and its blur by the even maps and by the odd ones."""
         path = state.path
         values = [*self.data.rgb(path.radiance, path.ray.wavelengths)]
         if not self.measured:
@@ -177,7 +177,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ the parts of a vertex
 
     def emission_weight(self, state: CausticPath, vertex: Vertex, emitted: Radiance) -> Float:
-        """Weight of a lamp that a path meets by way of mirrors, beside the particles or a retrace."""
+        """Weight of the lamp that a path hits by way of mirrors, against the particles or a retrace."""
         path, sources = state.path, self.maps.particles.sources
         lit = path.active & (path.pdf == 0) & dr.any(emitted != 0)
         behind = lit & (state.lobe > 0)
@@ -190,14 +190,14 @@ class Caustics(Path):
     def gather_photons(
         self, state: CausticPath, vertex: Vertex, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Radiance, Float]:
-        """(light that particles have brought to a vertex, by how much it exceeds that of the close ones, the part of
-        the light behind mirrors that the path counts from there on)."""
+        """(light of the particles at a vertex, its excess over that of the close ones, the fraction of the light behind
+        mirrors that the path counts from there on)."""
         mi, maps, si, path = self.mi, self.maps, vertex.si, state.path
         photons = maps.current
         if vertex.crossing is not None:
             active = active & vertex.crossing.surface
         active = active & mi.has_flag(vertex.bsdf.flags(), mi.BSDFFlags.Smooth)
-        # A path that has come here by mirrors shares what first particles have brought with second particles.
+        # A path that arrived here by mirrors is weighted against second particles, which continue from first ones.
         by_mirrors = (state.lobe > 0) & (path.pdf == 0)
         counts = dr.select(by_mirrors, maps.path_weight(state.lobe, maps.etendue_density(si.p)), 1)
 
@@ -205,18 +205,19 @@ class Caustics(Path):
             here &= photon.depth + path.depth + 1 <= self.max_depth
             value, pdf = vertex.bsdf.eval_pdf(self.scattering.context, si, si.to_local(photon.direction), here)
             cosine = dr.maximum(abs(dr.dot(photon.direction, si.n)), 1e-6)
-            share = 1 - maps.path_weight(pdf / cosine, photon.density)
-            share *= dr.select(photon.second, 1, counts)
+            weight_here = 1 - maps.path_weight(pdf / cosine, photon.density)
+            weight_here *= dr.select(photon.second, 1, counts)
             flux = maps.rotated(photon.flux, path.index)
-            return dr.select(here, value * flux * (weight * share / cosine), 0)
+            return dr.select(here, value * flux * (weight * weight_here / cosine), 0)
 
         within = INNER if self.measured else 0.0
         back, normal = si.to_world(si.wi), mi.Vector3f(si.n)
-        light, excess = photons.gather(si.p, normal, back, u.photons, mi.Spectrum(0), visit, active, within)
+        search = Search(si.p, normal, back, u.photons)
+        light, excess = photons.gather(search, mi.Spectrum(0), visit, active, within)
         return light, excess, counts
 
     def roulette_behind(self, state: CausticPath, path: PathState, u: VertexNumbers) -> PathState:
-        """Roulette, but not of a retrace, nor of a first trace that has not come to where one is due."""
+        """Russian roulette, except in a retrace and in a first trace before its retrace is due."""
         played = self.roulette(path, u)
         if not self.retraces:
             return played
@@ -233,7 +234,7 @@ class Caustics(Path):
         counts: Float,
         blur: Radiance | None,
     ) -> CausticPath:
-        """What the path carries along from the vertex; `state` is before it, `path` after it."""
+        """The path's state after the vertex; `state` is before it, `path` after it."""
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         begun = bs.pdf / dr.maximum(abs(dr.dot(path.ray.d, vertex.si.n)), 1e-6)
@@ -249,7 +250,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ blur
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """From a picture with INNER of the radius, by the even maps and by the odd ones."""
+        """The difference to a picture with INNER of the radius, by the even maps and by the odd ones."""
         if not self.measured:
             return []
         rounds, rest = divmod(samples, 2 * SAMPLES_PER_MAP)

@@ -1,4 +1,4 @@
-"""Direct light by both strategies."""
+"""Direct light by light and BSDF sampling."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Direct(LightTransport):
         return dr.while_loop(state, lambda index, _: index < last, step, mode="symbolic", label="samples")[1]
 
     def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """The light of the surface that the camera ray has met, and the light that this surface reflects."""
+        """Emission of the surface that the camera ray has hit, and the direct light that this surface reflects."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
         active = path.active & vertex.si.is_valid()
@@ -43,7 +43,7 @@ class Direct(LightTransport):
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 
-        # BSDF sampling: the light that the sampled direction meets.
+        # BSDF sampling: the light that the sampled direction hits.
         throughput = throughput * weight
         features = self.data.features(throughput, vertex.si, path.active, active)
         path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)

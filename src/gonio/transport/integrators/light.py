@@ -16,11 +16,11 @@ from .light_transport import LightTransport
 
 
 class Light(LightTransport):
-    """Particle tracing from the lamps, seen by the camera at each vertex: the referee of `path`.
+    """Particle tracing from the lamps, with every vertex connected to the camera: the reference for `path`.
 
-    What mirrors and smooth glass show is missing: no particle leaves them toward the camera but by chance. A sample of
-    the picture is as many particles as it has pixels. Splats are added up as whole numbers, whose sum does not
-    depend on the order.
+    Light that leaves mirrors and smooth glass toward the camera is missing, since no connection to the camera is
+    possible there. A sample of the picture is as many particles as it has pixels. Splats are added up as integers,
+    whose sum does not depend on the order.
     """
 
     name = "light"
@@ -44,7 +44,7 @@ class Light(LightTransport):
             return sums
 
         def sample(index: UInt, invalid: UInt) -> tuple[UInt, UInt]:
-            """One particle of each lane, from its lamp to its end."""
+            """One particle per lane, from its lamp to its end."""
             key, low = self.particles.number(index, pixel, self.camera.pixels)
             particle, flight = self.particles.leave(key, low)
             invalid += self.camera.see_lamp(key, low, particle, sums)
@@ -62,7 +62,7 @@ class Light(LightTransport):
         return Sums(sums.radiance, sums.features, invalid, sums.splats)
 
     def step(self, flight: Flight, invalid: UInt, key: UInt, low: UInt, sums: Sums) -> tuple[Flight, UInt]:
-        """One vertex of a particle: its light toward the camera, and on to the next surface."""
+        """One vertex of a particle: connect it to the camera, then continue to the next surface."""
         particles, camera, active = self.particles, self.camera, flight.active
         vertex = particles.intersect(flight)
         bs, weight = particles.sample_bsdf(key, low, flight, vertex)

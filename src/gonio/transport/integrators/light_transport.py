@@ -1,9 +1,9 @@
-"""The steps of a path, which integrators that follow light put together in loops of their own.
+"""The steps of a path, which integrators combine in loops of their own.
 
     camera_path -> [ intersect, emitted -> sample_light, sample_bsdf, direct_light -> spawn, roulette -> trace ]
 
-A vertex costs one call of its BSDF, which is evaluated toward a light and samples the next direction, and a shadow ray
-where it would carry anything.
+A vertex costs one call of its BSDF, which evaluates it toward a light and samples the next direction, and a shadow ray
+unless its contribution is zero.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ from .base import Integrator, Settings
 
 # Russian roulette begins at this depth, as in Mitsuba's `path`: before it, paths are rarely dim enough to pay.
 ROULETTE_DEPTH = 5
-# Survival probability over the throughput. What ends a path early costs more than the path: by 1 in its place, rough
-# glass has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
+# Survival probability over the throughput. Early termination costs more than it saves: with a factor of 1, rough glass
+# has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
 SURVIVAL = 4.0
 
-# Dimensions of a path: each vertex takes VERTEX_DIMENSIONS of them.
+# Dimensions of a path: each vertex uses VERTEX_DIMENSIONS of them.
 FIRST_VERTEX = FIRST_FREE
 LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 
 
 @dataclass
 class PathState:
-    """A path on its way, one per lane."""
+    """The state of a path, one per lane."""
 
     index: UInt  # of the sample
     depth: UInt  # segments traced so far
     ray: Ray  # the next segment, and
-    hit: Hit  # what it meets
+    hit: Hit  # its first intersection
     throughput: Radiance
-    eta: Float  # product of the relative indices on the way
+    eta: Float  # product of the relative indices along the path
     pdf: Float  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
     solid_angle: Float  # LightSample.solid_angle at its origin
-    radiance: Radiance  # gathered so far
-    hero_only: UInt  # 1 where the first wavelength goes on without the others
-    inside: UInt  # of which media, see `media.py`
+    radiance: Radiance  # accumulated so far
+    hero_only: UInt  # 1 if the path continues with its first wavelength alone
+    inside: UInt  # the media that contain it, see `media.py`
     active: Mask
 
 
@@ -64,7 +64,7 @@ class VertexNumbers:
 
 
 class LightTransport(Integrator):
-    """An integrator that follows light along paths: it writes `vertex`, and its loop over vertices.
+    """An integrator that follows light along paths: subclasses implement `vertex` and loop over vertices.
 
     samples_lights  whether vertices sample the lights
     samples_lobes   whether they sample all lobes of the BSDF; delta lobes are always followed
@@ -95,12 +95,12 @@ class LightTransport(Integrator):
         path, features = self.vertex(self.camera_path(pixel, key, index), key)
         return [*self.data.rgb(path.radiance, path.ray.wavelengths), *features]
 
-    # ------------------------------------------------------------------ where a path begins
+    # ------------------------------------------------------------------ the beginning of a path
 
     def camera_path(
         self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True, wavelength: Float | None = None
     ) -> PathState:
-        """A sample's path up to the first surface that it meets, on lanes that begin one."""
+        """A sample's path up to its first hit, on lanes that begin one."""
         ray, weight, hit = self.data.first_hit(pixel, key, index, begins, wavelength)
         return self._path(index, ray, hit, self.mi.Spectrum(weight), self.data.begins_path(hit))
 
@@ -132,7 +132,7 @@ class LightTransport(Integrator):
         """The random numbers of the path's next vertex."""
         mi, data, index = self.mi, self.data, path.index
         dimension = path.depth * VERTEX_DIMENSIONS + FIRST_VERTEX
-        pair = data.direction_pair if self.lights.has_environment else data.pair  # all around, or on a lamp
+        pair = data.direction_pair if self.lights.has_environment else data.pair  # over the sphere, or on a lamp
         roulette, photons = sampler.independent_pair(key, index, dimension + ROULETTE)
         return VertexNumbers(
             mi.Point2f(*pair(key, index, dimension + LIGHT)),
@@ -142,10 +142,11 @@ class LightTransport(Integrator):
             photons,
         )
 
-    # ------------------------------------------------------------------ the parts of a vertex
+    # ------------------------------------------------------------------ the steps at a vertex
 
     def intersect(self, path: PathState) -> tuple[Vertex, Radiance]:
-        """The surface that the path's ray meets, and the path's throughput there, less what media absorb on the way."""
+        """The surface that the path's ray hits, and the path's throughput there after absorption by media on the
+        way."""
         active, throughput, media = path.active, path.throughput, self.media
         si = self.data.surfaces.interaction(path.hit, path.ray, active)
         vertex = Vertex(si, si.bsdf(path.ray))
@@ -157,8 +158,8 @@ class LightTransport(Integrator):
         return vertex, throughput
 
     def emitted(self, path: PathState, vertex: Vertex) -> Radiance:
-        """Radiance that the path's ray meets, weighted against the light sampling at its origin."""
-        lights, active, by_both = self.lights, path.active, path.pdf > 0  # else by the ray alone
+        """Radiance along the path's ray, weighted against light sampling at its origin."""
+        lights, active, by_both = self.lights, path.active, path.pdf > 0  # otherwise only BSDF sampling can find it
         emitted = lights.emitted(vertex.si, active)
         if self.samples_lights:
             compete = active & by_both & dr.any(emitted != 0)
@@ -167,15 +168,15 @@ class LightTransport(Integrator):
         return dr.select(active, emitted, 0)
 
     def sample_light(self, vertex: Vertex, u: VertexNumbers, active: Mask) -> LightSample | None:
-        """A sample of the light that arrives from the lights; None in a scene without any."""
+        """A sample of the direct light; None in a scene without lights."""
         return self.lights.sample(vertex.si, u.light, active) if self.lights.count else None
 
     def sample_bsdf(
         self, vertex: Vertex, light: LightSample | None, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-        """(BSDF times cosine toward the light, its density there, a direction, the weight of that).
+        """(BSDF times cosine toward the light, its pdf, a sampled direction, the weight of that).
 
-        Without a light the first two are 0; where only lights are looked for, the others are.
+        Without a light the first two are 0; if only lights are sampled, the others are.
         """
         mi, scattering = self.mi, self.scattering
         value, pdf = mi.Spectrum(0), mi.Float(0)
@@ -193,7 +194,7 @@ class LightTransport(Integrator):
     def direct_light(
         self, vertex: Vertex, light: LightSample | None, value: Radiance, pdf: Float, active: Mask
     ) -> Radiance:
-        """The light of a light sample that the vertex sends back along the path, weighted against BSDF sampling."""
+        """The light of a light sample that the vertex reflects along the path, weighted against BSDF sampling."""
         if light is None:
             return self.mi.Spectrum(0)
         si, reflected = vertex.si, value * light.weight
@@ -206,7 +207,7 @@ class LightTransport(Integrator):
         return dr.select(active, dr.select(visible, reflected, 0), 0)
 
     def ambient_light(self, vertex: Vertex, active: Mask) -> Radiance:
-        """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
+        """Ambient radiance times the BSDF's attribute "ambient" (0 without one)."""
         assert self.ambient is not None
         si, bsdf = vertex.si, vertex.bsdf
         if self.mi.is_rgb:
@@ -216,7 +217,8 @@ class LightTransport(Integrator):
         return dr.select(active, reflected * self.ambient.eval(si, active), 0)
 
     def keep_hero(self, path: PathState, vertex: Vertex, throughput: Radiance, active: Mask) -> tuple[Radiance, UInt]:
-        """The throughput of the first wavelength only where a surface disperses, and where that is so."""
+        """Where a surface disperses, the throughput of the first wavelength only; also whether the path is limited to
+        it."""
         if not self.disperses:
             return throughput, path.hero_only
         here = active & ((vertex.bsdf.flags() & DISPERSES) != 0)
@@ -225,7 +227,8 @@ class LightTransport(Integrator):
     def spawn(
         self, path: PathState, vertex: Vertex, bs: BSDFSample, light: LightSample | None, active: Mask
     ) -> PathState:
-        """The path with a ray in the sampled direction. `path` has the vertex's radiance, and the throughput beyond."""
+        """The path with a ray in the sampled direction. `path` has the vertex's radiance, and the throughput after
+        it."""
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         active = active & dr.any(path.throughput != 0) & (self.samples_lobes | delta)
@@ -241,9 +244,9 @@ class LightTransport(Integrator):
         )
 
     def roulette(self, path: PathState, u: VertexNumbers) -> PathState:
-        """End dim paths by chance: survive with SURVIVAL times the throughput's largest channel, at most 0.95.
+        """Russian roulette: survive with SURVIVAL times the throughput's largest channel, at most 0.95.
 
-        Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
+        Inside glass, radiance is scaled by eta^2, which is undone on exit; this does not make a path more important.
         """
         throughput = path.throughput
         survive = dr.clip(SURVIVAL * dr.max(dr.detach(throughput)) * dr.square(path.eta), 1e-6, 0.95)
@@ -252,13 +255,13 @@ class LightTransport(Integrator):
         return replace(path, throughput=dr.select(plays, throughput / survive, throughput), active=active)
 
     def trace(self, path: PathState) -> PathState:
-        """The path with what its ray meets; one that meets nothing ends, unless there is an environment to meet."""
+        """The path with the first hit of its ray; a path that hits nothing ends, unless there is an environment."""
         hit = self.data.surfaces.nearest(path.ray, path.active)
         active = path.active if self.lights.has_environment else path.active & hit.is_valid()
         return replace(path, hit=hit, active=active)
 
     def light_along(self, path: PathState, active: Mask) -> Radiance:
-        """The light that the path's ray meets, of which nothing else is of interest, times the throughput."""
+        """The light along the path's ray times the throughput, if nothing else of the surface is needed."""
         if self.media.known:
             path = self.trace(replace(path, active=active))
             vertex, throughput = self.intersect(path)

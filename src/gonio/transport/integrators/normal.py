@@ -1,4 +1,4 @@
-"""Shading normals."""
+"""The integrator `normal`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .base import Integrator
 
 
 class Normal(Integrator):
-    """The shading normal as a colour, (n + 1) / 2; black where nothing is hit."""
+    """The shading normal as a color, (n + 1) / 2; black where nothing is hit."""
 
     name = "normal"
 

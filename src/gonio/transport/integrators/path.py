@@ -25,8 +25,8 @@ class Path(LightTransport):
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
         depth = self.depth(settings)
-        # The last ray can only find light. It is traced like the others where media dim it, and where it may meet any
-        # of several lights, for which each vertex would have a second ray and its surface.
+        # The last ray can only find light. It is traced like the others if media attenuate it, or if it may hit any of
+        # several lights; otherwise each vertex would have a second ray and its surface.
         self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
         self.one_vertex = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
 
@@ -40,8 +40,8 @@ class Path(LightTransport):
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
         """Add samples [first, last) of every pixel to the sums: one flat loop over the vertices of all of them.
 
-        A lane whose path has ended begins its next one at once, instead of idling until the longest of its 16
-        neighbors' has ended.
+        A lane whose path has ended begins its next one at once, instead of idling until the longest of the 16 paths
+        around it has ended.
         """
         if self.one_vertex:
             return super().accumulate(pixel, key, first, last, sums)
@@ -58,7 +58,7 @@ class Path(LightTransport):
         return dr.while_loop(state, lambda index, *_: index < last, step, mode="symbolic", label="vertices")[2]
 
     def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """Take the light of the surface that the path's ray has met, gather light there, and trace the next ray."""
+        """Add the emission of the surface that the path's ray has hit and its direct light, and trace the next ray."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
         active = path.active & vertex.si.is_valid() & (path.depth + 1 < self.max_depth)
@@ -72,7 +72,7 @@ class Path(LightTransport):
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 
-        # BSDF sampling: the next ray, whose light the next vertex adds.
+        # BSDF sampling: the next ray, whose emission the next vertex adds.
         throughput = throughput * weight
         features = self.data.features(throughput, vertex.si, path.active, active)
         path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)

@@ -1,11 +1,11 @@
-"""A picture in the making.
+"""Progressive rendering.
 
-How it is fast:
+Performance:
 
-- One lane holds one pixel, and one kernel walks through samples [first, first + count) of it, adding them up in
+- One lane holds one pixel, and one kernel iterates over samples [first, first + count) of it, adding them up in
   registers. Memory does not grow with samples; first, count, seed, camera and every parameter of the scene are
   data of the kernel, so nothing is recompiled when they change.
-- Lanes are pixels in 4 x 4 tiles: the vector unit's 16 rays stay together and hit the same things.
+- Lanes are pixels in 4 x 4 tiles: the vector unit's 16 rays stay coherent and hit the same objects.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ from .base import Integrator, Settings
 # 0.21 s in tiles and 0.32 s in scanlines.
 TILE = 4
 
-LANES = "lanes"  # in a state: samples of each lane
+LANES = "lanes"  # key of a state: samples per lane
 
-SHARE = 16  # a lane's share of samples counts in sixteenths
+SHARE = 16  # a lane's share of samples is in sixteenths of the mean
 
-# Before the first pass all lanes read one zero. To write a zero for each would take a large film as long as its first
-# sample. More than one are kept, since Dr.Jit makes another kernel of what reads an array of one.
+# Before the first pass all lanes read one zero, since writing a zero for each lane of a large film takes as long as its
+# first sample. There is more than one zero, since Dr.Jit makes a different kernel for arrays with one entry.
 NOTHING = 16
 
 
 class Render:
-    """A picture in the making: call `advance` until there are enough samples, look at `image` at any time.
+    """A progressive render: call `advance` until there are enough samples, read `image` at any time.
 
     scene     a loaded Mitsuba scene; its parameters may change between renders, not between passes
-    sensor    the camera; None takes the scene's first. Its film gives the size; the pixel filter is a box
+    sensor    the camera; None is the scene's first. Its film gives the size; the pixel filter is a box
     aovs      also average albedo and normal of the first hit, for the denoiser
-    share     samples that each lane gets where a picture has SHARE of them on the mean; None: as many for all
+    share     samples per lane if the mean over the picture is SHARE; None: equally many for all
     """
 
-    features = 0  # values that a subclass adds up beside the radiance
+    features = 0  # number of values that a subclass adds up besides the radiance
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class Render:
         self.mi = mi = engine.load()
         if mi.is_polarized or mi.variant().startswith("scalar"):
             what = "is polarized" if mi.is_polarized else "works on one ray at a time"
-            hint = "load the scene with llvm_ad_rgb or another that is not so, or take Mitsuba's own path"
+            hint = "load the scene with another variant, such as llvm_ad_rgb, or use Mitsuba's own path"
             raise InputError(f"variant {mi.variant()} {what}", "Render", hint)
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")
@@ -72,45 +72,45 @@ class Render:
         self.sensor = sensor if sensor is not None else scene.sensors()[0]
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0
-        self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
+        self._lanes: UInt | None = None  # samples per lane, if some are ahead of `done`
         self._share = None if share is None else own(mi.UInt32, share)
         self._order = tiles(self.width, self.height)
         self._pixel = own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
-        # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
-        # two kernels; this puts both in the second state.
+        # A newly loaded camera and a moved one hold the same numbers in arrays of different order, which would give two
+        # kernels; this call puts both into the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.kept():
             self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
     def _nothing(self, lanes: int) -> Sums:
-        """Sums of no samples."""
+        """Sums over zero samples."""
         features = 6 if self.aovs else self.features
         return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
     def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
-        """The integrator, with what it reads of the scene."""
+        """The integrator with its scene data."""
         settings, program = self.settings, self.settings.program
         parts = self.mi, self.scene, self.sensor, settings.sampler, settings.ambient
         return program(data(*parts, mis_compensation=program.samples_lobes, aovs=self.aovs), settings)
 
     @property
     def advice(self) -> str:
-        """What to tell a person who chose this integrator for this scene; "" is nothing."""
+        """Advice to a user who chose this integrator for this scene; "" if there is none."""
         with dr.suspend_grad():
             return self._integrator.advice()
 
     def advance(self, count: int) -> None:
         """Render `count` more samples of every pixel; returns when they are done.
 
-        Sums are carried on in 64 bits in the order of the samples, which is why passes of any size add up to the
-        same bits, and why a pass that is interrupted leaves the picture as it was before.
+        Sums are in 64 bits and in the order of the samples: passes of any size add up to the same bits, and an
+        interrupted pass leaves the picture unchanged.
         """
         if count < 1:
-            raise InputError(f"{count} samples asked for", "advance", "1 or more")
+            raise InputError(f"{count} samples requested", "advance", "1 or more")
         mi = self.mi
-        # Dr.Jit would record each loop once more, without what turns out to stay as it is: LLVM finds that by itself.
+        # Dr.Jit would record each loop again without its invariant variables: LLVM eliminates these anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
         with dr.suspend_grad(), garbage.kept(), interruptible(), unchanged:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
@@ -119,7 +119,7 @@ class Render:
             lanes, until = self._lanes, dr.opaque(mi.UInt32, highest)
             if self._share is not None:
                 lanes, until = self._shared(lowest) if lanes is None else lanes, self._shared(highest)
-            if lanes is not None:  # some lanes are ahead, and go on or wait
+            if lanes is not None:  # some lanes are ahead, and continue or wait
                 until = dr.maximum(lanes, until)
                 dr.eval(lanes, until)
                 lowest, highest = int(dr.min(lanes)[0]), int(dr.max(until)[0])
@@ -136,7 +136,7 @@ class Render:
         self._lanes = None if self._share is None else until
 
     def _shared(self, done: int) -> UInt:
-        """Samples of each lane where the picture has so many on the mean."""
+        """Samples per lane at a mean of `done` over the picture."""
         mi = self.mi
         return mi.UInt32(mi.UInt64(self._share) * dr.opaque(mi.UInt64, done) // SHARE)
 
@@ -146,7 +146,7 @@ class Render:
         return self.done > 0 or self._lanes is not None
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
+        """The sums so far, as arrays with one entry per lane that do not change while more is rendered."""
         if not self._begun:
             return self._nothing(len(self._pixel)).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
@@ -154,13 +154,16 @@ class Render:
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on from the sums of so many samples, to the same bits. Raises ValueError for those of another film."""
+        lanes = state.get(LANES)
+        if lanes is not None and (lanes.shape != (len(self._pixel),) or lanes.dtype != np.uint32):
+            raise ValueError("samples of other lanes")
         self._sums = Sums.of_arrays(self.mi, state, len(self._pixel), like=self._sums)
         self.done, self._lanes = done, None
-        if LANES in state and np.any(state[LANES] != done):
-            self._lanes = own(self.mi.UInt32, state[LANES])
+        if lanes is not None and np.any(lanes != done):
+            self._lanes = own(self.mi.UInt32, lanes)
 
     def select(self, lanes: slice) -> None:
-        """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
+        """Render these lanes only, from the first sample: a part of the picture, to be assembled by the caller."""
         self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
@@ -175,15 +178,15 @@ class Render:
         return picture
 
     def differences(self) -> list[NDArray[np.float32]]:
-        """How far the picture is from one that is blurred less, told several times by samples of their own; [] where
-        nothing is blurred. Without bias, but noisy; (height, width, 3) each."""
+        """The difference to a less blurred picture, as several estimates with independent samples; [] for an integrator
+        without blur. Unbiased, but noisy; (height, width, 3) each."""
         return self._integrator.differences(self._mean(self._sums.radiance[3:]), self.done)
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).
 
-        Albedo is the mean of the BSDF's sampling weight, hence the fraction of light from all around that goes to
-        the camera: a metal has its colour, a mirror and glass have about 1.
+        Albedo is the mean of the BSDF's sampling weight, that is the fraction of uniform illumination that reaches the
+        camera: a metal has its color, a mirror and glass have about 1.
         """
         if not self.aovs:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
@@ -191,11 +194,12 @@ class Render:
 
     @property
     def invalid(self) -> int:
-        """How many values so far were not finite and were left out; anything but 0 is a fault of some BSDF or light."""
+        """How many values so far were not finite and were skipped; above 0 it indicates a defect of some BSDF or
+        light."""
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, channels: Sequence[Float]) -> NDArray[np.float32]:
-        """Each channel's sums divided by the samples, at their pixels."""
+        """The sums of each channel divided by the samples, at their pixels."""
         mi = self.mi
         shape = (self.height, self.width, len(channels))
         if not self._begun:
@@ -211,7 +215,7 @@ class Render:
 def tiles(width: int, height: int) -> NDArray[np.uint32]:
     """The pixel (row * width + column) of each lane: tiles of TILE x TILE, row by row, without padding."""
     pixels = np.arange(height * width, dtype=np.uint32).reshape(height, width)
-    edge = width - width % TILE  # behind it tiles are narrower
+    edge = width - width % TILE  # beyond it tiles are narrower
     order = np.empty(height * width, np.uint32)
     at = 0
     for top in range(0, height, TILE):

@@ -1,4 +1,4 @@
-"""Surface parameters."""
+"""The integrator `uv`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .base import Integrator
 
 
 class UV(Integrator):
-    """The surface parameters as a colour, (u, v, 0)."""
+    """The surface parameters as a color, (u, v, 0)."""
 
     name = "uv"
 

@@ -1,4 +1,4 @@
-"""The Mitsuba plugin `gonio_area`: a light that shines from both sides of any shape."""
+"""The Mitsuba plugin `gonio_area`: a light that emits from both sides of any shape."""
 
 from __future__ import annotations
 
@@ -27,20 +27,19 @@ from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, is_
 
 
 def register(mi: ModuleType) -> None:
-    """Make `gonio_area` known to the current variant of Mitsuba. Calling it again does nothing.
+    """Register `gonio_area` with the current variant of Mitsuba. Calling it again has no effect.
 
-    The plugin nests as `emitter` in any shape:
+    The plugin is used as the `emitter` of any shape:
 
         {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": {"type": "rgb", "value": [50, 50, 50]}}}
 
     radiance  emitted radiance, W/(m^2 sr), the same in every direction on **both** sides; rgb, spectrum or texture
 
-    tag       any text. Mitsuba's loader merges Python plugins with equal properties, and then complains of one
-              emitter on two shapes: two lamps of the same radiance need different tags, or `load_dict(...,
-              optimize=False)`
+    tag       any text. Mitsuba's loader merges Python plugins with equal properties, and then rejects one emitter on
+              two shapes: two lamps of the same radiance need different tags, or `load_dict(..., optimize=False)`
 
-    It is sampled by solid angle on rectangles and spheres, by area on others. Not for light tracing
-    (`sample_ray` is not offered).
+    It is sampled by solid angle on rectangles and spheres, by area on other shapes. It does not support light tracing
+    (`sample_ray` is missing).
     """
     if mi.variant() not in _registered:
         _registered.add(mi.variant())
@@ -48,7 +47,7 @@ def register(mi: ModuleType) -> None:
 
 
 def _light_class(mi: ModuleType) -> OfVariant:
-    """The class for the variant that is set."""
+    """The emitter class for the current variant."""
     base: Plugin = mi.Emitter
 
     class TwoSidedAreaLight(base):
@@ -70,9 +69,9 @@ def _light_class(mi: ModuleType) -> OfVariant:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
                 ds = direction_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
-            elif is_sphere(mi, shape):  # not its own method: (u, v) there are the sample, and it shines on itself
+            elif is_sphere(mi, shape):  # Mitsuba's samples have a wrong uv, and let a sphere illuminate itself
                 ds = direction_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
-            else:  # not its own method: a mesh's never chooses a point whose normal looks away
+            else:  # Mitsuba's sampling of meshes omits points whose normal faces away
                 ds = area_sample(mi, shape.sample_position(it.time, sample, active), it)
             active = mi.Bool(active) & (ds.pdf > 0)
             ds.emitter = mi.EmitterPtr(self)

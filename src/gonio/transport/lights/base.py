@@ -1,4 +1,4 @@
-"""What every kind of light answers: the radiance it emits, a sample of it, and the density of that sample."""
+"""The interface of lights: emitted radiance, samples, and the density of samples."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class LightSample:
     """A sample of the light that arrives at a point.
 
     ds           Mitsuba's direction sample: direction, distance, density in 1/sr
-    target       the point up to which a shadow ray must be free
+    target       the end point of the shadow ray
     weight       radiance over density
-    delta        whether the light is a point or a parallel beam, which no BSDF sample can meet
-    solid_angle  of a rectangle sampled uniformly in it, else 0
+    delta        whether the light is a point or a parallel beam, which no BSDF sample can hit
+    solid_angle  solid angle of a rectangle that is sampled uniformly in it, else 0
     """
 
     ds: DirectionSample
@@ -30,14 +30,14 @@ class LightSample:
 
 
 class LightHit:
-    """A light met at `si` by a ray from `origin`; `solid_angle` is that of the `LightSample` taken there."""
+    """A light hit at `si` by a ray from `origin`; `solid_angle` is that of the `LightSample` taken there."""
 
     def __init__(self, mi: ModuleType, scene: Scene, origin: Point, solid_angle: Float, si: SurfaceInteraction) -> None:
         self.mi, self.scene, self.origin, self.solid_angle, self.si = mi, scene, origin, solid_angle, si
 
     @cached_property
     def it(self) -> Interaction:
-        """The origin as Mitsuba's emitters take it."""
+        """The origin in the type that Mitsuba's emitters expect."""
         it = dr.zeros(self.mi.SurfaceInteraction3f)
         it.p = self.origin
         return it
@@ -49,13 +49,13 @@ class LightHit:
 
 
 class LightSampler:
-    """One or several lights of a scene that are sampled by one method.
+    """One or several lights of a scene that are sampled by the same method.
 
-    index  the light's place in `Lights.emitters`
+    index  the light's position in `Lights.emitters`
     """
 
     def owns(self, si: SurfaceInteraction) -> Mask:
-        """Whether a ray that ended at `si` may have met one of these lights."""
+        """Whether a ray that ended at `si` may have hit one of these lights."""
         raise NotImplementedError
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
@@ -74,11 +74,11 @@ class LightSampler:
 def with_shadow_target(mi: ModuleType, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
     """A light sample whose shadow ray ends as far off the lamp's surface as it begins off that of `si`.
 
-    A ray that ended on the surface itself would let a round lamp hide its own limb. Nothing arrives from closer, where
-    positions consist of rounding errors.
+    A ray that ended on the surface itself would let a round lamp occlude its own limb. At shorter distances positions
+    consist of rounding errors, so the weight is 0.
     """
     offset = shadow_offset(mi, si.p, ds.p)
-    normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point has none
+    normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point light has none
     target = mi.Point3f(ds.p - normal * dr.mulsign(offset, dr.dot(normal, ds.d)))
     weight = dr.select(ds.delta | (ds.dist > offset), weight, 0)
     return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))

@@ -1,4 +1,4 @@
-"""Mitsuba's direction samples toward lamps, from points on them and their densities."""
+"""Mitsuba's direction samples toward lamps, from points on the lamps and their densities."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from types import ModuleType
 import drjit as dr
 
 from ...bridge.types import DirectionSample, Float, Interaction, Mask, Point, PositionSample, Record, Shape
-from .solid_angles import Seen
+from .solid_angles import LampView
 
 
-def direction_sample(mi: ModuleType, view: Seen, sample: Point, it: Interaction) -> DirectionSample:
-    """A direction sample toward a lamp as it is seen from `it`, from two numbers in [0, 1)."""
+def direction_sample(mi: ModuleType, view: LampView, sample: Point, it: Interaction) -> DirectionSample:
+    """A direction sample toward a lamp from `it`, from two numbers in [0, 1)."""
     ps = dr.zeros(mi.PositionSample3f, dr.width(it.p))
     point, normal, uv, pdf = view.sample(sample.x, sample.y)
     ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*uv), it.time
@@ -38,12 +38,12 @@ def toward(mi: ModuleType, ps: Record, it: Interaction) -> DirectionSample:
 
 
 def area_density(shape: Shape, ps: PositionSample, active: Mask) -> Float:
-    """Density per area with which a shape samples its own points."""
+    """Density per area with which a shape samples its points."""
     density: Float = shape.pdf_position(ps, active)
     return density
 
 
 def per_steradian(pdf: Float, ds: DirectionSample) -> Float:
-    """A density per area as one per solid angle."""
+    """Convert a density per area to one per solid angle."""
     cosine = dr.abs(dr.dot(ds.d, ds.n))
     return dr.select(cosine > 0, pdf * dr.square(ds.dist) / cosine, 0)

@@ -1,4 +1,4 @@
-"""The environment as a light: by Mitsuba's own sampling, or by the density of `sky.py`."""
+"""The environment as a light, sampled by Mitsuba or by the density of `sky.py`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .sky import Sky
 
 
 class Environment(LightSampler):
-    """What rays that leave the scene meet."""
+    """The light of rays that leave the scene, sampled by Mitsuba."""
 
     def __init__(self, mi: ModuleType, emitter: Emitter) -> None:
         self.mi, self.emitter = mi, emitter
@@ -31,7 +31,7 @@ class Environment(LightSampler):
 
 
 class VaryingEnvironment(Environment):
-    """An environment map, sampled by its brightness."""
+    """An environment map that is sampled by its luminance."""
 
     def __init__(self, mi: ModuleType, emitter: Emitter, sky: Sky) -> None:
         super().__init__(mi, emitter)
@@ -51,7 +51,7 @@ class VaryingEnvironment(Environment):
 def environment(mi: ModuleType, scene: Scene, emitter: Emitter, mis_compensation: bool) -> Environment:
     """The sampler of an environment.
 
-    mis_compensation  whether BSDFs are sampled too, to which the even part of a map is left (Karlik2019)
+    mis_compensation  whether BSDFs are sampled too, so that they can sample the uniform part of a map (Karlik2019)
     """
     if "data" in dict(mi.traverse(emitter)):
         sky = Sky(mi, scene, emitter, mis_compensation)

@@ -1,4 +1,4 @@
-"""All lights but the environment, each asked by a call of Mitsuba's emitter from the kernel."""
+"""All lights except the environment, sampled by calls of Mitsuba's emitters from the kernel."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import drjit as dr
 import numpy as np
 
 from ...bridge.faults.borrowed_memory import own
+from ...bridge.faults.rotated_sphere_normal import with_radial_normal
 from ...bridge.faults.textured_area_light import must_sample_by_area
-from ...bridge.faults.turned_sphere_normal import with_radial_normal
 from ...bridge.types import (
     DirectionSample,
     Emitter,
@@ -36,11 +36,11 @@ Answer = TypeVar("Answer")
 
 
 class Lamps(LightSampler):
-    """Lights with a surface, points and beams, as Mitsuba samples them.
+    """Lights with a surface, point lights and beams, as Mitsuba samples them.
 
     emitters       all lights of the scene, in the order of `Lights`
-    scene_indices  the place of each among `scene.emitters()`
-    environment    the place among `emitters` of the one that is no lamp, -1 where there is none
+    scene_indices  their positions in `scene.emitters()`
+    environment    position of the environment in `emitters`, -1 if there is none
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Lamps(LightSampler):
         lamps = [emitter for i, emitter in enumerate(emitters) if i != environment]
         self.lone = lamps[0] if len(lamps) == 1 else None
         shape = emitters[0].get_shape() if len(emitters) == 1 else None
-        # Data, too: where another scene is alive, this one's shapes have other numbers.
+        # Kernel data as well: the numbers of shapes depend on what other scenes exist.
         self.lone_shape = None if shape is None else dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
         dr.make_opaque(self.lone_shape)
         by_area = [must_sample_by_area(mi, emitter) for emitter in emitters]
@@ -58,7 +58,7 @@ class Lamps(LightSampler):
         dr.make_opaque(self.by_area)
 
     def emitter(self, index: UInt, active: Mask) -> Emitter:
-        """The emitter with this index; a lone lamp is asked without a call from the kernel, which is faster."""
+        """The emitter with this index; a single lamp is called directly instead of by pointer, which is faster."""
         if self.lone is not None:
             return self.lone
         place = dr.gather(self.mi.UInt32, self.scene_indices, index, active)
@@ -82,7 +82,7 @@ class Lamps(LightSampler):
     def _asked(
         self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask
     ) -> tuple[DirectionSample, Radiance]:
-        """What a light itself samples; where that is wrong, a point on its area."""
+        """Mitsuba's own sample of a light; where that is incorrect, a point sampled by area."""
         if self.by_area is None:
             own: tuple[DirectionSample, Radiance] = emitter.sample_direction(si, u, active)
             return own
@@ -94,7 +94,7 @@ class Lamps(LightSampler):
         return dr.select(here, near, ds), dr.select(here & (near.pdf > 0), sent / near.pdf, weight & ~here)
 
     def sent(self, emitter: Emitter, ds: DirectionSample, si: SurfaceInteraction, active: Mask) -> Radiance:
-        """Radiance of a lamp toward `si` from a point on it."""
+        """Radiance of a lamp toward `si` from a point on the lamp."""
         at_light = self.mi.SurfaceInteraction3f(ds, si.wavelengths)
         at_light.wi = at_light.to_local(-ds.d)
         return emitter.eval(at_light, active)
@@ -111,7 +111,7 @@ class Lamps(LightSampler):
     # ------------------------------------------------------------------ points on a lamp
 
     def on_area(self, emitter: Emitter, index: UInt, u: Point, active: Mask) -> PositionSample:
-        """A point of a lamp, uniform on its area."""
+        """A point of a lamp, uniformly by area."""
         mi = self.mi
         nothing: PositionSample = dr.zeros(mi.PositionSample3f)
         ps = self.of_shape(emitter, index, lambda shape, *args: shape.sample_position(0.0, *args), nothing, u, active)
@@ -122,11 +122,11 @@ class Lamps(LightSampler):
     def of_shape(
         self, emitter: Emitter, index: UInt, ask: Callable[..., Answer], nothing: Answer, *args: OfVariant
     ) -> Answer:
-        """`ask(shape, *args)` of a lamp's shape; `nothing` of a lamp that has none."""
+        """`ask(shape, *args)` for a lamp's shape; `nothing` for a lamp without one."""
         if len(self.emitters) == 1 or not self.has_instances:
             return ask(self.emitters[0].get_shape() if len(self.emitters) == 1 else emitter.get_shape(), *args)
 
-        # An instance, which a call from the kernel would ask too, has no area.
+        # An instance, which a call from the kernel would include, has no area.
         def answer(shape: Shape | None) -> Callable[..., Answer]:
             return lambda *args: nothing if shape is None else ask(shape, *args)
 
@@ -139,8 +139,8 @@ class Lamps(LightSampler):
 
     @cached_property
     def spheres(self) -> Float | None:
-        """Four numbers per lamp: the center of a sphere and its radius, which is negative where the normal points
-        inward; 0 of other lamps. None where no lamp is a sphere."""
+        """Four numbers per lamp: center and radius of a sphere, where a negative radius means that the normal points
+        inward; 0 for other lamps. None if no lamp is a sphere."""
         mi = self.mi
         rows, read = np.zeros((len(self.emitters), 4)), placement_reader(mi)
         for row, emitter in zip(rows, self.emitters, strict=True):

@@ -1,4 +1,4 @@
-"""The lights of a scene: a list of samplers, which of them a sample takes, and how it is weighed against the BSDF's."""
+"""The lights of a scene: their samplers, the choice among them, and their weights against BSDF sampling."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from .lamps import Lamps
 
 
 class Choice(Protocol):
-    """Which of several lights a sample at a point takes."""
+    """A rule that chooses one of several lights for a sample at a point."""
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
-        """(index of a light, what is left of `u` as a number in [0, 1], the light's probability)."""
+        """(index of a light, `u` rescaled to [0, 1] for reuse, the light's probability)."""
         ...
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
@@ -36,11 +36,11 @@ class Choice(Protocol):
 class Lights:
     """The lights of a scene, as integrators use them.
 
-    emitters  Mitsuba's, in an order that does not change between runs; `index` is a place among them
-    samplers  of the environment and of the lamps, chosen once: the fastest that know them (`fast/`)
-    lamps     the sampler of all lights but the environment
+    emitters  Mitsuba's emitters, in an order that does not change between runs; `index` is a position among them
+    samplers  samplers of the environment and of the lamps: the fastest that support them (`fast/`)
+    lamps     the sampler of all lights except the environment
 
-    mis_compensation  whether BSDFs are sampled too, to which an environment map leaves its even part
+    mis_compensation  whether BSDFs are sampled too, which then sample the uniform part of an environment map
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, mis_compensation: bool = False):
@@ -69,7 +69,7 @@ class Lights:
         return self.mi.has_flag(flags, kinds.Infinite) and not self.mi.has_flag(flags, kinds.DeltaDirection)
 
     def _prepare_choice(self) -> None:
-        """Probabilities of the lights, and tables from Dr.Jit's pointers to them."""
+        """Prepare the probabilities of the lights, and tables indexed by Dr.Jit's pointers to them."""
         mi = self.mi
         self.probability = self._probabilities()
         self.by_power = mi.DiscreteDistribution(self.probability)
@@ -79,7 +79,7 @@ class Lights:
         self.index_of_pointer = self._of_pointer(dr.arange(mi.UInt32, self.count))
 
     def _lamps(self, order: list[int]) -> Lamps:
-        """The sampler of the lamps."""
+        """The fastest sampler that supports the lamps."""
         mi = self.mi
         parts = mi, self.scene, self.emitters, self.scene_indices, self.environment_index
         if not fast.enabled() or not self.count:
@@ -90,19 +90,19 @@ class Lights:
         return TabledLamps.of(*parts, pointers, self.index_of_pointer if self.count > 1 else None) or Lamps(*parts)
 
     def _probabilities(self) -> Float:
-        """Half uniform, half by the mean unoccluded light at 256 points spread in the scene's bounding box.
+        """Half uniform, half by the mean unoccluded light at 256 points distributed over the scene's bounding box.
 
-        The uniform half keeps every light's weight below 2 n: a dim lamp beside an object may matter most there.
+        The uniform half limits every light's weight to 2 n: a dim lamp next to an object may matter most there.
         """
         mi = self.mi
         index = dr.arange(mi.UInt32, 256)
         it = dr.zeros(mi.SurfaceInteraction3f, 256)
         box = self.scene.bbox()
         if box.valid():
-            # Multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time.
+            # Multiples of powers of the inverse of x^4 = x + 1 mod 1 (R3 sequence, M. Roberts): even and deterministic.
             spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
             low, extents = mi.Point3f(box.min), mi.Vector3f(box.extents())
-            dr.make_opaque(low, extents)  # data: as literals they would make a kernel for every size of scene
+            dr.make_opaque(low, extents)  # kernel data: literals would give a kernel per scene size
             it.p = low + spread * extents
         if mi.is_spectral:
             it.wavelengths = type(it.wavelengths)(550)
@@ -113,11 +113,11 @@ class Lights:
             mean = float(dr.mean(dr.mean(weight, axis=0))[0])
             flux.append(mean if 0 <= mean < float("inf") else 0.0)
         total = sum(flux)
-        shares = [f / total if total > 0 else 1 / self.count for f in flux]
-        return mi.Float([0.5 / self.count + 0.5 * share for share in shares])
+        fractions = [f / total if total > 0 else 1 / self.count for f in flux]
+        return mi.Float([0.5 / self.count + 0.5 * fraction for fraction in fractions])
 
     def _of_pointer(self, values: Float) -> Float:
-        """A value per light, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
+        """A value per light, indexed by Dr.Jit's number of the emitter (the content of an EmitterPtr)."""
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
         table = dr.zeros(type(values), int(dr.max(number)[0]) + 1)
@@ -125,10 +125,10 @@ class Lights:
         dr.eval(table)
         return table
 
-    # ------------------------------------------------------------------ what integrators ask
+    # ------------------------------------------------------------------ used by integrators
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
-        """Radiance that the surface (or, where the ray left the scene, the environment) at `si` sends along the ray."""
+        """Radiance from the surface at `si` along the ray, or from the environment if the ray left the scene."""
         radiance = self.mi.Spectrum(0)
         for sampler in self.samplers:
             owns = sampler.owns(si)
@@ -136,10 +136,11 @@ class Lights:
         return radiance
 
     def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
-        """A direction toward a light: `u` in [0, 1)^2 chooses the light by its x, and by what is left a point on it.
+        """A direction toward a light: `u` in [0, 1)^2 chooses the light by x, and a point on it by the rescaled x and
+        by y.
 
-        Chosen by a number of its own, a light would get any of the points of all, distributed as unevenly as random
-        ones.
+        With a separate number for the choice, each light would get a random subset of all points, which is as uneven as
+        random points.
         """
         mi = self.mi
         if self.count == 1:
@@ -157,7 +158,7 @@ class Lights:
         return light
 
     def pdf(self, origin: Point, solid_angle: Float, si: SurfaceInteraction, active: Mask) -> Float:
-        """Density (1/sr) with which `sample`, asked at `origin`, would have chosen the direction of the light at `si`.
+        """Density (1/sr) with which `sample` at `origin` would have chosen the direction of the light at `si`.
 
         solid_angle  `LightSample.solid_angle` at that origin, so that it is not computed twice
         """
@@ -175,24 +176,25 @@ class Lights:
         return density * self.choice.probability(origin, index, active)
 
     def mis_weight(self, pdf: Float, other: Float) -> Float:
-        """Weight of one of two strategies with a sample each and densities `pdf` and `other`: lights and BSDFs.
+        """Weight of one of two sampling strategies (lights, BSDFs) with one sample each and densities `pdf` and
+        `other`.
 
         The power heuristic p^2 / (p^2 + q^2) (Veach1997); the balance heuristic p / (p + q) under a compensated
         environment map, for which it has 5 to 10 % less error (Karlik2019).
         """
-        ratio = other / pdf  # first the ratio: p^2 itself overflows for sharp lobes
+        ratio = other / pdf  # ratio first: p^2 itself overflows for narrow lobes
         compensated = any(isinstance(sampler, VaryingEnvironment) for sampler in self.samplers)
         both = ratio + 1 if compensated else dr.fma(ratio, ratio, 1)
         return dr.select(pdf > 0, dr.rcp(both), 0)
 
     @property
     def shortens_last_ray(self) -> bool:
-        """Whether `along` needs no nearest surface, only a shadow ray where the ray points at the light."""
+        """Whether `along` needs no nearest surface, only a shadow ray if the ray points at the light."""
         return isinstance(self.lamps, RectangleLight)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
-        """The light that arrives along a ray which can meet nothing else, with its density as in `pdf`: one pair, or
-        several of lights that do not hide one another."""
+        """The light along a ray, with its density as in `pdf`: one pair, or several if lights do not occlude one
+        another. Anything else that the ray may hit is ignored."""
         if isinstance(self.lamps, RectangleLight):
             return [self.lamps.along(ray, solid_angle, active)]
         hit = self.surfaces.nearest(ray, active)
@@ -202,7 +204,7 @@ class Lights:
 
 
 class PowerChoice:
-    """The same probabilities everywhere: half uniform, half by the light that each sends into the scene."""
+    """The same probabilities everywhere: half uniform, half by the light that each lamp sends into the scene."""
 
     def __init__(self, by_power: Choice) -> None:
         self._by_power = by_power

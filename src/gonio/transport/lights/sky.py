@@ -1,8 +1,8 @@
-"""Directions toward an environment, by how bright it is.
+"""Directions toward an environment, with a density proportional to its luminance.
 
-A grid of cells, even in longitude and in colatitude, holds the mean luminance of each; within a cell directions are
-uniform. Where lobes are sampled beside it (multiple importance sampling), the grid holds what exceeds the mean of the
-whole: lobes see to the even part, and the directions here go where they would be missed (Karlik2019).
+A grid of cells, uniform in longitude and colatitude, holds the mean luminance of each; within a cell directions are
+uniform. If BSDFs are sampled too (multiple importance sampling), the grid holds the excess over the mean of the sphere:
+BSDF sampling covers the uniform part, and light sampling concentrates on the rest (Karlik2019).
 """
 
 from __future__ import annotations
@@ -16,29 +16,30 @@ from numpy.typing import NDArray
 from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt, Vector
 
-NARROWEST, WIDEST = 64, 1024  # cells around, twice as many as from pole to pole: as fine as the map, up to .35 degrees
-LEAST = 0.05  # of its luminance that each cell keeps: lobes that are badly sampled have to be found here
-SHORT = 16  # steps that are searched by halves, all of them
-MOST_STEPS = 4  # a side, in which a cell is looked at: maps of 4096 texels around are read whole
+# Cells in longitude, twice as many as in colatitude: as fine as the map, up to 0.35 degrees.
+MIN_WIDTH, MAX_WIDTH = 64, 1024
+MIN_PART = 0.05  # of its luminance that each cell retains: lobes may be sampled badly by their material
+SHORT = 16  # entries up to which a row is searched by bisection alone
+MAX_STEPS = 4  # per axis, at which a cell is evaluated: maps up to 4096 texels wide are read completely
 
 
 class Sky:
     """An environment as a density of directions.
 
-    compensated  whether lobes are sampled beside it
+    compensated  whether BSDFs are sampled too
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, emitter: Emitter, compensated: bool) -> None:
         self.mi, self.emitter = mi, emitter
         texels = max(int(mi.traverse(emitter)["data"].shape[1]) - 2, 1)  # Mitsuba repeats a column at each end
-        self.width = min(max(1 << (texels - 1).bit_length(), NARROWEST), WIDEST)
+        self.width = min(max(1 << (texels - 1).bit_length(), MIN_WIDTH), MAX_WIDTH)
         self.height = self.width // 2
-        luminance = self._seen(min(max(-(-texels // self.width), 2), MOST_STEPS))
+        luminance = self._luminance(min(max(-(-texels // self.width), 2), MAX_STEPS))
         edges = np.cos(np.pi * np.arange(self.height + 1) / self.height)
         angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / self.width)  # steradian of a cell
         if compensated:
             mean = float(np.sum(luminance * angle) / (4.0 * np.pi))
-            luminance = np.maximum(luminance - mean, LEAST * luminance)
+            luminance = np.maximum(luminance - mean, MIN_PART * luminance)
         total = float(np.sum(luminance * angle))
         self.known = 0.0 < total < np.inf
         if not self.known:
@@ -46,18 +47,18 @@ class Sky:
         rows = np.cumsum(np.sum(luminance * angle, axis=1) / total)
         columns = np.cumsum(luminance, axis=1)
         columns /= np.maximum(columns[:, -1:], 1e-300)
-        self._density = self._held(luminance / total)  # 1/sr
+        self._density = self._stored(luminance / total)  # 1/sr
         self._rows, self._columns = Choice(mi, rows[None] / rows[-1]), Choice(mi, columns)
         box = scene.bbox()
         reach = 1.0 if not box.valid() else float(dr.norm(mi.ScalarVector3f(box.extents())))
         self._far = dr.opaque(mi.Float, max(4.0 * reach, 1e-3))
 
-    def _held(self, values: NDArray[np.float64]) -> Float:
+    def _stored(self, values: NDArray[np.float64]) -> Float:
         return own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
 
-    def _seen(self, steps: int) -> NDArray[np.float64]:
-        """Luminance of each cell, from points so many steps apart on its edges and inside: between mean and largest, so
-        that no cell which holds a part of a sun seems dark."""
+    def _luminance(self, steps: int) -> NDArray[np.float64]:
+        """Luminance of each cell, from (steps + 1)^2 points on its edges and inside: halfway between mean and maximum,
+        so that a cell which contains a part of a sun is not underestimated."""
         mi, high, wide = self.mi, steps * self.height, steps * self.width
         index = dr.arange(mi.UInt32, (high + 1) * wide)
         row = index // wide
@@ -79,7 +80,7 @@ class Sky:
         return 0.5 * (largest + total / (steps + 1) ** 2).astype(np.float64)
 
     def _toward(self, longitude: Float, cosine: Float) -> Vector:
-        """A direction: longitude in turns, cosine of the angle with the grid's axis, y."""
+        """A direction from the longitude in turns and the cosine of the angle with the grid's y axis."""
         sine = dr.sqrt(dr.maximum(0.0, dr.fma(-cosine, cosine, 1.0)))
         sin, cos = dr.sincos(longitude * (2.0 * dr.pi))
         return self.mi.Vector3f(sine * cos, cosine, sine * sin)
@@ -109,39 +110,39 @@ class Sky:
 
 
 class Choice:
-    """Steps of running sums, from 0 to 1 along each row: which one a number falls into.
+    """Inversion of cumulative sums, which run from 0 to 1 along each row.
 
-    Where a row is long, a second table tells between which two steps each of as many even parts of [0, 1] lies, so that
-    few are left to search (Chen1974): of a sky with a sun one or two, where halves of the whole take nine looks.
+    For long rows a guide table holds, for each of as many equal intervals of [0, 1], the range of entries to search
+    (Chen1974): one or two for a sky with a sun, where bisection of the row needs nine steps.
     """
 
     def __init__(self, mi: ModuleType, sums: NDArray[np.float64]) -> None:
-        rows, self.count = sums.shape  # a power of two
+        rows, self.count = sums.shape  # count is a power of two
         self.mi, sums = mi, sums.astype(np.float32)
         self.sums = own(mi.Float, sums.ravel())
         self.below: UInt | None = None
         if self.count > SHORT:
-            # how many sums of its row are at most k / count, for k up to count
+            # the number of sums in a row that are at most k / count, for k up to count
             at = np.ceil(sums * self.count).astype(np.int64) + np.arange(rows)[:, None] * (self.count + 1)
             below = np.bincount(at.ravel(), minlength=rows * (self.count + 1)).reshape(rows, -1).cumsum(axis=1)
             self.below = own(mi.UInt32, np.minimum(below, self.count - 1).astype(np.uint32).ravel())
 
     def of(self, row: UInt, u: Float) -> tuple[UInt, Float]:
-        """(the step of a row in which u in [0, 1] lies, how far into it)."""
+        """(the entry of a row that contains u in [0, 1], relative position within it)."""
         mi, begin = self.mi, row * self.count
-        at = self._halved(begin, u) if self.below is None else self._searched(self.below, row, begin, u)
+        at = self._bisect(begin, u) if self.below is None else self._search(self.below, row, begin, u)
         start = dr.select(at > 0, dr.gather(mi.Float, self.sums, begin + dr.maximum(at, 1) - 1), 0.0)
         end = dr.gather(mi.Float, self.sums, begin + at)
         return at, dr.clip((u - start) / dr.maximum(end - start, 1e-30), 0.0, 1.0)
 
-    def _halved(self, begin: UInt, u: Float) -> UInt:
+    def _bisect(self, begin: UInt, u: Float) -> UInt:
         at, half = self.mi.UInt32(0), self.count // 2
         while half:
             at = dr.select(dr.gather(self.mi.Float, self.sums, begin + at + (half - 1)) <= u, at + half, at)
             half //= 2
         return at
 
-    def _searched(self, below: UInt, row: UInt, begin: UInt, u: Float) -> UInt:
+    def _search(self, below: UInt, row: UInt, begin: UInt, u: Float) -> UInt:
         mi = self.mi
         part = row * (self.count + 1) + dr.minimum(mi.UInt32(u * self.count), self.count - 1)
 

@@ -1,4 +1,4 @@
-"""Lamps as they are seen from a point: directions toward rectangles and balls, even in their solid angle or area."""
+"""Lamps as seen from a point: directions toward rectangles and balls, uniform in solid angle or area."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import drjit as dr
 
 from ...bridge.types import Float, Mask, Point, Shape, Vector
 
-# Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
-# 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
-# from the solid angle. Above: the point lies all but in the rectangle (2 pi = 6.283), where 1/z0 loses its digits.
+# Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 have an error of
+# 2.4e-7, so at 1e-3 sr the sampled position is accurate to 2.4e-4 of an edge, and solid angles bring no gain for such
+# distant lamps. Above: the point is almost in the rectangle (2 pi = 6.283), where 1/z0 loses precision.
 SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
 
-# A point is on a ball, as far as float32 knows, closer to it than this part of the radius and that of its coordinates.
+# A point counts as on a ball if it is closer to it than these fractions of the radius and of its coordinates.
 TOUCHING, ROUNDING = 1e-4, 1e-6
 
-# Cosine of the lean of edges that float32 transforms of a true rectangle stay far below; it bounds the error.
+# Largest |cosine| between edges of a rectangle; float32 transforms of a true rectangle stay far below it.
 STRAIGHT = 1e-4
 
-Sample = tuple[Point, Vector, tuple[Float, Float], Float]  # a point, its normal, (u, v) there, its density in 1/sr
+Sample = tuple[Point, Vector, tuple[Float, Float], Float]  # point, normal, (u, v), density in 1/sr
 
 
 @dataclass
 class Rectangle:
-    """A rectangle in space: corner, two perpendicular unit axes, their lengths, and the side of its normal: 1 where
-    that is axis0 x axis1, else -1."""
+    """A rectangle in space: corner, two perpendicular unit axes, their lengths, and the side of its normal: 1 for
+    axis0 x axis1, else -1."""
 
     corner: Point
     axis0: Vector
@@ -37,8 +37,8 @@ class Rectangle:
 
     @staticmethod
     def of(mi: ModuleType, shape: Shape) -> Rectangle:
-        """The rectangle of a Mitsuba `rectangle` as the kernel sees it, so that moving it recompiles nothing; of its
-        sides either may be that of the normal."""
+        """The rectangle of a Mitsuba `rectangle` as kernel data, so that moving it recompiles nothing; the side of its
+        normal is not determined."""
         zero, one = mi.Float(0), mi.Float(1)
         corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
         edge0 = shape.sample_position(zero, mi.Point2f(one, zero)).p - corner
@@ -55,15 +55,15 @@ class Rectangle:
         return self.length0 * self.length1
 
     def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) toward a point seen at `distance` under |cosine|: uniform in the solid angle where one is
-        given, uniform on the area where it is 0."""
+        """Density (1/sr) toward a point at `distance` under |cosine|: uniform in the solid angle, or uniform by area if
+        `solid_angle` is 0."""
         return dr.select(solid_angle > 0, dr.rcp(solid_angle), self.pdf_by_area(distance, cosine))
 
     def pdf_by_area(self, distance: Float, cosine: Float) -> Float:
         return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
 
     def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
-        """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
+        """Intersection with a ray: (distance, (u, v) in [0, 1]^2, whether there is one)."""
         normal = self.normal
         distance = dr.dot(self.corner - origin, normal) / dr.dot(direction, normal)
         offset = dr.fma(direction, distance, origin) - self.corner
@@ -72,14 +72,14 @@ class Rectangle:
 
 
 class SphericalRectangle:
-    """A rectangle seen from a point: its solid angle, and directions uniform in it.
+    """A rectangle as seen from a point: its solid angle, and directions uniform in it.
 
     Urena2013, sec. 3: in the frame of the rectangle, with the point at the origin and the rectangle at z0 < 0, the
-    u-coordinate is found by inverting the solid angle of a sub-rectangle, the v-coordinate by inverting the height
-    on the sphere. Where the solid angle is too small or too large for float32 the area is sampled instead.
+    u-coordinate follows from inverting the solid angle of a sub-rectangle, the v-coordinate from inverting the height
+    on the sphere. If the solid angle is too small or too large for float32, the area is sampled instead.
 
-    `solid_angle` is exact for small ones too: twice the sum of the two triangles' (Van Oosterom and Strackee 1983),
-    whose numerator is a product and cancels nothing, unlike the sum of four angles less 2 pi.
+    `solid_angle` is accurate for small ones too: twice the sum of the two triangles' (Van Oosterom and Strackee 1983),
+    whose numerator is a product without cancellation, unlike the sum of four angles minus 2 pi.
     """
 
     def __init__(self, rectangle: Rectangle, origin: Point):
@@ -90,7 +90,7 @@ class SphericalRectangle:
         self.z0 = -dr.abs(dr.dot(offset, rectangle.normal))
         zz = dr.square(self.z0)
         xx0, xx1, yy0, yy1 = dr.square(self.x0), dr.square(self.x1), dr.square(self.y0), dr.square(self.y1)
-        # z components of the normals of the planes through the origin and an edge: v = y0, y1 and u = x0.
+        # z components of the normals of the planes through the origin and an edge: v = y0, y1 and u = x0
         self.n0 = -self.y0 * dr.rsqrt(yy0 + zz)
         self.n2 = self.y1 * dr.rsqrt(yy1 + zz)
         n3 = -self.x0 * dr.rsqrt(xx0 + zz)
@@ -113,7 +113,7 @@ class SphericalRectangle:
         return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance` under |cosine|."""
         return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
 
     def sample(self, u: Float, v: Float) -> Sample:
@@ -141,13 +141,13 @@ class SphericalRectangle:
 
 @dataclass
 class RectangularArea:
-    """A rectangle of which points are sampled uniform on its area."""
+    """A rectangle whose points are sampled uniformly by area."""
 
     rectangle: Rectangle
     origin: Point
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance` under |cosine|."""
         return self.rectangle.pdf_by_area(distance, cosine)
 
     def sample(self, u: Float, v: Float) -> Sample:
@@ -162,27 +162,27 @@ class RectangularArea:
 
 @dataclass
 class Ball:
-    """A sphere in space: its centre, its radius, the side of its normal (1 outward, -1 inward), and where (u, v) are
-    wanted the axes from which they are counted."""
+    """A sphere in space: its center, its radius, the side of its normal (1 outward, -1 inward), and the axes of its
+    (u, v) if these are needed."""
 
-    centre: Point
+    center: Point
     radius: Float
     side: Float
     axes: tuple[Vector, ...] = ()
 
     @staticmethod
     def of(mi: ModuleType, shape: Shape) -> Ball:
-        """The ball of a Mitsuba `sphere` as the kernel sees it, so that moving it recompiles nothing."""
+        """The ball of a Mitsuba `sphere` as kernel data, so that moving it recompiles nothing."""
         zero, half, one = mi.Float(0), mi.Float(0.5), mi.Float(1)
         top, bottom = (shape.sample_position(zero, mi.Point2f(zero, v)).p for v in (zero, one))
         side = mi.Float(-1 if shape.has_flipped_normals() else 1)
-        centre = 0.5 * (top + bottom)
+        center = 0.5 * (top + bottom)
         radius = 0.5 * dr.norm(top - bottom)
-        x, y = (shape.sample_position(zero, mi.Point2f(u, half)).p - centre for u in (zero, mi.Float(0.25)))
-        return Ball(centre, radius, side, (x / radius, y / radius, (top - centre) / radius))
+        x, y = (shape.sample_position(zero, mi.Point2f(u, half)).p - center for u in (zero, mi.Float(0.25)))
+        return Ball(center, radius, side, (x / radius, y / radius, (top - center) / radius))
 
     def uv(self, outward: Vector) -> tuple[Float, Float]:
-        """(u, v) of the place whose normal is `outward`, as rays find them there; (0, 0) of a ball without axes."""
+        """(u, v) of the point with normal `outward`, as in ray intersections; (0, 0) for a ball without axes."""
         if not self.axes:
             return type(self.radius)(0), type(self.radius)(0)
         x, y, z = (dr.dot(outward, axis) for axis in self.axes)
@@ -191,20 +191,20 @@ class Ball:
 
 
 class SphericalCap:
-    """A ball seen from a point: the cap of directions that it fills, and directions uniform in it.
+    """A ball as seen from a point: the cap of directions that it subtends, and directions uniform in it.
 
-    A point of the ball follows from its direction by the law of sines (PBRT4, sec. 6.2.4), which cancels nothing.
-    From the surface itself and from inside, points are uniform on the area: from a place on the inner side that makes
-    light sampled by a diffuse surface the same for every point. The outer side sees nothing of its own ball, but for
-    the cap it would see itself: a distance of 0 in a direction made of rounding.
+    A point of the ball follows from its direction by the law of sines (PBRT4, sec. 6.2.4), which has no cancellation.
+    From the surface itself and from inside, points are uniform by area: from the inner side, the light sampled by a
+    diffuse surface is then the same for every point. From the outer side a ball does not see itself; a cap would give
+    it a distance of 0 in a direction made of rounding errors.
     """
 
     def __init__(self, mi: ModuleType, ball: Ball, origin: Point):
         self.mi, self.ball, self.origin = mi, ball, origin
-        away = ball.centre - origin
+        away = ball.center - origin
         distance = dr.norm(away)
         self.axis = dr.select(distance > 0, away / distance, mi.Vector3f(0, 0, 1))
-        reach = dr.max(dr.abs(ball.centre)) + ball.radius
+        reach = dr.max(dr.abs(ball.center)) + ball.radius
         self.outside = distance - ball.radius > TOUCHING * ball.radius + ROUNDING * reach
         self.distance = dr.select(self.outside, distance, 2 * ball.radius)
         sine2 = dr.square(ball.radius / self.distance)
@@ -212,11 +212,11 @@ class SphericalCap:
 
     @property
     def solid_angle(self) -> Float:
-        """Steradian, of a ball seen from outside."""
+        """Solid angle (sr) of a ball seen from outside."""
         return 2 * dr.pi * self.height
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the ball at `distance`, seen under |cosine| on it."""
+        """Density (1/sr) of `sample` toward a point of the ball at `distance` under |cosine|."""
         area = 4 * dr.pi * dr.square(self.ball.radius)
         by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * area, 1e-30))
         return dr.select(self.outside, dr.rcp(self.solid_angle), by_area)
@@ -232,17 +232,18 @@ class SphericalCap:
         across = dr.select(self.outside, across, dr.safe_sqrt(1 - dr.square(z)))
         s, c = dr.sincos(2 * dr.pi * v)
         normal = mi.Vector3f(mi.Frame3f(self.axis).to_world(mi.Vector3f(c * across, s * across, z)))
-        point = dr.fma(normal, ball.radius, ball.centre)
+        point = dr.fma(normal, ball.radius, ball.center)
         away = point - self.origin
         distance = dr.norm(away)
         pdf = self.pdf(distance, dr.abs(dr.dot(away, normal)) / distance)
         return point, normal * ball.side, ball.uv(normal), pdf
 
 
-Seen = SphericalRectangle | RectangularArea | SphericalCap
+LampView = SphericalRectangle | RectangularArea | SphericalCap
 
 
 def is_sphere(mi: ModuleType, shape: Shape) -> bool:
+    """Whether a shape is a `sphere`."""
     return bool(shape.shape_type() == mi.ShapeType.Sphere.value)
 
 

@@ -1,10 +1,10 @@
-"""Where light begins: particles that leave the lamps.
+"""Emission of particles from the lamps.
 
-A particle is a ray from a lamp and the light that it carries, its radiance over `density`. That density is one of
-*étendue*, 1/(m^2 sr) with the cosine at the lamp: light keeps its étendue through mirrors, and through glass but for
-the square of the index, so that the same number tells how likely particles arrive on a surface behind (`caustics.py`).
+A particle is a ray from a lamp with the light that it carries, radiance over `density`. That density is one over
+*étendue*, 1/(m^2 sr), with the cosine at the lamp: light conserves its étendue at mirrors and, up to the square of the
+index, in glass, so the same number gives the density of particles on a surface behind them (`caustics.py`).
 
-With `Targets` particles go where certain shapes may stand, and nowhere else.
+With `Targets`, particles are emitted only toward bounding spheres of certain shapes.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ from .lights import Lights
 from .solid_angles import is_sphere
 
 SURFACE, POINT, INFINITE = 0, 1, 2
-UNMET = 1e30  # larger than what any lamp with an extent has, and small enough to be counted with
-MOST_TARGETS = 8  # spheres that particles are aimed at; the code for each stands in the kernel
+DELTA_DENSITY = 1e30  # of delta lamps; larger than the density of any other lamp, small enough to compute with
+MAX_TARGETS = 8  # spheres that particles are aimed at; the kernel contains code for each
 
 
 @dataclass
 class Particle:
-    """What leaves a lamp.
+    """A particle as it leaves a lamp.
 
-    origin     where, and the direction; for a lamp at infinity a point outside of the scene
+    origin     position, and direction; for a lamp at infinity a position outside the scene
     direction
     emitter    the lamp
-    place      of a lamp with a surface, the point on it
+    place      for a lamp with a surface, the point on it
     kind       SURFACE, POINT or INFINITE
-    flux       radiance over density; of a lamp that is a point or a parallel beam, its limit
-    density    1/(m^2 sr), of étendue; UNMET for those two, which no ray from elsewhere meets
-    direct_weight  of the lamp in the eyes of a camera that sees it directly: of a surface one over its density by area,
-                   of infinity the radiance over its density by solid angle
+    flux       radiance over density; for a point light or a parallel beam, the limit of this
+    density    1/(m^2 sr), over étendue; DELTA_DENSITY for those two, which no other ray can hit
+    direct_weight  weight of the lamp for a camera that sees it directly: for a surface, one over its density by area;
+                   for infinity, the radiance over its density by solid angle
     """
 
     origin: Point
@@ -67,29 +67,29 @@ class Particle:
 
 
 class Targets:
-    """Spheres around shapes, at most MOST_TARGETS: who stand together share one."""
+    """Bounding spheres of shapes, at most MAX_TARGETS: neighboring shapes share one."""
 
     def __init__(self, mi: ModuleType, shapes: Sequence[Shape]):
         self.mi = mi
-        spheres = _together([_sphere_around(mi, shape) for shape in shapes], MOST_TARGETS)
+        spheres = _together([_sphere_around(mi, shape) for shape in shapes], MAX_TARGETS)
         self.count = len(spheres)
-        self.centre = [mi.Point3f(*map(float, s[:3])) for s in spheres]
+        self.center = [mi.Point3f(*map(float, s[:3])) for s in spheres]
         self.radius = [mi.Float(float(s[3])) for s in spheres]
-        dr.make_opaque(self.centre, self.radius)
+        dr.make_opaque(self.center, self.radius)
 
     def _chosen(self, pick: Float) -> tuple[Point, Float, Float]:
-        """(centre, radius, what is left of the random number) of one of them."""
+        """(center, radius, rescaled random number) of one of them."""
         mi = self.mi
         number = dr.minimum(mi.UInt32(pick * self.count), self.count - 1)
-        centre, radius = self.centre[0], self.radius[0]
+        center, radius = self.center[0], self.radius[0]
         for i in range(1, self.count):
-            centre = dr.select(number == i, self.centre[i], centre)
+            center = dr.select(number == i, self.center[i], center)
             radius = dr.select(number == i, self.radius[i], radius)
-        return centre, radius, pick * self.count - mi.Float(number)
+        return center, radius, pick * self.count - mi.Float(number)
 
-    def _cone(self, origin: Point, centre: Point, radius: Float) -> tuple[Vector, Float, Float]:
-        """(axis, 1 - cosine of its half angle, solid angle) of the cone of a sphere; of all around from inside."""
-        away = centre - origin
+    def _cone(self, origin: Point, center: Point, radius: Float) -> tuple[Vector, Float, Float]:
+        """(axis, 1 - cosine of its half angle, solid angle) of a sphere's cone; from inside, the full sphere."""
+        away = center - origin
         distance2 = dr.squared_norm(away)
         sine2 = dr.square(radius) / dr.maximum(distance2, 1e-30)
         height = dr.select(sine2 < 1, sine2 / (1 + dr.safe_sqrt(1 - sine2)), 2)
@@ -98,42 +98,42 @@ class Targets:
 
     def direction(self, origin: Point, pick: Float, u: Point) -> Vector:
         """A direction toward one of the spheres, uniform in its cone."""
-        centre, radius, _ = self._chosen(pick)
-        axis, height, _ = self._cone(origin, centre, radius)
+        center, radius, _ = self._chosen(pick)
+        axis, height, _ = self._cone(origin, center, radius)
         low = height * u.x
         sine = dr.safe_sqrt(low * (2 - low))
         s, c = dr.sincos(2 * dr.pi * u.y)
         return self.mi.Vector3f(self.mi.Frame3f(axis).to_world(self.mi.Vector3f(c * sine, s * sine, 1 - low)))
 
     def direction_pdf(self, origin: Point, direction: Vector) -> Float:
-        """Density (1/sr) of `direction`."""
+        """Density of `direction`, 1/sr."""
         total = self.mi.Float(0)
-        for centre, radius in zip(self.centre, self.radius, strict=True):
-            axis, height, solid_angle = self._cone(origin, centre, radius)
-            # 1 - cosine from the chord, which keeps its digits in a narrow cone; a little wider, for rounding
+        for center, radius in zip(self.center, self.radius, strict=True):
+            axis, height, solid_angle = self._cone(origin, center, radius)
+            # 1 - cosine from the chord, which is accurate for narrow cones; slightly enlarged against rounding
             inside = dr.squared_norm(direction - axis) * 0.5 <= height * 1.0001
             total += dr.select(inside, dr.rcp(solid_angle), 0)
         return total / self.count
 
     def line(self, direction: Vector, pick: Float, u: Point) -> Point:
-        """A point through which a line of that direction meets one of the spheres, uniform over its disc."""
-        centre, radius, _ = self._chosen(pick)
-        return centre + self.mi.Frame3f(direction).to_world(_on_disc(self.mi, u) * radius)
+        """A point that defines a line of that direction through one of the spheres, uniform over its disk."""
+        center, radius, _ = self._chosen(pick)
+        return center + self.mi.Frame3f(direction).to_world(_on_disk(self.mi, u) * radius)
 
     def line_pdf(self, point: Point, direction: Vector) -> Float:
-        """Density (1/m^2, across the direction) of `line`."""
+        """Density of `line`, 1/m^2 perpendicular to the direction."""
         total = self.mi.Float(0)
-        for centre, radius in zip(self.centre, self.radius, strict=True):
-            offset = point - centre
+        for center, radius in zip(self.center, self.radius, strict=True):
+            offset = point - center
             across2 = dr.squared_norm(offset - direction * dr.dot(offset, direction))
             total += dr.select(across2 <= dr.square(radius) * 1.0001, dr.rcp(dr.pi * dr.square(radius)), 0)
         return total / self.count
 
 
 class Sources:
-    """The lamps of a scene as what particles leave; `targets` None sends them everywhere.
+    """The lamps of a scene as emitters of particles; `targets` None emits in all directions.
 
-    Raises InputError for lamps that cannot be asked.
+    Raises InputError for lamps that cannot emit particles.
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, lights: Lights, targets: Targets | None = None):
@@ -146,15 +146,15 @@ class Sources:
         parallel = [mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection) for emitter in lights.emitters]
         self.parallel = mi.Bool(parallel)
         box = scene.bbox()
-        centre, radius = (np.zeros(3), 1.0)
+        center, radius = (np.zeros(3), 1.0)
         if box.valid():
             low, high = np.array(box.min).ravel(), np.array(box.max).ravel()
-            centre, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-6)
-        self.centre, self.radius = mi.Point3f(*map(float, centre)), mi.Float(radius)
-        dr.make_opaque(self.centre, self.radius, self.kind_of, self.two_sided, self.parallel)
+            center, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+        self.center, self.radius = mi.Point3f(*map(float, center)), mi.Float(radius)
+        dr.make_opaque(self.center, self.radius, self.kind_of, self.two_sided, self.parallel)
 
     def wavelengths(self, u: Float) -> tuple[Sequence[Float], Radiance]:
-        """Wavelengths of a particle as the camera's are, and their weight; none in RGB."""
+        """Wavelengths of a particle, sampled like the camera's, and their weight; none in RGB."""
         mi = self.mi
         if not mi.is_spectral:
             return [], mi.Spectrum(1)
@@ -177,7 +177,7 @@ class Sources:
             here = kind == one
             other = make(number, emitter, place, aim, way, wavelengths, here)
             result = other if result is None else dr.select(here, other, result)
-        assert result is not None, "who asks has seen that there are lamps"
+        assert result is not None, "callers check that there are lamps"
         return Particle(
             result.origin,
             result.direction,
@@ -185,12 +185,12 @@ class Sources:
             result.place,
             kind,
             result.flux / probability,
-            dr.select(result.density < UNMET, result.density * probability, UNMET),
+            dr.select(result.density < DELTA_DENSITY, result.density * probability, DELTA_DENSITY),
             result.direct_weight / probability,
         )
 
     def density(self, origin: Point, si: SurfaceInteraction, direction: Vector, active: Mask) -> Float:
-        """`Particle.density` of the one that would come from the lamp met at `si` by a ray of that direction."""
+        """`Particle.density` of a particle from the lamp that a ray of that direction has hit at `si`."""
         mi, lights = self.mi, self.lights
         emitter = si.emitter(self.scene)
         probability, index = mi.Float(1), mi.UInt32(0)
@@ -210,14 +210,14 @@ class Sources:
             if one == INFINITE:
                 hit = active & ~si.is_valid()
                 it = dr.zeros(mi.SurfaceInteraction3f)
-                it.p = self.centre
+                it.p = self.center
                 ds = dr.zeros(mi.DirectionSample3f)
                 ds.d, ds.emitter = direction, emitter
                 pdf = emitter.pdf_direction(it, ds, hit) * self._line_pdf(origin, direction)
                 result = dr.select(hit, pdf, result)
         return result * probability
 
-    # ------------------------------------------------------------------ of each kind
+    # ------------------------------------------------------------------ kinds of lamps
 
     def _from_surface(
         self,
@@ -244,7 +244,7 @@ class Sources:
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
         if lights.lamps.spheres is not None:
-            # into one that is smaller than the step off a surface: out at its other side
+            # Light into a ball smaller than the ray's offset from the surface would start on its other side.
             radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
             shines &= ~inward | (abs(radius) > shadow_offset(mi, ps.p, ps.p))
@@ -256,7 +256,7 @@ class Sources:
     def _direction_pdf(
         self, si: SurfaceInteraction, direction: Vector, active: Mask, two_sided: Mask | None = None
     ) -> Float:
-        """1/sr, of a direction away from a lamp's surface."""
+        """Density of a direction away from a lamp's surface, 1/sr."""
         if self.targets is not None:
             return self.targets.direction_pdf(si.p, direction)
         assert two_sided is not None
@@ -274,7 +274,7 @@ class Sources:
     ) -> Particle:
         mi = self.mi
         it = dr.zeros(mi.SurfaceInteraction3f)
-        it.p = self.centre
+        it.p = self.center
         it.wavelengths = wavelengths
         origin = emitter.sample_direction(it, place, active)[0].p
         if self.targets is not None:
@@ -282,11 +282,11 @@ class Sources:
             pdf = self.targets.direction_pdf(origin, direction)
         else:
             direction, pdf = mi.warp.square_to_uniform_sphere(way), mi.Float(dr.inv_four_pi)
-        it.p = origin + direction  # at the distance of one, light per area is light per solid angle
+        it.p = origin + direction  # at unit distance, flux per area is flux per solid angle
         _, intensity = emitter.sample_direction(it, place, active)
         flux = dr.select(active & (pdf > 0), intensity / pdf, 0)
-        place_ = self._nowhere(wavelengths)
-        return Particle(origin, direction, emitter, place_, mi.UInt32(POINT), flux, mi.Float(UNMET), mi.Spectrum(0))
+        nowhere, density = self._nowhere(wavelengths), mi.Float(DELTA_DENSITY)
+        return Particle(origin, direction, emitter, nowhere, mi.UInt32(POINT), flux, density, mi.Spectrum(0))
 
     def _from_infinite(
         self,
@@ -300,23 +300,23 @@ class Sources:
     ) -> Particle:
         mi = self.mi
         it = dr.zeros(mi.SurfaceInteraction3f)
-        it.p = self.centre
+        it.p = self.center
         it.wavelengths = wavelengths
         ds, weight = emitter.sample_direction(it, way, active)
         direction = mi.Vector3f(-ds.d)
         if self.targets is not None:
             point = self.targets.line(direction, aim, place)
         else:
-            point = self.centre + mi.Frame3f(direction).to_world(_on_disc(mi, place) * self.radius)
+            point = self.center + mi.Frame3f(direction).to_world(_on_disk(mi, place) * self.radius)
         by_area = self._line_pdf(point, direction)
-        outside = dr.norm(point - self.centre) + 2 * self.radius
+        outside = dr.norm(point - self.center) + 2 * self.radius
         parallel = dr.gather(mi.Bool, self.parallel, number, active)
-        density = dr.select(parallel, UNMET, ds.pdf * by_area)
+        density = dr.select(parallel, DELTA_DENSITY, ds.pdf * by_area)
         flux = dr.select(active & (by_area > 0), weight / by_area, 0)
         origin = mi.Point3f(point - direction * outside)
         direct_weight = dr.select(parallel, 0, weight)
-        place_ = self._nowhere(wavelengths)
-        return Particle(origin, direction, emitter, place_, mi.UInt32(INFINITE), flux, density, direct_weight)
+        nowhere = self._nowhere(wavelengths)
+        return Particle(origin, direction, emitter, nowhere, mi.UInt32(INFINITE), flux, density, direct_weight)
 
     def _line_pdf(self, point: Point, direction: Vector) -> Float:
         if self.targets is not None:
@@ -341,18 +341,18 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
         return POINT
     if has(kinds.Surface) and not has(kinds.DeltaDirection):
         return SURFACE
-    what = f"a lamp of the kind {emitter.class_name()}, which sends no particles"
+    what = f"a lamp of the kind {emitter.class_name()}, which cannot emit particles"
     raise InputError(what, "integrator", "use --integrator path, or a lamp with a surface, a point or an environment")
 
 
-def _on_disc(mi: ModuleType, u: Point) -> Vector:
-    """A point of the unit disc across z."""
-    on_disc = mi.warp.square_to_uniform_disk_concentric(u)
-    return mi.Vector3f(on_disc.x, on_disc.y, 0)
+def _on_disk(mi: ModuleType, u: Point) -> Vector:
+    """A point of the unit disk perpendicular to z."""
+    on_disk = mi.warp.square_to_uniform_disk_concentric(u)
+    return mi.Vector3f(on_disk.x, on_disk.y, 0)
 
 
 def _sphere_around(mi: ModuleType, shape: Shape) -> NDArray[np.float64]:
-    """Centre and radius of a sphere that holds a shape."""
+    """Center and radius of a bounding sphere of a shape."""
     box = shape.bbox()
     low, high = np.array(box.min, float).ravel(), np.array(box.max, float).ravel()
     radius = float(np.max(high - low)) / 2 if is_sphere(mi, shape) else float(np.linalg.norm(high - low)) / 2
@@ -360,7 +360,7 @@ def _sphere_around(mi: ModuleType, shape: Shape) -> NDArray[np.float64]:
 
 
 def _together(spheres: list[NDArray[np.float64]], most: int) -> list[NDArray[np.float64]]:
-    """At most so many spheres that hold all: the longest extent of their centres is halved until there are enough."""
+    """At most so many spheres that contain all: the group with the longest extent of centers is halved repeatedly."""
     groups = [np.array(spheres)]
     while len(groups) < most:
         spans = [float(np.max(np.ptp(group[:, :3], axis=0))) if len(group) > 1 else -1.0 for group in groups]
@@ -369,13 +369,14 @@ def _together(spheres: list[NDArray[np.float64]], most: int) -> list[NDArray[np.
         group = groups.pop(int(np.argmax(spans)))
         group = group[np.argsort(group[:, int(np.argmax(np.ptp(group[:, :3], axis=0)))], kind="stable")]
         groups += [group[: len(group) // 2], group[len(group) // 2 :]]
-    return [_around(group) for group in groups]
+    return [_bounding_sphere(group) for group in groups]
 
 
-def _around(group: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bounding_sphere(group: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Center and radius of a sphere that contains the spheres of a group."""
     if len(group) == 1:
         return group[0]
     low, high = (group[:, :3] - group[:, 3:]).min(0), (group[:, :3] + group[:, 3:]).max(0)
-    centre = (low + high) / 2
-    radius = float(np.max(np.linalg.norm(group[:, :3] - centre, axis=1) + group[:, 3]))
-    return np.array([*centre, radius])
+    center = (low + high) / 2
+    radius = float(np.max(np.linalg.norm(group[:, :3] - center, axis=1) + group[:, 3]))
+    return np.array([*center, radius])

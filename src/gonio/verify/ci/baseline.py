@@ -1,7 +1,7 @@
 """A baseline: the known failures. Only new ones fail a report.
 
-A law of a card is known where it failed when the baseline was written, and its figure is at most a tenth worse now. Any
-report.json is a baseline; `text` writes the short form, to be kept beside the code.
+A law of a card is known if it failed when the baseline was written, and its figure is at most a tenth worse now. Any
+report.json is a baseline; `text` writes the short form, to be stored with the code.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ Known = Mapping[tuple[str, str], float | None]
 
 
 def read(path: Path) -> Known:
-    """The figures of known failures, by title and law; None where there is no figure. InputError for other files."""
+    """The figures of known failures, by title and law; None for failures without a figure. InputError for other
+    files."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -64,21 +65,21 @@ def text(report: Report) -> str:
 
 
 def apply(report: Report, known: Known) -> list[str]:
-    """Mark known failures in a report, which they no longer fail; returns those that no longer occur, in words."""
-    mended = []
+    """Mark known failures in a report, so that they do not fail it; returns those that no longer occur, as text."""
+    fixed = []
     for card in report.cards:
         for verdict in card.verdicts:
             key = card.title, verdict.law
             if key not in known:
                 continue
             if not verdict.failed:
-                mended.append(f"{card.title}: {verdict.law} no longer fails: remove it from the baseline")
+                fixed.append(f"{card.title}: {verdict.law} no longer fails: remove it from the baseline")
             elif _no_worse(verdict, known[key]):
                 verdict.status = KNOWN
             else:
                 now = verdict.shown or "no figure"
                 verdict.notes.append(f"worse than in the baseline: {now}, {_words(known[key])}")
-    return mended
+    return fixed
 
 
 def _no_worse(verdict: Verdict, before: float | None) -> bool:

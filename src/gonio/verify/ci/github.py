@@ -1,4 +1,4 @@
-"""Annotations of GitHub Actions: lines that the runner reads and shows beside the code."""
+"""Annotations of GitHub Actions: lines that the runner reads and shows in the code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def wanted() -> bool:
 
 
 def text(report: Report) -> str:
-    """A line per violated law, for its file where there is one; "" where all hold."""
+    """A line per violated law, for its file if there is one; "" if all laws hold."""
     lines = []
     for card in report.cards:
         for verdict in card.verdicts:

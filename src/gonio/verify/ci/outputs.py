@@ -17,7 +17,7 @@ Name = str | Path | None
 
 @dataclass(frozen=True)
 class Outputs:
-    """The files to write, and the baseline; None for files that are not wanted.
+    """The files to write, and the baseline; None for files that are not requested.
 
     report          folder for report.html and report.json
     junit, sarif    files
@@ -32,7 +32,7 @@ class Outputs:
     write_baseline: Name = None
 
     def check(self) -> Known:
-        """The known failures. InputError where a file cannot be read or written, before anything is computed."""
+        """The known failures. InputError if a file cannot be read or written, before anything is computed."""
         if self.report is not None:
             files.check_folder(self.report)
         for file in (self.junit, self.sarif, self.write_baseline):

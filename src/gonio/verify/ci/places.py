@@ -25,13 +25,13 @@ class Place(NamedTuple):
 
 
 def of(card: Card, verdict: Verdict | None = None) -> Place | None:
-    """The line that a verdict's reason names, else the one on which the class begins; None where no file is judged."""
+    """The line that a verdict's reason names, else the first line of the class; None if no file is tested."""
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
         known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
         return Place(_relative(file), 1) if known else None
-    file = Path(named["file"]).expanduser()
+    file = Path(os.path.expanduser(named["file"]))
     for text in verdict.why if verdict else ():
         for match in _LINE.finditer(text):
             if match["file"] == file.name:
@@ -40,7 +40,7 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def level(verdict: Verdict) -> str:
-    """ "error" for what fails, "warning" where no picture shows it, "note" where declared or known, else "none"."""
+    """ "error" for a failure, "warning" if no picture shows it, "note" if declared or known, else "none"."""
     if verdict.status == FAIL:
         return "warning" if grade(verdict) in _SLIGHT else "error"
     return "note" if verdict.status in (DECLARED, KNOWN) else "none"

@@ -1,4 +1,4 @@
-"""The JSON Schema of report.json, as a file beside this one."""
+"""The JSON Schema of report.json, stored next to this file."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What explains a failed law: ratios, factors, causes, diagnosis and reproduction."""
+"""Explanations of a failed law: ratios, factors, causes, diagnosis and reproduction."""

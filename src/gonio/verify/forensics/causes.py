@@ -1,4 +1,4 @@
-"""The probable cause of a failure: named where the ratio of two values fits a formula, and not at all where none does.
+"""The probable cause of a failure: named only if the ratio of two values fits a formula.
 
 Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi leaves its trace in it: the first
 factor that fits is named, the simplest first. A ratio that is 1 except in a region, on a side or in a channel is named
@@ -21,7 +21,7 @@ ROWS = 4096  # pairs of directions at most
 
 
 def named(ratio: Ratio) -> Cause | None:
-    """The cause that a ratio names, None where it fits no formula."""
+    """The cause that a ratio suggests, None if it fits no formula."""
     unsupported = nothing_below(ratio.top, ratio.bottom, ratio.wo, ratio.wi, ratio.above, ratio.below)
     ratio = _telling(ratio)
     if len(ratio.wo) < FEWEST:
@@ -56,7 +56,7 @@ def named(ratio: Ratio) -> Cause | None:
 
 
 def _part(ratio: Ratio) -> Cause | None:
-    """Of two densities, one that never exceeds the other: it includes fewer lobes."""
+    """Of two densities, one that never exceeds the other, because it includes fewer lobes."""
     if "pdf" not in ratio.top or "pdf" not in ratio.bottom or "weight" in ratio.top:
         return None
     above, below = ratio.above[:, 0], ratio.below[:, 0]
@@ -113,7 +113,7 @@ def _off(ratio: Ratio) -> np.ndarray:
 
 
 def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The region outside which a ratio is right: in words, and the rows; None where no simple region fits."""
+    """The region outside which a ratio is 1: as text, and the rows; None if no simple region fits."""
     share = float(bad.mean())
     if not 0.003 < share < 0.97 or bad.sum() < FEWEST:
         return None
@@ -170,7 +170,7 @@ def _angles(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _place(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The first simple region that holds the bad pairs and no others: in words, and its rows."""
+    """The first simple region that contains the bad pairs and no others: as text, and its rows."""
     for words, rows in _places(wo, wi, bad):
         if (rows & bad).sum() >= 0.995 * bad.sum() and (rows & ~bad).sum() <= 0.005 * rows.sum() + 0.5:
             return words, rows
@@ -178,6 +178,6 @@ def _place(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> tuple[str, np.nda
 
 
 def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """The region of the bad pairs in words, "" where no simple region holds just them."""
+    """The region of the bad pairs as text, "" if no simple region contains exactly these."""
     place = _place(wo, wi, bad) if bad.any() and not bad.all() else None
     return place[0] if place else ""

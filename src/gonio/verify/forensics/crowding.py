@@ -1,8 +1,8 @@
-"""The difference between samples and pdf: its place, its size, and the factor that would make the two agree.
+"""The difference between samples and pdf: where it is, how large, and the factor that would remove it.
 
 The samples are the reference: the cells of the chi-square test hold their counts, and the pdf's expectation is
-multiplied by each factor of the table. The first that leaves no difference, in the cells of one wo and in int pdf of
-all others, is the cause.
+multiplied by each factor of the table. The first one that leaves no difference, in the cells of one wo and in int pdf
+of all others, is the cause.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ BLOCK = 10  # rows and columns of cells per block: differences stand out from no
 FULL = 25.0  # least expectation of a block
 EFFECT = 0.02  # root mean square of the relative difference of samples and expectation, below which they agree
 KNOWN = 0.004  # tolerance of a known number; 2^17 samples determine a scale to a third of a percent
-BEFORE = 0.08  # least difference of which a cause is looked for
+BEFORE = 0.08  # smallest difference whose cause is determined
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Blocks:
 
 
 def blocks(cells: SampleCells) -> Blocks | None:
-    """The cells of a test in blocks; None where their wo is unknown."""
+    """The cells of a test in blocks; None if their wo is unknown."""
     if cells.wo is None:
         return None
     a, b, c, d = boxes(cells.rows, cells.columns)
@@ -68,7 +68,7 @@ def blocks(cells: SampleCells) -> Blocks | None:
 
 
 def crowd(subject: Subject, held: Blocks) -> str:
-    """The worst difference of one sign between samples and pdf, its place, and the light in those cells, in words."""
+    """The worst difference of one sign between samples and pdf, its place, and the light in those cells, as text."""
     expected = held.joined(held.expected)
     off = (held.observed - expected) / np.sqrt(np.maximum(expected, FULL))
     sign = 1.0 if np.sum(np.maximum(off, 0.0) ** 2) >= np.sum(np.minimum(off, 0.0) ** 2) else -1.0
@@ -92,11 +92,11 @@ def crowd(subject: Subject, held: Blocks) -> str:
     return f"{amount} near wi {theta:.3g}, {phi:.3g} degrees, {cells}, for wo {theta_o:.3g}, {phi_o:.3g}"
 
 
-# --------------------------------------------------------------------------- the factor that would make them agree
+# --------------------------------------------------------------------------- the factor that would remove it
 
 
 def named(subject: Subject, held: Blocks) -> Cause | None:
-    """The factor between samples and pdf; None where none fits."""
+    """The factor between samples and pdf; None if none fits."""
     light = estimators.of_subject(subject)
     total = float(held.observed.sum())
     for formula, guess, field in _factors(subject):
@@ -202,7 +202,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
 
 
 def unsampled(subject: Subject) -> str:
-    """Where int pdf exceeds the share of valid samples, in words; "" where it does not."""
+    """Where int pdf exceeds the fraction of valid samples, as text; "" if it does not."""
     light = estimators.of_subject(subject)
     excess = light.claimed - light.drawn
     row = int(np.argmax(excess))

@@ -59,7 +59,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
                 verdict.cause = f"follows from {first.upper()}'s"
             continue
         if verdict.status == DECLARED and effort.name == "quick":
-            continue  # a first check spends no time on declared breaches
+            continue  # a quick check spends no time on declared violations
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", GonioWarning)
             _measure(law, verdict, subject, finding, effort, seed)
@@ -92,13 +92,13 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
 
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The failures, with those that others follow from first."""
+    """The failures, with those from which others follow first."""
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
 
 
-# Errors of a BSDF that already failed a law must not cost the report.
+# An error of a BSDF that already failed a law must not lose the report.
 _ERRORS = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
 
 
@@ -134,7 +134,7 @@ def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: i
 
 
 def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verdict]) -> tuple[Grade, str] | None:
-    """The grade and reason where a material violates a law by nature, or where a material inside it does."""
+    """The grade and reason if a material violates a law by nature, or if a material inside it does."""
     reason = subject.by_nature.get(law.name)
     if reason:
         return Grade.BY_NATURE, reason
@@ -142,7 +142,7 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
     if not inner:
         return None
     wrong = [one.target for one in inner if judge(law, one).status == FAIL]
-    sound = subject.around_sound() if wrong else None
+    sound = subject.with_sound_inside() if wrong else None
     if sound is None or judge(law, sound).status == FAIL:
         return None
     return (

@@ -1,5 +1,5 @@
-"""The fit of a ratio of two values that should be equal: by a constant, a factor of the table, or one whose constants
-are solved for. The simplest that holds for nearly every pair of directions is the result.
+"""The fit of a ratio of two values that should be equal: by a constant, a factor of the table, or a factor with fitted
+constants. The result is the simplest one that holds for nearly every pair of directions.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _reflects(ratio: Ratio) -> bool:
 
 
 def _constant(ratio: Ratio) -> Fit | None:
-    """The same factor everywhere: pi, 2, 4, or one without a name; 0 and -1 too."""
+    """The same factor everywhere: pi, 2, 4, or an unnamed one; 0 and -1 too."""
     r = scalar(ratio)
     if r is None:
         return None
@@ -95,9 +95,9 @@ def _cosines(ratio: Ratio) -> Fit | None:
 
 
 def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], positive: np.ndarray) -> Fit | None:
-    """Integer powers of some cosines, solved for."""
+    """Integer powers of some cosines, by least squares."""
     if np.any(np.ptp(np.percentile(logs, [5.0, 95.0], axis=0), axis=0) < 0.05):
-        return None  # nearly constant: any power would do
+        return None  # nearly constant: any power would fit
     rows = np.flatnonzero(positive)
     columns = np.column_stack([logs[rows], np.ones(len(rows))])
     solved = np.linalg.lstsq(columns, np.log(r[rows]), rcond=None)[0]
@@ -182,7 +182,7 @@ SCHLICK = {"n.o": "cos_o", "n.i": "cos_i", "o.m": "(o.m)", "n.m": "cos_m"}
 
 
 def _schlick(ratio: Ratio) -> Fit | None:
-    """Schlick's F at another cosine: at n.o in place of o.m. R0, one per channel, is solved for."""
+    """Schlick's F at another cosine, such as n.o instead of o.m. R0 is fitted per channel."""
     if not _reflects(ratio):
         return None
     wo, wi, m = ratio.wo, ratio.wi, factors.half_vector(ratio.wo, ratio.wi)

@@ -23,7 +23,7 @@ Denominator: TypeAlias = "Callable[[Subject, np.ndarray, np.ndarray, str], np.nd
 class Cause:
     """A probable cause.
 
-    words   a sentence of the report
+    words   the cause as a sentence of the report
     key     the same without figures: failures with the same key have the same cause
     """
 
@@ -61,7 +61,7 @@ class Ratio:
         return f"the ratio of {self.top} to {self.bottom}"
 
     def take(self, rows: np.ndarray, channels: np.ndarray | None = None) -> Ratio:
-        """The same over some pairs, and some channels."""
+        """The ratio over some pairs, and some channels."""
         above, below = self.above[rows], self.below[rows]
         if channels is not None:
             above, below = above[:, channels], below[:, channels]
@@ -69,7 +69,7 @@ class Ratio:
 
 
 class Fit(NamedTuple):
-    """The formula of a ratio, the mistake that it suggests, and how well it holds; of a constant, the constant."""
+    """The formula of a ratio, the mistake that it suggests, and how well it holds; `number` if it is a constant."""
 
     formula: str
     guess: str
@@ -95,7 +95,7 @@ NUMBERS |= {"4 / pi": 4.0 / np.pi, "pi / 4": np.pi / 4.0, "2 / pi": 2.0 / np.pi,
 
 
 def written(value: float, allowed: float = SPREAD) -> str:
-    """A number as a formula where it is a known one, else in digits."""
+    """A number as a formula if it is a known one, else in digits."""
     for name, known in NUMBERS.items():
         if abs(value / known - 1.0) < allowed:
             return name
@@ -103,7 +103,7 @@ def written(value: float, allowed: float = SPREAD) -> str:
 
 
 def factor_key(number: float) -> str:
-    """One key for a factor and its inverse: the ratio does not tell which of the two values lacks it."""
+    """One key for a factor and its inverse: the ratio does not show which of the two values lacks it."""
     return f"factor {max(number, 1.0 / number):.3g}" if number > 0.0 else f"factor {number:.3g}"
 
 
@@ -113,7 +113,7 @@ def tolerance(ratio: Ratio) -> float:
 
 
 def scalar(ratio: Ratio) -> np.ndarray | None:
-    """One number per pair (N,), where all channels have the same ratio; None where they have not."""
+    """One number per pair (N,) if all channels have the same ratio, else None."""
     lit = np.abs(ratio.below) > 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     r = np.divide(ratio.above, ratio.below, out=np.full_like(ratio.above, np.nan), where=lit)
     with warnings.catch_warnings():
@@ -125,7 +125,7 @@ def scalar(ratio: Ratio) -> np.ndarray | None:
 
 
 def holds(ratio: Ratio, quotient: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of values that should be 1; None where too many are not."""
+    """(spread, cover) of values that should be 1; None if too many are not."""
     allowed = max(SPREAD, tolerance(ratio))
     good = np.isfinite(quotient)
     cover = float(np.mean(good & (np.abs(quotient - 1.0) < allowed)))

@@ -1,8 +1,8 @@
-"""A failure of a Mitsuba plugin as a short program that needs Mitsuba alone, for its authors.
+"""A failure of a Mitsuba plugin as a short program that needs only Mitsuba, for its authors.
 
-The program ends with an AssertionError that tells the figure, as long as the fault exists.
+The program ends with an AssertionError that states the figure, as long as the defect exists.
 
-    script("energy", subject, finding)     "" where the BSDF is not one of Mitsuba's plugins, or the law has no program
+    script("energy", subject, finding)     "" if the BSDF is not one of Mitsuba's plugins, or the law has no program
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _literal(value: object) -> str:
 
 
 def _energy(subject: Subject, finding: Finding) -> str:
-    """The albedo by a grid of directions; without a gain, against that of the samples."""
+    """The albedo by a grid of directions; without a gain, compared with that of the samples."""
     from ..laws.energy import lossless_variant
 
     mode = "ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance\n"
@@ -104,7 +104,7 @@ def _energy(subject: Subject, finding: Finding) -> str:
 
 
 def _pdf(subject: Subject, finding: Finding) -> str:
-    """The share of samples in a region by the pdf, against that of the samples themselves."""
+    """The fraction of samples in a region by the pdf, compared with that of the samples themselves."""
     cells = finding.evidence
     if not isinstance(cells, SampleCells) or cells.wo is None:
         return ""

@@ -1,1 +1,1 @@
-"""Judging in a watched child process, so that a crash of a BSDF is a finding."""
+"""Tests in a monitored child process, so that a crash of a BSDF is a finding."""

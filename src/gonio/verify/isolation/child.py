@@ -1,12 +1,12 @@
-"""A trial in processes of its own: a BSDF that loops, crashes, prints or exhausts memory still gets a report.
+"""A trial in separate processes: a BSDF that loops, crashes, prints or exhausts memory still gets a report.
 
     trial(Task((Item("glass.py:Glass"),), "quick", seed=1), jobs=2)
 
-Each process (`worker`) judges one card after the other and announces every step and every call of the BSDF. Where it
-dies, or exceeds its time or memory, a new process judges the card again without the call that was in progress, which
-fails the laws that need it; or, where none was in progress, without the law. How strict a statistical test must be
-depends on the number of tests in the report, known only once all cards are judged: a card is judged by the number of
-its own tests, and again where the difference matters. So the report does not depend on the number of processes.
+Each process (`worker`) tests one card after the other and announces every step and every call of the BSDF. If it
+crashes, or exceeds its time or memory, a new process tests the card again without the call that was in progress, which
+fails the laws that need it; or, if no call was in progress, without the law. The threshold of a statistical test
+depends on the number of tests in the report, which is known only after all cards: a card is tested with the number of
+its own tests, and again if the difference matters. Therefore the report does not depend on the number of processes.
 
 This module imports nothing of Gonio or NumPy at the top: the first process starts before this one loads the rest.
 """
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from ..verdict import Card
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
-ISOLATED = "isolated"  # place of the error about a material that cannot be sent
-OTHERS = "*"  # key of all parameter values but the given ones
+ISOLATED = "isolated"  # location of the error about a material that cannot be sent
+OTHERS = "*"  # key of all parameter values except the given ones
 GRACE = 1.0  # seconds beyond the limit: the alarm inside the process stops a loop in Python without a new process
 LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take several
 LOOK = 0.05  # seconds between two checks of time and memory
@@ -65,7 +65,7 @@ class Item(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A trial; `laws` by name, all where None."""
+    """A trial; `laws` by name, None for all laws."""
 
     items: list[Item]
     effort: str
@@ -74,7 +74,7 @@ class Task(NamedTuple):
 
 
 def item_of(material: Any) -> Item:
-    """A Python object as another process can load it. InputError where that is not possible."""
+    """A Python object in a form that another process can load. InputError if that is not possible."""
     from ...catalog import notation, outside
     from ...material import BSDF, tree
 
@@ -109,12 +109,12 @@ def trial(
     jobs       processes at a time
     limit      seconds per law, GONIO_VERIFY_LIMIT or 300 if not given
     memory     GB per process; if not given, half of the machine's for all processes together
-    threshold  p-value below which a test rejects, where the task is part of a larger one
+    threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
-        raise InputError(f"{jobs} jobs", "--jobs", "give 1 or more")
+        raise InputError(f"{jobs} workers", "--workers", "give 1 or more")
     limit = watch.LIMIT if limit is None else limit
-    for name, value in (("--limit", limit), ("--memory", memory)):
+    for name, value in (("--timeout", limit), ("--memory", memory)):
         if value is not None and value <= 0.0:
             raise InputError(f"a limit of {value:g}", name, "give more than 0")
     jobs = min(jobs, sum(item.cards for item in task.items))
@@ -136,7 +136,7 @@ def trial(
 
 
 class _Worker:
-    """One process: the card and the step that it is at, since when, and the call in progress."""
+    """One process: its card and step, since when, and the call in progress."""
 
     def __init__(self, task: Task, limit: float, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
         self.folder = tempfile.TemporaryDirectory(prefix="gonio-verify-", ignore_cleanup_errors=True)
@@ -158,7 +158,7 @@ class _Worker:
         threading.Thread(target=self._read, args=(answers,), daemon=True).start()
 
     def order(self, *order: object) -> None:
-        """Send an order; where the process has died, the end of its answers says so."""
+        """Send an order; if the process has ended, the end of its answers reports it."""
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             self.process.stdin.write(pickle.dumps(order))
@@ -169,7 +169,7 @@ class _Worker:
         self.call: Call | None = None
 
     def over(self, limit: float, memory: float) -> str:
-        """The limit that it exceeds, in words; "" where none."""
+        """The limit that it exceeds, as text; "" if none."""
         limit, grace = (limit, GRACE) if self.card >= 0 else (max(limit, LOAD), 0.0)
         if self.busy and time.monotonic() - self.since > limit + grace:
             return watch.words(limit) if self.card >= 0 else f"no end after {limit:g} s"
@@ -200,7 +200,7 @@ class _Worker:
             return self.reason or "it closed the pipe to the process that watches it"
         if code >= 0:
             return f"the process ended itself with exit code {code}"
-        return f"the process died: {getattr(code, 'name', code)}"
+        return f"the process crashed: {getattr(code, 'name', code)}"
 
     def lines(self) -> int:
         """Number of lines printed since the last call."""
@@ -236,9 +236,9 @@ class _Worker:
 
 @dataclasses.dataclass
 class _State:
-    """A card on its way to its verdicts.
+    """The state of a card that is being tested.
 
-    skip       laws that must not be asked again, and why
+    skip       laws that must not be tested again, and why
     forbidden  methods and values with which they must not be called again, and why
     strikes    crashes outside of any call
     """
@@ -251,7 +251,7 @@ class _State:
     card: Card | None = None
 
     def avoid(self, laws: list[str], step: str, call: Call | None, reason: str) -> None:
-        """Exclude the call in progress from the next attempt, or the law where there was none."""
+        """Exclude the call in progress from the next attempt, or the law if there was none."""
         if call is not None and call[:2] not in self.forbidden:
             method, key, values = call
             self.forbidden[method, key] = f"{reason} (in {method}{', at ' if values else ''}{values})"
@@ -263,7 +263,7 @@ class _State:
         self.strikes += step == BETWEEN
         if step in self.skip or self.strikes >= STRIKES:
             if all(law in self.skip for law in laws):
-                raise MachineError(f"the process that judges dies at every step: {reason}", self.title)
+                raise MachineError(f"the process that judges crashes at every step: {reason}", self.title)
             self.skip = dict.fromkeys(laws, reason) | self.skip
         elif step != BETWEEN:
             self.skip[step] = reason
@@ -289,7 +289,7 @@ class _Pool:
         return [one.card for one in self.states or () if one.card]
 
     def judge(self, threshold: float | None, repeat: Sequence[int] = ()) -> None:
-        """Judge all cards, or some of them again, by a threshold; where None each by the number of its own tests."""
+        """Test all cards, or some of them again, with a threshold; None for the number of a card's own tests."""
         self.waiting = list(repeat)
         for number in repeat:
             assert self.states is not None
@@ -311,7 +311,7 @@ class _Pool:
             self.workers.append(_Worker(self.task, self.limit, self.answers))
 
     def _listen(self) -> None:
-        """Handle the answers that arrive within a moment, and end processes beyond their limits."""
+        """Handle the answers that arrive within a moment, and end processes that exceed their limits."""
         with contextlib.suppress(queue.Empty):
             timeout = LOOK
             while True:

@@ -13,7 +13,7 @@ from typing import Any
 
 LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds per law; the slowest takes some ten
 GRACE = 20.0  # seconds; a signal does not interrupt a loop inside a kernel, and after these the process ends
-watched = False  # whether a parent watches this process, and ends it where the signal has no effect
+watched = False  # whether a parent watches this process, and ends it if the signal has no effect
 # a context around each call of a BSDF, by model and method; a watched process announces the call there
 calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
 
@@ -29,7 +29,7 @@ def limited(what: str, seconds: float | None = None) -> Iterator[None]:
 
     A loop in Python is interrupted. A loop in a compiled kernel is not: then the process prints an error and exits
     with 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside of the main thread, and
-    where there is no SIGALRM.
+    on platforms without SIGALRM.
     """
     seconds = seconds or LIMIT
     text = words(seconds)

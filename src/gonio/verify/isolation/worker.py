@@ -1,4 +1,4 @@
-"""The process in which a BSDF is judged, as `child` starts it: it may loop, crash, print, or exhaust memory.
+"""The process in which a BSDF is tested, started by `child`: it may loop, crash, print, or exhaust memory.
 
 Orders arrive pickled on standard input; answers leave pickled by a copy of standard output, and what the BSDF prints
 goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step, and around
@@ -85,19 +85,19 @@ def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
 
 
 def _outside(error: BaseException) -> str:
-    """file:line where an exception came from a file of the user's, outside of `guarded` calls; else ""."""
+    """file:line of an exception in a user's file, outside of `guarded` calls; else ""."""
     files = {getattr(module, "__file__", "") for name, module in sys.modules.items() if name.startswith(outside.PREFIX)}
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 
 
 def _pipes() -> tuple[IO[bytes], Say]:
-    """The orders, and the function that sends an answer; whoever reads standard input or prints does not touch them."""
+    """The orders, and the function that sends an answer; reading standard input and printing do not affect them."""
     orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)  # else a process that aborts loses its last lines
+        sys.stdout.reconfigure(line_buffering=True)  # otherwise a process that aborts loses its last lines
     lock = threading.Lock()
 
     def say(*answer: object) -> None:
@@ -119,8 +119,8 @@ class _Stuck(BaseException):
 class _Calls:
     """Announces each call of the BSDF to the parent, and refuses those that ended a process before.
 
-    forbidden   by method and values, why it must not be called again
-    given       the key of the values that the material was given
+    forbidden   by method and values, the reason why it must not be called again
+    given       key of the values that the material was given
     """
 
     def __init__(self, say: Say) -> None:
@@ -151,7 +151,7 @@ class _Calls:
         self.say("call")
 
     def _values(self, model: Any) -> tuple[str, str]:
-        """The values of a material's parameters as a key, the same in every process, and in words."""
+        """The values of a material's parameters as a key, the same in every process, and as text."""
         known = self._keys.get(id(model))
         if known is None or known[0] is not model:  # the model is stored, so that no other gets its id
             key = words = ""

@@ -45,7 +45,7 @@ class Law:
         return None
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
-        """Ratios that may determine a failure's cause, or causes that are known already, the best first."""
+        """Ratios that may determine a failure's cause, or causes that are already known, the best first."""
         return ()
 
 
@@ -81,7 +81,7 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
         wo, wi = directions.single(wo), directions.single(wi)
     try:
         drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
-    except Fault:  # the laws of sampling report it; the others do without samples
+    except Fault:  # the laws of sampling report it; the others need no samples
         return wo, wi
     good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
     wi[third : 2 * third][good] = drawn.wi[good]

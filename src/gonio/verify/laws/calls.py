@@ -1,4 +1,4 @@
-"""Calls: results do not depend on how a renderer makes them."""
+"""Calls: results do not depend on how a renderer calls."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ SMALL = 1e-6  # of the largest value: smaller values are negligible
 
 class Calls(Law):
     """The result of a row does not depend on the other rows, on their number or on earlier calls; only transmission
-    depends on `mode`. Of a plugin: eval_pdf, eval_pdf_sample, masks of lanes, of components and of types, and its
-    flags, agree with eval, pdf and sample."""
+    depends on `mode`. For a plugin, eval_pdf, eval_pdf_sample, masks of lanes, components and types, and the flags
+    agree with eval, pdf and sample."""
 
     number = 11
     name = "calls"
-    title = "the same results however a renderer calls"
+    title = "results do not depend on how a renderer calls"
     everywhere = False  # it does not depend on the parameter values
-    meaning = "Right in a test, wrong in a picture: only integrators use these calls, batches and masks."
+    meaning = "Tests pass but pictures are wrong: only integrators use these calls, batches and masks."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        finding = Finding(0.0, 0.0, "not one difference is allowed", shown="agree")
+        finding = Finding(0.0, 0.0, "no difference is allowed", shown="agree")
         checked = []
         others: Iterable[Answer] = subject.model.renderer_calls(seed) if isinstance(subject.model, BSDF) else ()
         wrong: list[Answer] = []
@@ -137,7 +137,7 @@ def _answers(
 
 
 def _lanes(value: Any, last: Any, lanes: int) -> Any:
-    """Some lanes of a value; a value that is the same for all lanes stays."""
+    """Some lanes of a value; a value that is the same for all lanes is returned unchanged."""
     dr = backend.drjit()
     if not dr.is_array_v(value) or dr.width(value) != lanes:
         return value
@@ -165,7 +165,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
     yield twice
-    fresh = subject.anew()
+    fresh = subject.rebuilt()
     if fresh is not None:
         (new,) = _answers(fresh, wo, wi, u, precision)
         yield _unlike("a new object", first, new, wo, wi, same)
@@ -191,7 +191,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
 def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
-    """The worst difference in words, where there is one beyond `same`, relative to the larger value."""
+    """The largest difference beyond `same`, relative to the larger value, as text."""
     lit = first["sample's pdf"][:, 0] > 0.0
     for name, a in first.items():
         b = second[name]
@@ -250,7 +250,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     if not along:
         return
     odd = np.arange(len(wo)) % 2 == 1
-    # some up and others down, so that their ratios change too
+    # some increase and others decrease, so that their ratios change too
     shares = [(0.3, 0.6), (0.7, 0.25)]
     ends = [{axis.path: float(axis.at(shares[k % 2][end])) for k, axis in enumerate(along)} for end in (0, 1)]
     together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})
@@ -283,9 +283,9 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Declared facts agree with the results: `transmits`, `two_sided`, `delta`, and eta of samples."""
+    """Declared facts agree with the results: `transmits`, `two_sided`, `delta`, and the eta of samples."""
     model = subject.model
-    # all pairs of sides, whether it declares values there or not
+    # all pairs of sides, even those without declared values
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))
     o, i = (np.concatenate([w[:, :2], np.abs(w[:, 2:]) * sides[:, k, None]], 1) for k, w in enumerate((wo, wi)))
     value = subject.eval(o, i).max(1)

@@ -1,4 +1,4 @@
-"""Delta lobes: mirrors and smooth glass obey Snell, Fresnel and reciprocity like any other lobe."""
+"""Delta lobes: mirrors and smooth glass obey Snell's law, Fresnel's equations and reciprocity like any other lobe."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ CHECKS = (
     lobe_checks.rotation,
     lobe_checks.tint,
 )
-CHECKS64 = (lobe_checks.float32, lobe_checks.derivatives)  # of models that have 64 bits
+CHECKS64 = (lobe_checks.float32, lobe_checks.derivatives)  # for models with float64
 
 
 class DeltaLobes(Law):
-    """A delta lobe follows Snell's law or the mirror, carries (eta_o / eta_i)^2 in radiance, reflects by Fresnel's
-    equations for its own index, leads back the same way, and is chosen as often as its pdf states."""
+    """A delta lobe follows Snell's law or the mirror direction, carries (eta_o / eta_i)^2 in radiance, reflects by
+    Fresnel's equations for its own index, is reciprocal, and is chosen as often as its pdf states."""
 
     number = 10
     name = "delta"
-    title = "delta lobes obey Snell and Fresnel, and come back the way they went"
+    title = "delta lobes obey Snell's law, Fresnel's equations and reciprocity"
     meaning = "Mirror images and views through glass are displaced, too bright or too dark."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -71,7 +71,7 @@ class DeltaLobes(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        """The share of a lobe's light that goes elsewhere, or is too much or too little."""
+        """The fraction of a lobe's light that goes elsewhere, or is too much or too little."""
         misses: list[Miss] = finding.details  # type: ignore[assignment]
         if not misses:
             return estimators.sampling_bias(subject)  # chosen more or less often than stated
@@ -91,7 +91,7 @@ class DeltaLobes(Law):
 
 
 def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
-    """The mistake in the frequency of lobes, their stated probability, or their weight; "" where none is clear."""
+    """The mistake in the frequency of lobes, their stated probability, or their weight; "" if none is clear."""
     sampled = (share > 0.02) & (pdf > 0.0)
     if sampled.sum() < 8:
         return ""

@@ -21,7 +21,7 @@ from ..verdict import Finding, Trial
 from .base import Law
 
 GAIN = 1e-3
-GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where Fresnel and masking go wrong first
+GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
 
 class Energy(Law):
@@ -64,7 +64,7 @@ class Energy(Law):
         self._known(subject, wo, value, error, finding)
         white = lossless_variant(subject)
         if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
-            white = subject  # it has no albedo to set, and claims to lose nothing
+            white = subject  # it has no albedo to set, but claims to be lossless
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
         if finding.figure > GAIN:
@@ -134,7 +134,7 @@ class Energy(Law):
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
-        """The same with every albedo 1 and F = 1: its loss is the light that the model neglects."""
+        """The same with every albedo 1 and F = 1: the loss is the light that the model neglects."""
         value, error = _quadrature(white, wo, effort, seed)
         curves.furnace = value
         gain = float((value - error).max() - 1.0)
@@ -155,7 +155,7 @@ class Energy(Law):
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless_tolerance", None)
-        # a black one reflects nothing, whatever it claims
+        # a black material reflects nothing regardless of its claim
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
                 f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
@@ -260,7 +260,7 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
 
 
 def lossless_variant(subject: Subject) -> Subject | None:
-    """The subject with every albedo 1 and F = 1; None where it has neither."""
+    """The subject with every albedo 1 and F = 1; None if it has neither."""
     try:
         variant = subject.model.lossless()
     except InputError:

@@ -19,7 +19,8 @@ from .base import Law, pair_in_words, pairs, relative, worst_of
 
 TOLERANCE = 1e-4
 ROWS = 1 << 17  # rays in flight
-STEP = 1e-4  # of the parameter's size: with five points the truncation is its fourth power, the rounding 1e-16 / 1e-4
+# Relative to the parameter: with five points the truncation error is its fourth power, the rounding error 1e-16 / 1e-4.
+STEP = 1e-4
 
 
 class Gradients(Law):
@@ -109,8 +110,8 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter without derivative changes nearly all values when it is moved by a third, and has none there
-    either; with a derivative there, it is only clamped at the given value."""
+    """Whether a parameter without derivative changes nearly all values when it is changed by a third, and has no
+    derivative there either; with a derivative there, it is only clamped at the given value."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -169,9 +170,9 @@ class _Derivatives(NamedTuple):
 def _derivatives(
     model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float = STEP
 ) -> dict[str, _Derivatives]:
-    """The derivatives by parameters at some paths, with steps of a share of their sizes. All are computed at once, each
-    on its own rays, where the others are moved by 0: one kernel serves them all. Where another parameter has no
-    derivative, and 0 times NaN is NaN, a parameter is moved alone."""
+    """The derivatives by parameters at some paths, with steps relative to their sizes. All are computed at once, each
+    on separate rays, where the others are moved by 0: one kernel serves them all. If another parameter has no
+    derivative, a parameter is moved alone, since 0 times NaN is NaN."""
     derivatives: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):
@@ -230,7 +231,7 @@ def _judged(
     least = 1e-6 * float(np.max(np.abs(plain), initial=0.0)) / size
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
-    # A kink at the very value of the parameter, such as a node of a table: the central difference is the mean of its
+    # A kink exactly at the parameter's value, such as a node of a table: the central difference is the mean of its
     # two slopes, and any value between them is a derivative.
     left, right = ((4.0 * shifted[0.5 * s] - shifted[s] - 3.0 * plain) / (s * step) for s in (-1.0, 1.0))
     steep = np.maximum(np.abs(left), np.abs(right))

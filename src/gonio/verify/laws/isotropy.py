@@ -20,8 +20,7 @@ VISIBLE = 1e-3  # least anisotropy
 
 class Isotropy(Law):
     """An isotropic f depends on theta_o, theta_i and |phi_o - phi_i| only; an anisotropic one is wider along the axis
-    whose width is larger.
-    """
+    with the larger alpha."""
 
     number = 6
     name = "isotropy"
@@ -127,11 +126,12 @@ class Isotropy(Law):
         )
         if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
             wider = "x" if along > across else "y"
-            finding.problems.append(f"widths {pair[0]:g}, {pair[1]:g}, but wider along {wider}: axes swapped")
+            given = f"alpha is {pair[0]:g}, {pair[1]:g}"
+            finding.problems.append(f"{given}, but the lobe is wider along {wider}: axes swapped")
 
 
 def _swapped(subject: Subject) -> Subject | None:
-    """The subject with its two widths exchanged; None where it has none."""
+    """The subject with alpha_x and alpha_y exchanged; None if it has none."""
     for name, parameter in subject.parameters.items():
         pair = getattr(subject.model, name, None)
         if parameter.kind == "alpha" and isinstance(pair, tuple | list):

@@ -125,7 +125,7 @@ def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> boo
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether an albedo changes no value: a cache that ignores it, a parameter that is never read."""
+    """Whether an albedo changes no value, as with a cache that ignores it or a parameter that is never read."""
     low, high = (subject.replace(**{name: v}) for v in (0.125, 0.875))
     first, second = low.eval(wo, wi), high.eval(wo, wi)
     if not np.array_equal(first, second) or not np.any(first > 0.0):
@@ -133,7 +133,7 @@ def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> boo
     u = directions.numbers(np.random.default_rng(17), len(wo))  # it may belong to a delta lobe, which has no values
     if not np.array_equal(low.sample(wo, u).weight, high.sample(wo, u).weight):
         return False
-    # it may belong to a part whose share is 0: then with all shares at one half
+    # it may belong to a part of weight 0: try again with all weights at one half
     known = subject.parameters.items()
     shares = {path: getattr(subject.model, path) for path, one in known if one.high == 1.0 and not one.inside}
     some = {path: 0.5 for path, value in shares.items() if isinstance(value, int | float) and value == 0.0}

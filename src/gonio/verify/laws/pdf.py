@@ -31,7 +31,7 @@ ABOVE = (
 )
 BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
 OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for Fresnel's term
-FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for a percent
+FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for an accuracy of a percent
 PAIRS = 1 << 13  # of directions, to find a cause
 EXCESS = 1e-3  # of int pdf over 1
 SUPPORT = 1e-4  # share of light where the pdf is 0
@@ -43,7 +43,7 @@ class Pdf(Law):
 
     number = 4
     name = "pdf"
-    title = "pdf integrates to 1, covers eval, and is what sample does"
+    title = "pdf integrates to 1, covers eval, and is the density of the samples"
     meaning = "Multiple importance sampling gives samples wrong weights: energy is lost or gained, or noise persists."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -75,7 +75,7 @@ class Pdf(Law):
                     if claimed > EXCESS and not o.any():
                         word = "above" if side > 0 else "below"
                         share = f"{claimed:.2g} of all samples {word} the surface"
-                        text = f"the pdf claims {share}, where none falls, {where}"
+                        text = f"the pdf claims {share}, where none occurs, {where}"
                         finding.notes[:] = finding.notes or [text]
                 excess = max(tested.total - 1.0, 0.0)
                 if excess > finding.figure:
@@ -119,7 +119,7 @@ class Pdf(Law):
             yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
         for note in finding.notes:
             if note.startswith("the pdf claims"):
-                yield Cause(note, "pdf where no sample falls")
+                yield Cause(note, "pdf where no sample occurs")
 
 
 SWEEP = 512  # values of u.x
@@ -166,7 +166,7 @@ class _Repeat:
 
 
 def _widths(subject: Subject, effort: Effort) -> list[float]:
-    """Other widths, where there is a width to change."""
+    """Other values of alpha, if there is such a parameter."""
     parameter = subject.parameters.get("alpha")
     if parameter is None or parameter.kind not in ("alpha", "float"):
         return []
@@ -207,7 +207,7 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
 
 
 def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
-    """eval > 0 where pdf = 0 is light that sampling never reaches."""
+    """Positive eval at pdf = 0 is light that sampling never reaches."""
     if not subject.has_density:
         return
     wo, wi = pairs(subject, effort.pairs, seed)

@@ -31,9 +31,7 @@ class Positivity(Law):
     number = 1
     name = "positivity"
     title = "non-negative and finite, at extremes and in gradients"
-    meaning = (
-        "One NaN blackens a pixel for good and spreads with every filter; negative light darkens its neighborhood."
-    )
+    meaning = "A NaN blackens its pixel permanently and spreads with every filter; negative light darkens other pixels."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo, wi, u = _grid(subject, effort, seed)
@@ -41,7 +39,7 @@ class Positivity(Law):
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
-            reason="not one is allowed",
+            reason="none is allowed",
             notes=[f"{len(variants)} settings: the given one and the ends of each range"],
         )
         declared = "positivity" in subject.breaches  # measured noise around 0: its size is a share of the largest value
@@ -148,7 +146,7 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings combined in one call, one value per ray; one by one where the subject takes no arrays."""
+    """Settings combined in one call, one value per ray; one by one if the subject takes no arrays."""
     changes = [changed for changed, _ in variants]
     names = dict.fromkeys(name for changed in changes for name in changed)
     columns: dict[str, Any] = {}
@@ -174,7 +172,7 @@ def _batches(
 
 
 def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs: extreme angles on both sides, whether it answers there or not, and random ones."""
+    """Pairs: extreme angles on both sides, also where it has no values, and random ones."""
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)

@@ -20,12 +20,12 @@ TOLERANCE = 1e-3
 
 
 class Precision(Law):
-    """eval and pdf in float32 equal those in float64, but for the effect of a rounding of the directions."""
+    """eval and pdf in float32 equal those in float64, except for the effect of rounding the directions."""
 
     number = 9
     name = "precision"
     title = "float32 agrees with float64"
-    meaning = "Speckles and rings appear and vanish with distance, angle and roughness."
+    meaning = "Speckles and rings depend on distance, angle and roughness."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:

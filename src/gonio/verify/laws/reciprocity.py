@@ -118,8 +118,8 @@ class Reciprocity(Law):
 def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed: int) -> float | None:
     """Mean of f(wo, wi) - f(wi, wo), in standard errors; None where both are 0.
 
-    The random numbers of a model may be a hash of its directions: each row gets another `seed`, where the model has
-    one; else the directions are perturbed slightly, the same for both ways.
+    The random numbers of a model may be a hash of its directions: each row gets another `seed` if the model has one;
+    otherwise the directions are perturbed slightly, equally for both ways.
     """
     a, b = (np.tile(w, (REPEATS, 1)) for w in (wo, wi))
     if "seed" in subject.parameters:
@@ -147,7 +147,7 @@ def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
 
 
 def _eta(subject: Subject, seed: int) -> float:
-    """Index below over index above, by the model's own samples; 1 where nothing is transmitted."""
+    """Index below over index above, by the model's own samples; 1 if nothing is transmitted."""
     if not subject.transmits:
         return 1.0
     rng = np.random.default_rng([seed, 4])

@@ -1,4 +1,4 @@
-"""Shader parity: judged where a browser can run a shader, by the project's own tests."""
+"""Shader parity: tested by the project's own tests, in a browser that can run a shader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Shader(Law):
     on_request = True
     name = "shader"
     title = "shader code gives the same values"
-    meaning = "The engine's picture differs from the offline reference."
+    meaning = "The picture of a real-time engine differs from the offline reference."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         raise DoesNotApply("it needs a browser to run a shader; the project's tests do it for every model")

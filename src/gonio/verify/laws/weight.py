@@ -22,11 +22,11 @@ PAIRS = 1 << 13  # samples, to find a cause
 
 
 class Weight(Law):
-    """weight = eval / pdf at the sampled wi; declared delta samples have neither value nor pdf."""
+    """weight = eval / pdf at the sampled wi; declared delta samples have neither a value nor a pdf."""
 
     number = 5
     name = "weight"
-    title = "weight = eval / pdf at the sampled wi; deltas declared"
+    title = "weight = eval / pdf at the sampled wi; delta samples are declared"
     meaning = "Brightness depends on the integrator: BSDF sampling and light sampling converge to different pictures."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -80,12 +80,12 @@ class Weight(Law):
                     lambda b, x, y, m: b.pdf(x, y)[:, None],
                 )
             value = subject.eval(o, i, mode)
-            if _grey(s.weight[rows]) and not _grey(value):
-                yield Cause("the weight is grey where eval has a color: a mean, or one channel of it?", "grey weight")
+            if _gray(s.weight[rows]) and not _gray(value):
+                yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
-            if "is allowed" not in convention:  # the verdict already tells the figure
+            if "is allowed" not in convention:  # the verdict already states the figure
                 yield Cause(convention, convention)
 
     def _at(
@@ -152,7 +152,7 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
 
 
-def _grey(values: np.ndarray) -> bool:
+def _gray(values: np.ndarray) -> bool:
     """Whether all channels are equal, within a percent for most rows."""
     return not len(values) or bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
 

@@ -1,4 +1,4 @@
-"""Panels of the page that come from outside. The page's own are TypeScript: web/src/panels, a file each."""
+"""Panels from other packages. The page's own panels are TypeScript: web/src/panels, one file each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mitsuba 3.9: `sample_position` of a sphere that is turned returns the normal of one that is not.
+"""Mitsuba 3.9: `sample_position` of a rotated sphere returns the normal of the unrotated one.
 
     sphere = mi.load_dict({"type": "sphere", "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], 90)})
     ps = sphere.sample_position(0.0, mi.Point2f(0.1, 0.2))
@@ -17,6 +17,6 @@ from ..types import Float, PositionSample
 
 
 def with_radial_normal(mi: ModuleType, ps: PositionSample, sphere: Float) -> PositionSample:
-    """The position sample with the sphere's own normal; `sphere` is center and signed radius, 0 of other shapes."""
+    """The position sample with the sphere's true normal; `sphere` is center and signed radius, 0 for other shapes."""
     ps.n = dr.select(sphere.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(sphere.xyz)) / sphere.w), ps.n)
     return ps

@@ -1,0 +1,88 @@
+"""Standard streams as the command needs them: open, and able to print the names of all files."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import os
+import sys
+from typing import TextIO
+
+
+class OutputError(OSError):
+    """What is printed cannot be written: the disk is full, or the output closed."""
+
+
+class _Output(io.TextIOWrapper):
+    """A standard output whose errors are told from those of files."""
+
+    def write(self, text: str) -> int:
+        try:
+            return super().write(text)
+        except OSError as error:
+            raise _told(error) from error
+
+    def flush(self) -> None:
+        try:
+            super().flush()
+        except OSError as error:
+            raise _told(error) from error
+
+
+def _told(error: OSError) -> OSError:
+    """The error as `OutputError`; a pipe that is closed is none."""
+    return error if isinstance(error, BrokenPipeError) else OutputError(error.errno, error.strerror)
+
+
+def prepare() -> None:
+    """Open standard streams that are closed, as by `>&-`, and print bytes of file names that are no text as they are.
+
+    Else the next file that is opened would be the standard output, and what is printed would go into it. Printing to a
+    closed output fails, as it does on a full disk.
+    """
+    for number, mode in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            opened = os.open(os.devnull, mode)  # the lowest number that is free: this one
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+    codecs.register_error("gonio", _replaced)
+    sys.stdin = sys.stdin or io.TextIOWrapper(io.FileIO(0, closefd=False))  # type: ignore[arg-type]
+    sys.stdout = _stream(sys.stdout, sys.__stdout__, 1, _Output)
+    sys.stderr = _stream(sys.stderr, sys.__stderr__, 2, io.TextIOWrapper)
+
+
+def _stream(stream: TextIO | None, own: TextIO | None, number: int, kind: type[io.TextIOWrapper]) -> TextIO:
+    """The stream that prints to a file descriptor, in place of one that is closed or of Python's own.
+
+    Any other stream is used as it is: a second wrapper would close its buffer when it is collected.
+    """
+    if stream is None:
+        raw = io.BufferedWriter(io.FileIO(number, "w", closefd=False))
+        return kind(raw, "utf-8", "gonio")
+    if stream is not own or not isinstance(stream, io.TextIOWrapper):
+        return stream
+    return kind(
+        stream.buffer,
+        stream.encoding,
+        "gonio",
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
+
+
+def _replaced(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Bytes of a file's name as they are, and letters that the terminal's encoding lacks as escapes."""
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.lookup_error("backslashreplace")(error)
+
+
+def silence(*streams: TextIO) -> None:
+    """Let what is left in the streams, and all that is still printed there, vanish."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in streams:
+        os.dup2(nowhere, stream.fileno())

@@ -1,0 +1,342 @@
+"""The kinds of parameters: which values are valid, how they are bound, and their symbols in a recording."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GonioWarning, InputError, did_you_mean
+from ..members import Family
+from ..ops import backend, graph, sincos
+from ..optics import indices
+from . import user_code
+
+CHANNELS = 3  # of a color given as plain numbers; a renderer's spectra have their own number
+
+# The value of a parameter: as given by the user; in a bound copy a Dr.Jit value or a symbol, which have no common type.
+Value: TypeAlias = Any
+Floats: TypeAlias = "NDArray[np.floating]"
+
+
+class Material:
+    """Base of `BSDF`, as far as parameters are concerned: a node of the tree of materials."""
+
+    derives: ClassVar[bool] = False  # whether `derive` is defined
+    guided: ClassVar[bool] = False  # whether only `eval` is defined, so that a guide is computed for sampling
+
+    _bound: ClassVar[bool] = False
+    _count: int = 1  # of materials in the tree; not a field
+    _plain: Self | None = None
+    _derived: object = None
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """The declared parameters by name."""
+        raise NotImplementedError
+
+    def derive(self) -> object:
+        """Values that follow from the parameters only and are expensive to compute per ray: a NamedTuple, or None."""
+        return None
+
+    def prepare(self) -> None:
+        """Compute tables and the like from the unbound parameters, which is impossible while a loop is recorded."""
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether this is a bound copy."""
+        return self._bound
+
+    @property
+    def plain(self) -> Self:
+        """The material before binding: itself, or the origin of a bound copy. It provides facts that shape code."""
+        return self if self._plain is None else self._plain
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Declaration of one parameter; a kind is a subclass.
+
+    low, high  closed range; a value outside is an error, above `high` only a warning if `soft_high`
+    white      its value in the material's lossless variant (`BSDF.lossless`); None leaves it unchanged
+    inside     whether it describes the medium behind the surface, on which no formula of the surface depends
+    off        the value at which the weighted component vanishes, so that code can be written without it
+    """
+
+    kind: ClassVar[str] = ""
+    numeric: ClassVar[bool] = False
+    inner: ClassVar[bool] = False  # whether it holds a material
+
+    name: str
+    default: Value
+    doc: str
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    soft_high: bool = False
+    white: Value = None
+    inside: bool = False
+    off: float | None = None
+
+    @property
+    def required(self) -> bool:
+        return self.default is dataclasses.MISSING
+
+    @property
+    def range(self) -> str:
+        """The range in words, for errors and the manual."""
+        return self.kind
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """Name -> description, for a choice."""
+        return {}
+
+    def check(self, value: object, location: str) -> None:
+        """Raise InputError, or warn, if `value` is not valid for this parameter."""
+
+    def coerce(self, value: object, location: str) -> Value:
+        """The value that a material stores for a given `value`: by default the value itself, once checked."""
+        self.check(value, location)
+        return value
+
+    def portable(self, value: object) -> object:
+        """The value as stored in a pickled material."""
+        return value
+
+    def bind(self, value: object, types: backend.Types) -> Value:
+        """The value as Dr.Jit values of these types; values that shape the code are unchanged."""
+        return value
+
+    def symbol(self, value: object) -> Value:
+        """The symbol for the value in a recording; values that shape the code are unchanged."""
+        return value
+
+    def is_off(self, value: object) -> bool:
+        """Whether the value is the plain number `off`."""
+        return self.off is not None and isinstance(value, int | float) and value == self.off
+
+    def rows(self, value: object) -> int:
+        """Number of rays for which the value has entries; 1 if it is the same for all."""
+        return 1
+
+
+Choices: TypeAlias = "Mapping[str, str] | Callable[[], Mapping[str, str]] | Family[Any]"
+
+
+class _Numeric(Parameter):
+    """Base of the numeric kinds."""
+
+    numeric = True
+    dimensions: ClassVar[int] = 0  # of one ray's value
+    symbol_type: ClassVar[str] = "float"
+
+    @property
+    def range(self) -> str:
+        low = "" if self.low == -math.inf else f">= {self.low:g}"
+        high = "" if self.high == math.inf else f"<= {self.high:g}"
+        return " and ".join(x for x in (low, high) if x) or "any number"
+
+    def check(self, value: object, location: str) -> None:
+        if backend.is_drjit(value) or isinstance(value, graph.Node) or value is None:
+            return
+        try:
+            array = np.asarray(value)
+            if np.iscomplexobj(array):
+                raise InputError(f"{value!r} is complex, a real number expected", location, "give eta and k separately")
+            array = array.astype(np.float64)
+        except InputError:
+            raise
+        except (TypeError, ValueError):
+            raise InputError(f"{value!r} given, a number or an array expected", location) from None
+        if isinstance(value, str | bytes) or array.ndim > 1 + self.dimensions:
+            raise InputError(f"{value!r} given, a number or an array expected", location)
+        if self.dimensions and array.ndim and array.shape[-1] != CHANNELS:
+            what = f"a color of shape {array.shape}, a number, {CHANNELS} values or (N, {CHANNELS}) expected"
+            raise InputError(what, location)
+        if array.size == 0:
+            raise InputError("an empty array given, a number or an array expected", location)
+        if not np.all(np.isfinite(array)):
+            raise InputError(f"{value!r} is not finite", location)
+        if array.min() < self.low or (array.max() > self.high and not self.soft_high):
+            outside = array.min() if array.min() < self.low else array.max()
+            raise InputError(f"{outside:g} given, {self.range} expected", location)
+        if array.max() > self.high:
+            text = f"{array.max():g} is over {self.high:g}: the material reflects more light than it receives"
+            warnings.warn(f"{location}: {text}", GonioWarning, stacklevel=5)
+
+    def bind(self, value: object, types: backend.Types) -> Value:
+        return backend.float_of(value, types)
+
+    def symbol(self, value: object) -> Value:
+        return graph.symbol(self.symbol_type)
+
+    def rows(self, value: object) -> int:
+        array = np.empty(()) if backend.is_drjit(value) else np.asarray(value)
+        return 1 if array.ndim <= self.dimensions else len(array)
+
+
+class NumberParameter(_Numeric):
+    """A number; bound: a Dr.Jit float."""
+
+    kind = "float"
+
+
+class IndexParameter(NumberParameter):
+    """A refractive index: a number, or the name of a substance with dispersion.
+
+    A name becomes a `DispersiveIndex`, which acts as a number except in spectral renders.
+    """
+
+    def coerce(self, value: object, location: str) -> Value:
+        return super().coerce(indices.dispersive(value, location) if isinstance(value, str) else value, location)
+
+
+class ColorParameter(_Numeric):
+    """A color: a number (gray), three values, or an array (N, 3); bound: a spectrum."""
+
+    kind = "spectrum"
+    dimensions = 1
+    symbol_type = "spectrum"
+
+    @property
+    def share(self) -> bool:
+        """Whether it is a fraction of the light: its declared range ends at 1."""
+        return self.high == 1.0
+
+    def bind(self, value: object, types: backend.Types) -> Value:
+        if backend.is_drjit(value):
+            return value if backend.drjit().is_vector_v(value) else types.vec3(value, value, value)
+        array = np.asarray(value, dtype=np.float64)
+        return backend.vector_of(np.broadcast_to(array, (CHANNELS,)) if array.ndim == 0 else array, CHANNELS, types)
+
+
+class WidthParameter(_Numeric):
+    """A microfacet width alpha, or a tuple of two (along x, along y); bound: a pair."""
+
+    kind = "alpha"
+    symbol_type = "vec2"
+
+    def check(self, value: object, location: str) -> None:
+        for one in pair_of(value, location):
+            super().check(one, location)
+
+    def bind(self, value: object, types: backend.Types) -> Value:
+        if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+            return value
+        x, y = pair_of(value)
+        x, y = backend.float_of(x, types), backend.float_of(y, types) if y is not x else None
+        return types.vec2(x, x if y is None else y)
+
+    def rows(self, value: object) -> int:
+        return max(_Numeric.rows(self, one) for one in pair_of(value))
+
+
+class AngleParameter(_Numeric):
+    """An angle in radians; bound: the pair (cos, sin), or None for the plain number 0: no rotation is compiled."""
+
+    kind = "angle"
+    symbol_type = "vec2"
+
+    @staticmethod
+    def none(value: object) -> bool:
+        """Whether a value is statically known to be no rotation."""
+        return value is None or (isinstance(value, int | float) and value == 0)
+
+    def bind(self, value: object, types: backend.Types) -> Value:
+        if self.none(value):
+            return None
+        if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+            return value
+        s, c = sincos(backend.float_of(value, types))
+        return types.vec2(c, s)
+
+    def symbol(self, value: object) -> Value:
+        return None if self.none(value) else super().symbol(value)
+
+
+@dataclass(frozen=True)
+class ChoiceParameter(Parameter):
+    """A choice between names; it shapes the code, so it is static."""
+
+    kind = "choice"
+    members: Choices = dataclasses.field(default_factory=dict)
+
+    @property
+    def choices(self) -> dict[str, str]:
+        if isinstance(self.members, Family):
+            return self.members.titles()
+        return dict(self.members() if callable(self.members) else self.members)
+
+    @property
+    def range(self) -> str:
+        return " | ".join(self.choices)
+
+    def coerce(self, value: object, location: str) -> Value:
+        return super().coerce(user_code.member_name(value, location, self.family), location)
+
+    @property
+    def family(self) -> Family[Any] | None:
+        """The family whose members may be chosen; None for a choice between plain names."""
+        return self.members if isinstance(self.members, Family) else None
+
+    def spelled(self, name: str) -> str:
+        """The name for another process: FILE.py:NAME for a member that only this program has."""
+        return name if self.family is None else self.family.spelled(name)
+
+    def portable(self, value: object) -> object:
+        return value if self.family is None or not isinstance(value, str) else self.family.portable(value)
+
+    def check(self, value: object, location: str) -> None:
+        known = self.choices
+        if self.family is not None and isinstance(value, str) and user_code.names_code(value):
+            hint = "name it on the command line, in a program, or in a scene with --allow-code; here give a name"
+            raise InputError(f"'{value}' is code, which is not run from here", location, hint)
+        if not isinstance(value, str) or value not in known:
+            raise InputError(f"unknown {self.name} '{value}'", location, did_you_mean(str(value), list(known)))
+
+
+class FlagParameter(Parameter):
+    """A switch that shapes the code."""
+
+    kind = "flag"
+
+    def check(self, value: object, location: str) -> None:
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"{value!r} given, True or False expected", location)
+
+
+class FileParameter(Parameter):
+    """A file, by its path; the material reads it."""
+
+    kind = "file"
+
+    def check(self, value: object, location: str) -> None:
+        if isinstance(value, bool | int | float | list | tuple) or value is None or value == "":
+            raise InputError(f"{value!r} given, the path of a file expected", location)
+
+
+class MaterialParameter(Parameter):
+    """A material inside a material."""
+
+    kind = "bsdf"
+    inner = True
+
+    def check(self, value: object, location: str) -> None:
+        if not isinstance(value, Material):
+            raise InputError(f"{type(value).__name__} given, a material expected", location)
+
+
+def pair_of(value: object, location: str = "") -> tuple[Value, Value]:
+    """The two widths (x, y) of a user-given width: one value twice, or the two of a tuple."""
+    if not isinstance(value, tuple | list):
+        return value, value
+    if len(value) != 2:
+        raise InputError(f"{len(value)} widths given, one or two expected", location)
+    return value[0], value[1]

@@ -1,0 +1,75 @@
+"""How a scene is rendered: the options that requests, `go.render`, `go.study` and the command line share.
+
+`RenderOptions` declares them, with what the command line says of each. `RenderKeywords` are its types for checkers of
+`**options`, which Python has no way to take from a class. Nothing heavy is imported: `gonio render --help` reads this.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple, ParamSpec, TypedDict, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Shown(NamedTuple):
+    """What the command line says of an option: what it takes, "" for a flag, and what it is for."""
+
+    metavar: str
+    help: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderOptions:
+    """Options of a render; None: as the scene says."""
+
+    spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
+    size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None
+    integrator: Annotated[str | None, Shown("NAME", "direct, path, caustics, light, normal, ...")] = None
+    max_depth: Annotated[int | None, Shown("N", "Maximum path length, of path, caustics, light.")] = None
+    sampler: Annotated[str | None, Shown("NAME", "Random points: sobol, independent, ...")] = None
+    seed: Annotated[int | None, Shown("N", "Seed of all random numbers; the same seed gives the same result.")] = None
+    device: Annotated[str, Shown("cpu|cuda|auto", "Where to compute.")] = "cpu"
+    spectral: Annotated[bool, Shown("", "Trace wavelengths, so that glass disperses.")] = False
+    threads: Annotated[int | None, Shown("N", "CPU cores to use; all by default.")] = None
+    denoise: Annotated[bool, Shown("", "Remove noise with Open Image Denoise.")] = False
+    exposure: Annotated[float | Literal["auto"], Shown("EV|auto", "Brightness of a .png, in stops.")] = 0.0
+    allow_outside: Annotated[bool, Shown("", "Allow the scene to read files outside its folder.")] = False
+    allow_code: Annotated[bool, Shown("", "Allow the scene to run the Python files and plugins it names.")] = False
+
+
+class RenderKeywords(TypedDict, total=False):
+    """The types of `RenderOptions` as keywords."""
+
+    spp: int | None
+    size: tuple[int, int] | None
+    integrator: str | None
+    max_depth: int | None
+    sampler: str | None
+    seed: int | None
+    device: str
+    spectral: bool
+    threads: int | None
+    denoise: bool
+    exposure: float | Literal["auto"]
+    allow_outside: bool
+    allow_code: bool
+
+
+def takes_render_options(call: Callable[P, R]) -> Callable[P, R]:
+    """A function with `**options` under the signature that these stand for, with their defaults: for `help`, notebooks
+    and `checked`."""
+    signature = inspect.signature(call)
+    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    types = {name: getattr(one, "__forward_arg__", one) for name, one in RenderKeywords.__annotations__.items()}
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    shared = [
+        inspect.Parameter(field.name, keyword, default=field.default, annotation=types[field.name])
+        for field in dataclasses.fields(RenderOptions)
+    ]
+    call.__signature__ = signature.replace(parameters=[*own, *shared])  # type: ignore[attr-defined]
+    return call

@@ -1,0 +1,327 @@
+"""The expressions of a routine as text, re-nested, with values named as in Python where a name helps."""
+
+from __future__ import annotations
+
+import re
+
+from .layout import INDENT, common_head, wrap
+from .names import Names
+from .program import Struct, flat, place
+from .source import returned_by
+from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
+from .values import Routine, Value, stem_of
+
+INLINE = 88  # characters: a longer part of an expression gets a separate line
+# selections of existing values, which never get a separate line
+SELECTED = ("parameter", "constant", "component", "swizzle", "element")
+
+
+class ExpressionWriter:
+    """Writes the expressions of one routine, with the names of its parameters and local values."""
+
+    def __init__(self, names: Names, routine: Routine) -> None:
+        self.names, self.routine, self.language = names, routine, names.language
+        self.program = names.program
+        self.arguments = self.program.recorded[routine].arguments if routine in self.program.recorded else {}
+        self.used_names: set[str] = {*names.routines.values()}
+        self.parameter_names: dict[int, str] = {}
+        self.heads: list[tuple[str, str]] = []
+        self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
+        self.locals: dict[int, str] = {}
+        self.lines: list[str] = []
+        self.built: dict[tuple, str] = {}
+        self.holders: dict[str, Value] = {}  # name -> its current value
+        self.first_lines: dict[str, int] = {}  # name -> index of the line that declares it
+        self._parameters()
+
+    # ------------------------------------------------------------------ parameters
+
+    def _parameters(self) -> None:
+        routine, entry = self.routine, self.routine in self.program.entries.values()
+        used = [routine.parameters[i] for i in sorted(routine.used)]
+        derive = self.program.entries.get("derive") is routine
+        for argument, value in self.arguments.items():
+            mine = [p for p in used if place(p.static)[0] == argument]
+            struct = self.program.struct_of(value)
+            derived = self.program.derived_of(value)
+            if struct is not None or (derived is not None and isinstance(value, dict)):
+                plain = [p for p in mine if struct is not None and not place(p.static)[2]]
+                if struct is not None and (plain or entry):
+                    self._object(struct, "self", plain)
+                rest = [p for p in mine if p not in plain]
+                if derived is not None and (rest or (entry and not derive)):
+                    self._object(derived, "derived", rest)
+                continue
+            for parameter in (p for p in routine.parameters if place(p.static)[0] == argument):
+                if parameter in mine or entry:
+                    name = self.fresh(flat(parameter.static))
+                    self.parameter_names[parameter.order] = name
+                    if self.language.parameters_change:
+                        self.holders[name] = parameter
+                    self.heads.append((self.language.type(parameter.type), name))
+
+    def _object(self, struct: Struct, name: str, parameters: list[Value]) -> None:
+        name = self.fresh(name) if struct.record.name not in self.objects else self.objects[struct.record.name][1]
+        if struct.record.name not in self.objects:
+            self.objects[struct.record.name] = (struct, name)
+            self.heads.append((self.names.note(struct.record), name))
+        for parameter in parameters:
+            field = flat(place(parameter.static)[1])
+            self.parameter_names[parameter.order] = f"{name}.{self.language.word(field)}"
+
+    def fresh(self, name: str) -> str:
+        """A name that is not used in this function."""
+        base = self.language.word(name)
+        result, count = base, 1
+        while result in self.used_names or result in self.language.reserved:
+            count += 1
+            # a digit without an underscore means a power: x2 is x squared; and GLSL reserves "__"
+            result = f"{base.rstrip('_')}_{count}"
+        self.used_names.add(result)
+        return result
+
+    def _name_for(self, value: Value) -> str:
+        if value.op == "call" and isinstance(value.type, Routine):
+            for other in self.routine.values():
+                if other.op == "element" and other.args[0] is value and "." in other.name:
+                    return other.name.rpartition(".")[0].rpartition(".")[2]
+            tail = stem_of(value.static).rpartition("_")[2]
+            return {"sample": "sampled"}.get(tail, tail)
+        squared = value.args[0] if _squares(value) else None
+        if squared is not None and (not value.name or self.locals.get(squared.order) == value.name):
+            inner = self.expression(squared)[0].replace(".", "_")
+            return f"{inner}2" if inner.isidentifier() and not inner[-1].isdigit() else "square"
+        if value.name:
+            parts = value.name.split(".")
+            places = [part for part in parts if part.isdigit()]
+            return "_".join([next(part for part in reversed(parts) if not part.isdigit()), *places])
+        helper = returned_by(value.op, value.source, self.routine.source)
+        if helper:
+            return helper
+        if value.op == "call":
+            return stem_of(value.static).rpartition("_")[2].lower()
+        if value.op == "texel" and value.static[0].channels > 4:
+            return f"texel_{value.static[1]}"
+        if value.type == "bool":
+            return "holds"
+        if value.op in ("abs", "neg") and value.args[0].type == value.type:
+            inner = self.expression(value.args[0])[0].replace(".", "_")
+            return {"abs": "abs", "neg": "minus"}[value.op] + f"_{inner}" if inner.isidentifier() else "size"
+        return {
+            "sqrt": "root",
+            "dot": "cosine",
+            "div": "ratio",
+            "where": "chosen",
+            "texel": "texel",
+            "exp": "power",
+        }.get(value.op, {"add": "sum", "sub": "difference", "mul": "product"}.get(value.op, "value"))
+
+    # ------------------------------------------------------------------ expressions
+
+    def statement(self, value: Value) -> str:
+        """The text of a value on the right-hand side of a statement."""
+        text = self.expression(value, root=True)[0]
+        if self.language.templates and value.op in ("lt", "le", "and", "or") and "," not in text:
+            # without a comma, these comparisons cannot be parsed as a template
+            text = re.sub(r"(?<![\w!])\(([\w.]+ <=? [\w.]+)\)", r"\1", text)
+        return text
+
+    def part(self, value: Value, level: int, strict: bool = False) -> str:
+        """An operand, in parentheses if it binds more loosely than `level`."""
+        text, mine = self.expression(value)
+        return f"({text})" if mine < level or (strict and mine == level) else text
+
+    def expression(self, value: Value, root: bool = False) -> tuple[str, int]:
+        """(text, precedence) of a value: its name if it has one, else its expression."""
+        if not root and value.order in self.locals:
+            return self.locals[value.order], ATOM
+        text, level = self.compose(value)
+        if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # a call is broken at its commas
+            name = self.fresh(self._name_for(value))
+            self.lines += wrap(self.language.local(self.names.note(value.type), name, text), INDENT)
+            self.locals[value.order] = name
+            return name, ATOM
+        return text, level
+
+    def compose(self, value: Value) -> tuple[str, int]:
+        """(text, precedence) of a value's expression, even if it has a name."""
+        op, args = value.op, value.args
+        if op == "parameter":
+            return self.parameter_names[value.order], ATOM
+        if op == "constant":
+            return self.constant(value)
+        if op == "component":
+            return f"{self.part(args[0], ATOM)}.{'xyzw'[value.static]}", ATOM
+        if op == "swizzle":
+            return f"{self.part(args[0], ATOM)}.{value.static}", ATOM
+        if op == "element":
+            field = value.args[0].static.record.fields[value.static][0]
+            return f"{self.part(args[0], ATOM)}.{self.language.word(field)}", ATOM
+        if op == "splat":
+            return self.splat(args[0], value.type), SIGN
+        if op == "vector":
+            parts = [self.unparenthesized(a) for a in args]
+            return f"{self.language.type(value.type)}({', '.join(parts)})", ATOM
+        if op == "call" and stem_of(value.static) in self.language.native:
+            return f"{self.names.routines[value.static]}({', '.join(self.splat(a, value.type) for a in args)})", ATOM
+        if op == "call":
+            return f"{self.names.routines[value.static]}({', '.join(self.call_arguments(value))})", ATOM
+        if op == "texel":
+            return self.texel(value), ATOM
+        if op == "neg":
+            return f"-{self.part(args[0], SIGN, strict=True)}", SIGN
+        if op == "where":
+            return self.choice(value)
+        if op == "not" and value.type == "bool":
+            return f"!{self.part(args[0], SIGN)}", SIGN
+        wide = value.type.startswith("bvec")
+        if op in OPERATORS and not (wide and op in self.language.compare):
+            return self.infix(value)
+        template = self.language.compare[op] if wide else self.language.words[op]
+        spread = wide or op in ("minimum", "maximum")
+        kind = max((a.type for a in args), key=lambda t: t.startswith("vec"))
+        parts = [self.splat(a, kind) if spread else self.unparenthesized(a) for a in args]
+        return template.format(*parts), ATOM
+
+    def unparenthesized(self, value: Value) -> str:
+        """The text of a function's argument."""
+        return self.expression(value)[0]
+
+    def infix(self, value: Value) -> tuple[str, int]:
+        symbol, level = OPERATORS[value.op]
+        a, b = value.args
+        # the order of evaluation is that of the source: a + (b + c) keeps its parentheses
+        strict = value.op not in ("and", "or")
+        chain = level == SUM and a.order not in self.locals and OPERATORS.get(a.op, ("", ATOM))[1] == SUM
+        left = self.compose(a)[0] if chain else self.part(a, level)  # a long sum is wrapped, not split
+        right = self.part(b, level, strict)
+        if level in (AND, OR):  # && inside || gets parentheses for readability
+            left, right = (
+                f"({text})"
+                if other.op in ("and", "or") and other.op != value.op and other.order not in self.locals
+                else text
+                for text, other in ((self.expression(a)[0], a), (self.expression(b)[0], b))
+            )
+            left, right = (
+                f"({text})" if other.op == "where" and other.order not in self.locals else text
+                for text, other in ((left, a), (right, b))
+            )
+        if value.type.startswith("bvec"):
+            left, right = self.splat(a, "vec" + value.type[-1]), self.splat(b, "vec" + value.type[-1])
+        if value.op in ("lt", "le") and self.language.templates:  # otherwise `a < b, c > d` is parsed as a template
+            return f"({left} {symbol} {right})", ATOM
+        return f"{left} {symbol} {right}", level
+
+    def choice(self, value: Value) -> tuple[str, int]:
+        mask, a, b = value.args
+        vector = mask.type.startswith("bvec")
+        template = self.language.choice[vector]
+        infix = "?" in template
+        parts = [self.part(mask, OR) if infix else self.unparenthesized(mask)]
+        parts += [self.splat(x, value.type, CHOICE + 1 if infix else CHOICE) for x in (a, b)]
+        return template.format(*parts), CHOICE if infix else ATOM
+
+    def splat(self, value: Value, type_: str, level: int = CHOICE) -> str:
+        """The text of a value, converted to a vector if it is a float and a vector is needed."""
+        if value.type == type_ or value.type not in ("float",) or not type_.startswith("vec"):
+            return self.part(value, level)
+        if value.op == "constant":
+            return self.spread(type_, self.constant(value))
+        return self.spread(type_, self.expression(value))
+
+    def spread(self, type_: str, text: tuple[str, int]) -> str:
+        """The conversion of a float to a vector."""
+        inside = text[0] if "({1})" in self.language.spread or text[1] == ATOM else f"({text[0]})"
+        return self.language.spread.format(self.language.type(type_), inside)
+
+    def constant(self, value: Value) -> tuple[str, int]:
+        if value.type in ("bool",) or value.type.startswith("bvec"):
+            text = "true" if value.static else "false"
+            return (text if value.type == "bool" else f"{self.language.type(value.type)}({text})"), ATOM
+        text = self.names.number(value)
+        if value.type != "float":
+            return self.spread(value.type, (text, SIGN if text.startswith("-") else ATOM)), SIGN
+        return text, SIGN if text.startswith("-") else ATOM
+
+    def texel(self, value: Value) -> str:
+        table, group, how = value.static
+        arguments = [self.unparenthesized(a) for a in value.args]
+        if table.channels > 4:
+            arguments.append(str(group))
+        return f"{how}_{table.name}({', '.join(arguments)})"
+
+    # ------------------------------------------------------------------ calls
+
+    def call_arguments(self, value: Value) -> list[str]:
+        callee: Routine = value.static
+        recorded = self.program.recorded[callee]
+        entry = callee in self.program.entries.values()
+        texts: list[str] = []
+        given: set[str] = set()
+        for argument, object_ in recorded.arguments.items():
+            places = [i for i, p in enumerate(callee.parameters) if place(p.static)[0] == argument]
+            struct, derived = self.program.struct_of(object_), self.program.derived_of(object_)
+            if struct is not None or (derived is not None and isinstance(object_, dict)):
+                for wanted, below in ((struct, False), (derived, True)):
+                    if wanted is None:
+                        continue
+                    fields = {
+                        flat(place(callee.parameters[i].static)[1]): (value.args[i], i in callee.used)
+                        for i in places
+                        if (place(callee.parameters[i].static)[2] or isinstance(object_, dict)) == below
+                    }
+                    if entry or any(used for _, used in fields.values()):
+                        if wanted.record.name not in given:
+                            texts.append(self.object(wanted, fields))
+                        given.add(wanted.record.name)
+                continue
+            texts += [self.unparenthesized(value.args[i]) for i in places if i in callee.used or entry]
+        return texts
+
+    def object(self, struct: Struct, fields: dict[str, tuple[Value, bool]]) -> str:
+        """A struct as an argument: this function's own if it holds exactly these fields, or a new one."""
+        name = struct.record.name
+        if name in self.objects:
+            own = self.objects[name][1]
+            if all(
+                self.parameter_names.get(v.order) == f"{own}.{self.language.word(field)}"
+                for field, (v, used) in fields.items()
+                if used
+            ):
+                return own
+        parts = []
+        for field, type_ in struct.record.fields:
+            given, used = fields.get(field, (None, False))
+            if given is not None and given.op == "parameter" and given.order not in self.parameter_names:
+                self._late(given)
+            if given is not None and (used or given.order in self.parameter_names):
+                parts.append(self.splat(given, type_))
+            else:  # it is not read
+                parts.append("0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM)))
+        key = (name, tuple(parts))
+        if key not in self.built:
+            local = self.fresh(common_head(parts) or name[0].lower() + name[1:])
+            type_name = self.names.note(struct.record)
+            if self.language.struct_literal:
+                line = self.language.local(type_name, local, f"{type_name}({', '.join(parts)})")
+            else:
+                line = f"{type_name} {local} = {{ {', '.join(parts)} }};"
+            self.lines += wrap(line, INDENT)
+            self.built[key] = local
+        return self.built[key]
+
+    def _late(self, parameter: Value) -> None:
+        """Name a field of this function's own structs that is only passed on in another struct."""
+        root, path, derived = place(parameter.static)
+        value = self.arguments.get(root)
+        struct = self.program.derived_of(value) if derived or isinstance(value, dict) else self.program.struct_of(value)
+        if struct is not None and struct.record.name in self.objects and path in struct.paths:
+            own = self.objects[struct.record.name][1]
+            self.parameter_names[parameter.order] = f"{own}.{self.language.word(flat(path))}"
+
+
+def _squares(value: Value) -> bool:
+    """Whether a value is the square of its first argument."""
+    if value.op == "call":
+        return stem_of(value.static) == "sqr"
+    return value.op == "mul" and value.args[0] is value.args[1]

@@ -1,0 +1,35 @@
+"""`gonio compensation` and `go.compensation`: the ways to restore the light lost by single scattering, compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .. import files
+from ..catalog import notation
+from ..material import BSDF
+from ..materials.compensated import comparison
+from ..owner import public
+from . import energy_figures
+
+SAMPLES = 200_000
+
+
+@public
+def compensation(*models: BSDF | str, output: str | Path | None = None, samples: int = SAMPLES) -> dict[str, Any]:
+    """Compare the ways to restore the light lost by single-scattering models: furnace, error, reciprocity, cost.
+
+        go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
+
+    models   materials to compare too: one with a base as a method, any other as a base
+    output   folder for a picture and JSON; None writes nothing
+    samples  random walks per point of the reference
+    Returns what `gonio compensation --json` prints: `albedo` [material][method] over `roughness` and `mu`, `rms` to
+    the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`, and the `cost`.
+    """
+    folder = None if output is None else files.check_folder(Path(output))
+    own = [model if isinstance(model, BSDF) else notation.named(model)[0] for model in models]
+    result = comparison.compare(walks=samples, own=own)
+    if folder is not None:
+        energy_figures.plot_comparison(result, folder)
+    return result

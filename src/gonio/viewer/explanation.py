@@ -1,0 +1,46 @@
+"""`gonio explain` and `go.explain`: the manual page of a material, of any other member of a family, or of a family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..catalog import notation, operands
+from ..owner import public
+from . import families, manual
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One page, or one for each member that has the name; `print` gives their text."""
+
+    pages: tuple[manual.Page | families.MemberPage | families.FamilyPage, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON: the first page, with the others as `also`."""
+        first, *others = (page.as_dict() for page in self.pages)
+        return {**first, "also": others} if others else first
+
+    def text(self, width: int = families.WIDTH) -> str:
+        """For a terminal of so many columns."""
+        return "\n\n".join(page.text(width) for page in self.pages)
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+@public
+def explain(name: str = "") -> Explanation:
+    """The manual page of a material, or of any other member of a family: formula, parameters, limits, source.
+
+        print(go.explain("conductor"))
+        print(go.explain("ggx"))
+
+    name  a material, a distribution of normals, a masking term, an integrator, a law, ...; or a family, such as
+          "fresnel", whose members are listed; "" lists the families
+    Raises InputError, with the nearest known name.
+    """
+    if not name:
+        return Explanation((families.index(),))
+    if operands.is_material(name):
+        return Explanation((manual.page(notation.taken_apart(name)[0]),))
+    return Explanation(tuple(families.pages(name)))
