@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import gonio as go
 import numpy as np
 import pytest
+from gonio import cli
 from gonio.errors import InputError
-from gonio.measure import compare
+from gonio.measure import SAMPLE, compare
 from gonio.measure.tables.half_difference import centres, sampled
 
 SHAPE = (12, 12, 16)
@@ -31,8 +33,23 @@ def test_light_that_grazes_invents_nothing(turn: float) -> None:
 @pytest.mark.slow
 def test_the_error_of_a_conversion_is_parted(shared: Path, tmp_path: Path) -> None:
     source = shared / "data/rgl/paper_white_rgb.bsdf"
-    half, whole = (compare.convert(source, tmp_path / f"{phi}.binary", phi) for phi in (180, 360))
-    assert 0.0 < half.resolution < half.error and 0.0 < half.reciprocity < half.error
-    assert whole.error < half.error and whole.reciprocity == 0.0
+    results = [go.convert(source, tmp_path / f"{phi}.binary", phi=phi) for phi in (180, 360)]
+    half, full = (result.facts for result in results)
+    assert 0.0 < half["resolution"] < half["error"] and 0.0 < half["reciprocity"] < half["error"]
+    assert full["error"] < half["error"] and full["reciprocity"] == 0.0
+    assert "by the asymmetry of the table; --phi 360 preserves it" in str(results[0]) and "phi" not in str(results[1])
     with pytest.raises(InputError, match="90 given for a merl file"):
         compare.convert(source, tmp_path / "x.binary", 90)
+
+
+def test_the_range_of_phi_is_an_option_of_the_command_and_a_keyword(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InputError, match="90 given for a merl file"):
+        go.convert(SAMPLE, tmp_path / "x.binary", phi=90)
+    with pytest.raises(InputError, match="360 given for a gonio file"):
+        go.convert(SAMPLE, tmp_path / "x.gonio", phi=360)
+    material = tmp_path / "m.json"
+    material.write_text('{"type": "lambert", "albedo": 0.5}')
+    assert cli.run(["convert", str(material), "-o", str(tmp_path / "m.mtlx"), "--phi", "360"]) == 2
+    assert "not a table of measured values" in capsys.readouterr().err

@@ -50,8 +50,8 @@ def convert(
     source    a picture, a file of measured values, or one that describes a material (.gltf, .mtlx, .json)
     output    the file to write
     exposure  of a .png: stops, or "auto"
-    phi       cells of phi_d in a .binary: 180, or 360, which preserve nonreciprocal values; by default as many as the
-              table has, else 180
+    phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
+              nonreciprocal values; by default that of the table if it has such cells, otherwise 180
     Warns (GonioWarning) of what the format does not hold. Raises InputError for formats that cannot be read or written.
     """
     result = converted(str(source), Path(output), exposure, phi)

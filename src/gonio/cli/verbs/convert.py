@@ -21,7 +21,7 @@ def convert(
     exposure: Exposure = "0.0",
     phi: Annotated[
         int | None,
-        Option("--phi", metavar="180|360", help="Cells of phi_d in a .binary; 360 preserve nonreciprocal values."),
+        Option("--phi", metavar="DEG", help="Range of phi_d in a .binary: 180, or 360 for nonreciprocal values."),
     ] = None,
     as_json: Json = False,
 ) -> None:

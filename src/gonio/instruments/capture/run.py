@@ -169,6 +169,7 @@ def capture(
     grazing      degrees: pixels seen or lit from beyond are left out
     param        path -> value of parameters that are held
     free         paths of parameters that move although they stay by themselves
+    progress     called before each step, with its name
     Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
     throughout, or that show no sample.
     """
