@@ -341,7 +341,7 @@ def test_an_exposure_is_chosen_by_the_picture(scene: Path, capsys: pytest.Captur
 
 def test_what_clips_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", scene, "-o", "a.exr", "--exposure", "1") == 0
-    assert ".exr keeps radiance as it is" in capsys.readouterr().err
+    assert ".exr stores radiance" in capsys.readouterr().err
     for arguments in (["render", scene, "-o", "a.png"], ["convert", "a.exr", "-o", "a.png"]):
         assert gonio(*arguments, "--exposure", "9") == 0
         told = re.search(
@@ -399,7 +399,7 @@ def test_convert_keeps_the_picture_and_its_settings(
     before = Path("a.png").read_bytes()
     assert "unknown picture format '.jpg'" in failure(capsys, "convert", "a.exr", "-o", "a.jpg")
     assert "cannot read" in failure(capsys, "convert", "b.exr", "-o", "a.png")
-    assert "no exposure" in failure(capsys, "convert", "a.exr", "-o", "a.png", "--exposure", "bright")
+    assert "not an exposure" in failure(capsys, "convert", "a.exr", "-o", "a.png", "--exposure", "bright")
     assert "-100 to 100" in failure(capsys, "convert", "a.exr", "-o", "a.png", "--exposure", "nan")
     assert Path("a.png").read_bytes() == before
 
@@ -503,7 +503,7 @@ def test_compare_judges_by_the_tolerance(capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.mark.usefixtures("two_pictures")
 def test_compare_refuses_what_cannot_be_compared(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "16x12 against 16x4" in failure(capsys, "compare", "a.exr", "small.npz")
+    assert "differ in size: 16x12 and 16x4" in failure(capsys, "compare", "a.exr", "small.npz")
     assert "cannot read" in failure(capsys, "compare", "a.exr", "c.exr")
     assert "did you mean 'relmse'?" in failure(capsys, "compare", "a.exr", "b.exr", "--metric", "relms")
     assert "tolerance" in failure(capsys, "compare", "a.exr", "b.exr", "--tolerance", "nan")

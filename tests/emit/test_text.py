@@ -262,7 +262,7 @@ def test_comments_speak_of_the_shader_not_of_python(name: str) -> None:
 
 def test_every_constant_that_is_no_multiple_of_pi_says_what_it_is() -> None:
     text = go.emit(go.KullaConty(GOLD))
-    assert "NOTHING = 1.0e-5;  // M_avg below this" in text
+    assert "NOTHING = 1.0e-5;  // smaller values of M_avg" in text
 
 
 @pytest.mark.slow

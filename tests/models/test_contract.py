@@ -273,7 +273,7 @@ def test_directions_go_by_name_too() -> None:
     np.testing.assert_array_equal(m.eval(wi=WI, wo=WO), m.eval(WO, WI))
     np.testing.assert_array_equal(m.pdf(WO, wi=WI), m.pdf(WO, WI))
     np.testing.assert_array_equal(m.sample(WO, u=U).wi, m.sample(WO, U).wi)
-    with pytest.raises(TypeError, match=r"Conductor.eval misses its argument 'wi'"):
+    with pytest.raises(TypeError, match=r"Conductor.eval lacks its argument 'wi'"):
         m.eval(WO)  # type: ignore[call-overload]
     with pytest.raises(TypeError, match=r"Conductor.eval has no argument 'wr'"):
         m.eval(WO, wr=WI)  # type: ignore[call-overload]

@@ -210,7 +210,7 @@ def test_uv_of_a_ball_are_those_that_rays_find() -> None:
         ball_ = solid_angles.Ball.of(mi, shape)
         normal = rng.normal(size=(3, 1000))
         normal = mi.Vector3f((normal / np.linalg.norm(normal, axis=0)).astype(np.float32))
-        si = scene.ray_intersect(mi.Ray3f(ball_.centre + 3 * normal, -normal))
+        si = scene.ray_intersect(mi.Ray3f(ball_.center + 3 * normal, -normal))
         assert dr.all(si.is_valid())
         u, v = (np.array(x) for x in ball_.uv(normal))
         gap = np.abs(u - np.array(si.uv.x))
