@@ -188,7 +188,7 @@ class Problem:
         return shown, np.stack(slope, -1)
 
     def _ball(self, off: list[Array], types: backend.Types) -> tuple[Array, Array]:
-        """Centre and radius with their faults."""
+        """Center and radius with their faults."""
         placed = self.scene.ball
         assert placed is not None, "a photograph shows it"
         right, down = across(placed.center)
