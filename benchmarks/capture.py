@@ -1,10 +1,11 @@
 """A material from photographs of a ball: accuracy, how often intervals hold the truth, faults, and plans.
 
-    python benchmarks/capture.py [--only accuracy,coverage,faults,plan] [--trials 50]
+    python benchmarks/capture.py [--only accuracy,coverage,series,faults,plan] [--trials 50]
 
 accuracy  8 lights, 256 x 256, 1 % noise: how far albedo and alpha are off after the fit, of several materials; seconds
 coverage  the same with a calibration that is off as it says (lamps by 1 degree, ball by 1 % and a pixel, intensities by
           1 % each and .5 % together): how often the 95 % intervals hold the truth
+series    the same from series of three 16-bit exposures of four cameras, whose shutters are off by .5 % each
 faults    one fault at a time, and 8-bit photographs
 plan      4 planned photographs against 8 random ones, in pairs: root mean square error of the parameters, and what the
           fits state of it. True errors of a pair are all but one random number, so that it takes some 80 pairs
@@ -24,12 +25,20 @@ import numpy as np
 from gonio.instruments.capture import rehearsal
 from gonio.instruments.capture.fitting import across
 from gonio.instruments.capture.run import Capture, capture, plan
+from gonio.instruments.capture.series import Noise
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 
 MIDDLE, RADIUS, AWAY = np.array([0.0, 0.0, 500.0]), 50.0, 400.0
 ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # between lamp and camera, of the eight
 PAINT = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick"))
+CAMERAS = {  # read noise, photons of full scale, relative noise
+    "deep wells": (0.5e-3, 60000, 0.0),
+    "usual": (1.5e-3, 8000, 0.0),
+    "small wells": (4e-3, 1000, 0.0),
+    "a flickering lamp": (1.5e-3, 8000, 0.01),
+}
+TIMES = (0.02, 0.08, 0.32)  # seconds of a series
 STATED = {"light": 1.0, "radius": 0.01, "center": 1.0, "intensity": 0.01, "scale": 0.005}
 
 
@@ -83,14 +92,39 @@ def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
     return np.array(found, float)
 
 
+def in_series(true: dict[str, Any], times: np.ndarray) -> dict[str, Any]:
+    """The calibration with a series of exposures of each view."""
+    photographs = [
+        {
+            "light": shot["light"],
+            "exposures": [{"file": f"{shot['light']}-{n}.png", "seconds": float(t)} for n, t in enumerate(times)],
+        }
+        for shot in true["photographs"]
+    ]
+    return {**true, "response": "linear", "photographs": photographs}
+
+
 def measured(
-    material: go.BSDF, model: str, lamps: np.ndarray, stated: dict[str, float], seed: int, bits: int | None = None
+    material: go.BSDF,
+    model: str,
+    lamps: np.ndarray,
+    stated: dict[str, float],
+    seed: int,
+    bits: int | None = None,
+    camera: str = "",
 ) -> tuple[Capture, np.ndarray, float]:
     """What was found, the truth, and the seconds that it took."""
     true = rig(lamps, bits)
     with tempfile.TemporaryDirectory() as folder:
-        told = off(true, stated, np.random.default_rng([seed, 5]))
-        at = rehearsal.take(true, material, Path(folder) / "p", noise=0.01, bits=bits, seed=seed, stated=told)
+        rng = np.random.default_rng([seed, 5])
+        told = off(true, stated, rng)
+        noise: float | Noise = 0.01
+        if camera:
+            read, photons, relative = CAMERAS[camera]
+            noise = Noise(np.full(3, read**2), np.full(3, 1.0 / photons), np.full(3, relative**2))
+            bits, told = 16, in_series(told, np.array(TIMES))
+            true = in_series(true, TIMES * np.exp(0.005 * rng.normal(size=len(TIMES))))
+        at = rehearsal.take(true, material, Path(folder) / "p", noise=noise, bits=bits, seed=seed, stated=told)
         start = time.perf_counter()
         found = capture(at, model)
         return found, truth(material, found.fit.names), time.perf_counter() - start
@@ -104,11 +138,17 @@ def show(title: str, names: tuple[str, ...], errors: np.ndarray, inside: np.ndar
 
 
 def trials(
-    title: str, material: go.BSDF, model: str, stated: dict[str, float], count: int, bits: int | None = None
+    title: str,
+    material: go.BSDF,
+    model: str,
+    stated: dict[str, float],
+    count: int,
+    bits: int | None = None,
+    camera: str = "",
 ) -> None:
     errors, inside, took = [], [], []
     for seed in range(1, count + 1):
-        found, known, seconds = measured(material, model, eight(), stated, seed, bits)
+        found, known, seconds = measured(material, model, eight(), stated, seed, bits, camera)
         errors.append(np.abs(found.fit.values - known) / known)
         inside.append((found.fit.interval[:, 0] <= known) & (known <= found.fit.interval[:, 1]))
         took.append(seconds)
@@ -169,13 +209,23 @@ def plans(count: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="accuracy,coverage,faults,plan")
+    parser.add_argument("--only", default="accuracy,coverage,series,faults,plan")
     parser.add_argument("--trials", type=int, default=50)
     options = parser.parse_args()
     if "accuracy" in options.only:
         accuracy()
     if "coverage" in options.only:
         trials("paint, every fault at once", PAINT, "lambert+ggx", STATED, options.trials)
+    if "series" in options.only:
+        for camera in CAMERAS:
+            trials(
+                f"series, every fault at once, {camera}",
+                PAINT,
+                "lambert+ggx",
+                STATED,
+                options.trials // 4,
+                camera=camera,
+            )
     if "faults" in options.only:
         faults(max(options.trials // 5, 2))
     if "plan" in options.only:

@@ -99,7 +99,7 @@ def test_faults_that_are_not_stated_are_noticed(taken: Path, found: run.Capture,
     got = go.capture(again(taken, tmp_path, off(rig())), "lambert+ggx")
     assert np.any(np.abs(got.fit.values / TRUTH - 1.0) > 0.01)
     assert np.all(got.fit.errors > 3.0 * found.fit.errors)  # neighbours err alike, which counts
-    assert any("neighbouring pixels err alike" in text for text in got.warnings)
+    assert any("neighboring pixels err alike" in text for text in got.warnings)
 
 
 @pytest.mark.slow

@@ -11,12 +11,13 @@ import pytest
 from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.fitting import batch, data, solver
-from gonio.fitting.fit import fit, modelled
+from gonio.fitting.fit import fit, modelled, moving_of
 from gonio.fitting.parameters import free_of, start_of
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
 from gonio.measure.tables.half_difference import HalfDifference, sampled
+from gonio.ops import backend
 
 SHAPE = (24, 24, 36)
 METAL = go.Conductor.preset("Au", alpha=0.2)
@@ -70,6 +71,57 @@ def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=2e-3)
 
 
+def test_relative_residuals_have_the_derivative_that_noise_cannot_bias() -> None:
+    dr, types = backend.drjit(), backend.types("float64")
+    f = np.geomspace(1e-3, 30.0, 400)
+    for v in (-5.0, -0.2, 0.0, 1.0):
+        model = backend.float_of(f, types)
+        dr.enable_grad(model)
+        residual = solver.deviance(model, backend.float_of(v, types), backend.float_of(0.1, types))
+        dr.forward_from(model)
+        score = backend.to_numpy(dr.detach(residual) * dr.grad(residual), len(f))  # of rho = r^2 / 2
+        difference = np.clip((v - f) / (f + 0.1), -1.0, 1.0)
+        np.testing.assert_allclose(score, -difference / (f + 0.1), rtol=1e-6)
+
+
+def test_a_model_of_0_is_no_solution() -> None:
+    cells = data.data_of(table(PLASTIC, shape=(8, 8, 8)))
+    material, moving = moving_of("lambert+ggx")
+    problem = solver.Problem(material, moving, cells, "relative")
+    dark, right = (
+        problem.cost(np.array(x)) for x in ([0.0] * 3 + [1.0] * 3 + [0.15], [0.3, 0.2, 0.1] + [1.5] * 3 + [0.15])
+    )
+    assert dark > 100.0 * right
+
+
+def test_negative_values_in_a_channel_are_counted_and_do_not_carry_the_others_away() -> None:
+    cells = data.data_of(table(PLASTIC))
+    value = cells.value.copy()
+    highlight = value[:, 1] > 1.0
+    value[highlight, 2] *= -0.3  # out of gamut
+    found = fit(data.Data(cells.wo, cells.wi, value, cells.row), "lambert+ggx")
+    np.testing.assert_allclose(found.values[[0, 1, 3, 4]], [0.3, 0.2, 1.5, 1.5], rtol=0.1)
+    assert found.as_dict()["negative"] == [0, 0, int(highlight.sum())]
+
+
+def test_saturated_values_are_left_out_and_told() -> None:
+    clipped = table(PLASTIC)
+    values = np.minimum(clipped.values, 2.0)
+    cells = data.data_of(HalfDifference(values, clipped.turn))
+    assert cells.out["saturated"] > 100 and (cells.value < 2.0 * cells.wi[:, 2:]).all()
+    found = fit(cells, "lambert+ggx")
+    np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.02)
+    assert any("saturated and left out" in note for note in found.notes)
+    assert found.as_dict()["left_out"] == cells.out
+
+
+@pytest.mark.parametrize("name", ["vch_silk_blue", "chm_mint"])
+def test_a_fit_to_a_real_file_does_not_collapse(shared: Path, name: str) -> None:
+    found = fit(shared / "data/rgl" / f"{name}_rgb.bsdf", "lambert+ggx")
+    assert found.error < 0.7  # it was 16 and 30
+    assert any("values are negative (r 2" in note or "values are negative (r 3" in note for note in found.notes)
+
+
 def test_derivatives_are_those_of_finite_differences() -> None:
     cells = data.data_of(table(PLASTIC, shape=(8, 8, 8)))
     moving = free_of(PLASTIC, {"b.k": None})
@@ -101,8 +153,22 @@ def test_a_colour_whose_channels_mix_has_a_derivative_for_each() -> None:
 
 
 def test_what_the_data_do_not_tell_is_said() -> None:
-    found = fit(table(go.Lambert(0.3)), Sum(go.Lambert(0.3), go.Lambert(0.1)))
-    assert any("a.albedo.r and b.albedo.r are tied" in note for note in found.notes)
+    """Two lobes of one width over a table of one: each may have any share."""
+    cells = data.data_of(table(go.Conductor(alpha=0.3), shape=(12, 12, 16)))
+    twice = Sum(go.Conductor(alpha=0.3, albedo=0.6), go.Conductor(alpha=0.3, albedo=0.4))
+    shares = ("a.albedo", "b.albedo")
+    held = {f"{part}.{name}": tree.value_at(twice, f"{part}.{name}") for part in "ab" for name in ("eta", "k", "alpha")}
+    found = fit(cells, twice, free=shares, param=held)
+    assert np.isinf(found.errors).all()
+    assert any("do not tell a.albedo.r and b.albedo.r from each other" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("model", "gone"), [("lambert+lambert", "b.albedo"), ("lambert+ward", "b.diffuse")])
+def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
+    found = fit(table(go.Lambert((0.3, 0.2, 0.1)), shape=(12, 12, 16)), model)
+    assert not any(name.startswith(gone) for name in found.names)
+    assert f"{gone} is held at 0: a.albedo does the same" in found.notes
+    np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
 def test_parameters_that_are_held_stay() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..measure.tables.base import Floats, Measurement, in_rgb
 from ..measure.tables.half_difference import HalfDifference, centres
 
 GRAZING = 80.0  # degrees: beyond, measurements are not to be trusted, and papers leave them out (Ngan2005)
+SHARED = 0.01  # of the values, that are the largest one to the last digit where a detector saturates
+HIGHLIGHT = 4.0  # times the median, from which on the largest value is a highlight's and not a diffuse material's
 GRID = (60, 45, 36)  # of half vector and difference, where a table has another grid than that
 
 
@@ -22,23 +25,30 @@ class Data:
 
     wo, wi  (N, 3) float64, above the surface
     value   f cos theta_i, (N, 3)
-    row     of which run of neighbours each is one, (N,): what lies close together is off together
+    row     of which run of neighbors each is one, (N,): what lies close together is off together
+    out     values of the table that are left out, by why
     """
 
     wo: Floats
     wi: Floats
     value: Floats
     row: NDArray[np.int64]
+    out: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.wo)
+
+    @property
+    def negative(self) -> NDArray[np.int64]:
+        """Values under 0, of each channel, (3,)."""
+        return np.count_nonzero(self.value < 0.0, axis=0)
 
     def some(self, count: int, seed: int = 1) -> Data:
         """So many of them, drawn evenly from all; all where there are no more."""
         if count >= len(self):
             return self
         chosen = np.sort(np.random.default_rng([seed, 91]).choice(len(self), count, replace=False))
-        return Data(self.wo[chosen], self.wi[chosen], self.value[chosen], self.row[chosen])
+        return Data(self.wo[chosen], self.wi[chosen], self.value[chosen], self.row[chosen], self.out)
 
 
 def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Data:
@@ -53,14 +63,17 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
     own = isinstance(table, HalfDifference)
     shape = table.values.shape[:3] if isinstance(table, HalfDifference) else GRID
     turn = table.turn if isinstance(table, HalfDifference) else np.pi
+    cells = int(np.prod(shape))
     wo, wi, row, seen = _cells((int(shape[0]), int(shape[1]), int(shape[2])), turn, grazing)
     kept = seen
+    out = {"grazing": cells - len(wo)}
     if isinstance(table, HalfDifference):
         valid = table.valid.ravel()[seen]
         wo, wi, row, kept = wo[valid], wi[valid], row[valid], seen & table.valid.ravel()
     if not own:
         known = table.angular_range.holds(wo, wi)
         wo, wi, row, kept = wo[known], wi[known], row[known], seen
+    out["not measured"] = cells - out["grazing"] - len(wo)
     if not len(wo):
         raise InputError("no valid value up to that angle", where, "raise --grazing, or check the file")
     if isinstance(table, HalfDifference):
@@ -68,9 +81,26 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
     else:
         value = table.rgb(wo, wi)
     fine = np.isfinite(value).all(axis=1)
-    if own and not fine.all():
+    clipped = fine & _saturated(value / wi[:, 2:])
+    if not (fine & ~clipped).any():
+        raise InputError("no finite value up to that angle", where, "check the file")
+    out |= {"not finite": int(np.count_nonzero(~fine)), "saturated": int(np.count_nonzero(clipped))}
+    if not fine.all() or clipped.any():
+        fine &= ~clipped
         wo, wi, value, row = wo[fine], wi[fine], value[fine], row[fine]
-    return Data(wo, wi, value, row)
+    return Data(wo, wi, value, row, {why: count for why, count in out.items() if count})
+
+
+def _saturated(f: Floats) -> NDArray[np.bool_]:
+    """Which values (N, 3) stand at the end of what was measured, (N,): a hundredth and more of a channel share its
+    largest value to the last digit, and it is a highlight's."""
+    found = np.zeros(len(f), bool)
+    for channel in f.T:
+        largest = np.max(channel, initial=0.0, where=np.isfinite(channel))
+        at_end = channel == largest
+        if at_end.mean() >= SHARED and largest > HIGHLIGHT * np.nanmedian(np.abs(channel)):
+            found |= at_end
+    return found
 
 
 @lru_cache(maxsize=2)

@@ -6,36 +6,34 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..arguments import renamed
 from ..catalog import notation
 from ..errors import InputError
-from ..material import BSDF, tree
-from ..materials.combined.sum import Sum
+from ..material import BSDF
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
+from .certainty import certainty, information
 from .data import GRAZING, Data, data_of
-from .parameters import Free, free_of, start_of, with_values
-from .solver import METRICS, Problem, Solution, covariance, reweighed, solve
+from .models import modelled as modelled
+from .models import moving_of as moving_of
+from .models import moving_with_notes
+from .parameters import NAMES, Free, with_values
+from .solver import METRICS, Problem, Solution, solve
+from .starts import starts_of
 
 FEW = 6000  # values from which starts are judged
 SOME = 60_000  # from which the best start goes on
-WIDTHS = (0.03, 0.1, 0.3, 0.7)  # of lobes, tried as starts
-COLOURS = (0.5, 2.0)  # of colours without an upper end, such as indices, whose default may be a place without a slope
-STARTS = 24  # tried at most
+SOLVED = 8  # of them that are followed by the metric itself on a few values
+ENDS = 3  # of them that are followed to their end
+SAME = 1e-4  # relative difference of two costs from which on two ends are two
 NORMAL_95 = 1.96
 TIED = 0.98  # correlation from which two numbers are called tied
-SHORT = {
-    "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
-    "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
-}
-FIXED = {"ggx": ("k",), "beckmann": ("k",)}
-AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,8 @@ class Fit:
     values       theirs, (K,)
     errors       standard errors, (K,): inf where the data do not tell
     correlation  (K, K)
-    metric       on which differences were measured, error the root of their mean square on it
+    metric       on which differences were measured, error the root of their mean square on it (of "relative" ones of
+                 the deviance, which is the same where they are small)
     relative     mean |difference| over mean value of f cos theta_i
     criterion    Bayesian information criterion: lower is better; more parameters cost
     count        values that were fitted to
@@ -90,6 +89,8 @@ class Fit:
             "relative": self.relative,
             "criterion": self.criterion,
             "values": self.count,
+            "negative": [int(count) for count in self.data.negative],
+            "left_out": dict(self.data.out),
             "seconds": round(self.seconds, 3),
             "parameters": {
                 name: {"value": float(v), "error": float(e) if np.isfinite(e) else None}
@@ -106,58 +107,6 @@ class Fit:
             for n, v, e in zip(self.names, self.values, self.errors, strict=True)
         ]
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
-
-
-class Model(NamedTuple):
-    """What is fitted: a material, the paths that stay as they are, and others' least values."""
-
-    material: BSDF
-    fixed: tuple[str, ...] = ()
-    least: Mapping[str, float] = {}
-
-
-def modelled(text: str, lobes: int = 1) -> Model:
-    """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=.2)".
-
-    lobes  how many of the last one are added up. "ggx" and "beckmann" are a microfacet lobe of that distribution with
-    Schlick's Fresnel term of an index without absorption, so that colour is all in eta.
-    """
-    if lobes < 1:
-        raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
-    parts = [part.strip() for part in text.split("+")]
-    if not all(parts):
-        raise InputError(f"'{text}' is no sum of materials", "model", 'such as "lambert+ggx"')
-    parts += parts[-1:] * (lobes - 1)
-    made: list[Model] = []
-    for part in parts:
-        head, bracket, rest = part.partition("(")
-        spelled = SHORT.get(head, head)
-        if bracket:
-            own = spelled.partition("(")[2].rstrip(")")
-            spelled = f"{spelled.partition('(')[0]}({','.join(filter(None, [own, rest.removesuffix(')')]))})"
-        material = notation.named(spelled)[0]
-        given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
-        made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
-    whole = made[0]
-    for other in made[1:]:
-        fixed = (*(f"a.{path}" for path in whole.fixed), *(f"b.{path}" for path in other.fixed))
-        least = {f"a.{p}": v for p, v in whole.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
-        whole = Model(Sum(whole.material, other.material), fixed, least)
-    return whole
-
-
-def moving_of(
-    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
-) -> tuple[BSDF, list[Free]]:
-    """A model with the values that `fixed` holds, and its parameters that move; as `fit` takes them."""
-    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
-    given = dict(fixed or {})
-    if given:
-        texts = {path: value for path, value in given.items() if isinstance(value, str)}
-        others = {path: value for path, value in given.items() if path not in texts}
-        material = tree.replace(notation.changed(material, texts), others)
-    moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
-    return material, [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
 
 
 @renamed(metric="loss", fixed="param")
@@ -192,99 +141,100 @@ def fit(
     started = time.perf_counter()
     if loss not in METRICS:
         raise InputError(f"unknown metric '{loss}'", "loss", " | ".join(METRICS))
-    material, moving = moving_of(model, lobes, param, free)
+    material, moving, notes = moving_with_notes(model, lobes, param, free)
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
-    # "relative" weighs by the model itself, so its way there leads over the logarithm, which needs no weights
-    rough = "log" if loss == "relative" else loss
-    floor = Problem(material, moving, cells.some(SOME), rough).floor
-
-    def problem(part: Data, name: str) -> Problem:
-        return Problem(material, moving, part, name, floor)
-
-    few = problem(cells.some(FEW), rough)
-    tried = []
-    for start in _starts(material, moving):
-        tried.append(solve(few, start, steps=12, tolerance=1e-3))
-        progress(f"start {len(tried)}: {np.sqrt(tried[-1].cost / max(3 * len(few.data), 1)):.4g}")
-    tried.sort(key=lambda one: one.cost)
-    middle = problem(cells.some(SOME), rough)
-    # the two best, where they differ: a few values may not tell which is better
-    ends = [solve(middle, one.numbers, steps=40) for one in tried[:2]]
-    best = min(ends, key=lambda one: one.cost)
-    if loss != rough:
-        middle = problem(middle.data, loss)
-        best = reweighed(middle, best.numbers, times=3)
+    middle = Problem(material, moving, cells.some(SOME), loss)
+    best = _best(middle, starts_of(material, moving), progress)
     whole = middle
     if len(cells) > SOME:
-        whole = problem(cells, loss)
-        best = reweighed(whole, best.numbers, times=1)
+        whole = Problem(material, moving, cells, loss, middle.floor, middle.floors)
+        best = solve(whole, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
-    return _result(whole, best, loss, time.perf_counter() - started)
+    return _result(whole, best, loss, time.perf_counter() - started, notes)
 
 
-def _starts(material: BSDF, free: list[Free]) -> list[Floats]:
-    """Where to begin: as the material is, and at other widths of its lobes, each lobe its own, and other indices."""
-    first = start_of(material, free)
-    found = [first]
-    open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
-    firsts = [first, *(np.where(open_ended, value, first) for value in COLOURS if open_ended.any())]
-    places = np.cumsum([0, *(one.count for one in free)])
-    lobes = [int(at) for at, one in zip(places, free, strict=False) if one.kind == "alpha" or _exponent(one)]
-    for widths in itertools.combinations_with_replacement(WIDTHS, len(lobes)):
-        for begin in firsts:
-            other = begin.copy()
-            for at, width in zip(lobes, widths, strict=True):
-                one = free[int(np.searchsorted(places, at, side="right")) - 1]
-                value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
-                other[at] = np.clip(value, one.low, one.high)
-            found.append(other)
-    return found[:STARTS]
+def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
+    """The least cost that starts lead to. All are followed on a few values by the logarithm, which is smooth from
+    anywhere, then the best by the metric itself, at last the best that differ on all values."""
+    data = problem.data.some(FEW)
+    few = _with_data(problem, data, problem.name)
+    rough = _with_data(problem, data, "log") if problem.name == "relative" else few
+    begins: list[Floats] = []
+    for start in starts:
+        end = solve(rough, start, steps=12, tolerance=1e-3).numbers
+        # the logarithm is blind to what its floor hides: where it leads is no better than its start at times
+        begins.append(min((end, start), key=few.cost))
+        progress(f"start {len(begins)}: {np.sqrt(few.cost(begins[-1]) / max(3 * len(data), 1)):.4g}")
+    begins.sort(key=few.cost)
+    tried = sorted((solve(few, one, steps=12, tolerance=1e-3) for one in begins[:SOLVED]), key=lambda one: one.cost)
+    different = [tried[0]]
+    for one in tried[1:]:
+        if all(abs(one.cost / max(other.cost, 1e-300) - 1.0) > SAME for other in different):
+            different.append(one)
+    ends = [solve(problem, one.numbers, steps=40) for one in different[:ENDS]]
+    return min(ends, key=lambda one: one.cost)
 
 
-def _exponent(one: Free) -> bool:
-    return one.kind == "float" and one.ratio and one.high >= 1e3
+def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
+    """The same problem on other data, its floors as they are."""
+    return Problem(problem.material, problem.free, data, metric, problem.floor, problem.floors)
 
 
-def _result(problem: Problem, best: Solution, metric: str, seconds: float) -> Fit:
+def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes: Sequence[str]) -> Fit:
     data, numbers, cost = problem.data, best.numbers, best.cost
-    matrix = covariance(problem, numbers)
-    errors = np.sqrt(np.diag(matrix))
-    told = np.isfinite(errors) & (errors > 0.0)
-    correlation = np.eye(len(numbers))
-    correlation[np.ix_(told, told)] = matrix[np.ix_(told, told)] / np.outer(errors[told], errors[told])
+    hessian, pushes = information(problem.linearized(numbers), data.row, problem.count)
+    runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
+    sure = certainty(hessian, pushes * np.sqrt(runs / max(runs - problem.count, 1)))
     names = tuple(name for one in problem.free for name in one.names)
     material = with_values(problem.material, problem.free, numbers)
     value = material.eval(data.wo, data.wi)
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
-    runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
+    told = notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold)
     mean = cost / max(3 * len(data), 1)
     return Fit(
         material,
         names,
         numbers,
-        errors,
-        correlation,
+        sure.errors,
+        sure.correlation,
         metric,
         float(np.sqrt(mean)),
         relative,
         float(3 * runs * np.log(max(mean, 1e-300)) + len(numbers) * np.log(3 * runs)),
         len(data),
-        tuple(notes_on(problem.free, numbers, errors, correlation, names)),
+        (
+            *notes,
+            *told,
+            *_notes_on_data(data),
+        ),
         seconds,
         data,
     )
 
 
 def notes_on(
-    free: Sequence[Free], numbers: Floats, errors: Floats, correlation: Floats, names: tuple[str, ...]
+    free: Sequence[Free],
+    numbers: Floats,
+    errors: Floats,
+    correlation: Floats,
+    names: tuple[str, ...],
+    untold: Sequence[Sequence[int]] = (),
 ) -> list[str]:
-    """What a reader must know before the values are trusted."""
+    """What a reader must know before the values are trusted.
+
+    untold  groups of numbers of which the data tell at most a combination
+    """
     notes, at = [], 0
+    for group in untold:
+        if len(group) > 1:
+            listed = ", ".join(names[k] for k in group[:-1]) + f" and {names[group[-1]]}"
+            notes.append(f"the data do not tell {listed} from each other, only a combination of them: fix one")
+    together = {k for group in untold if len(group) > 1 for k in group}
     for one in free:
         for k in range(at, at + one.count):
-            if not np.isfinite(errors[k]):
+            if not np.isfinite(errors[k]) and k not in together:
                 notes.append(f"the data do not tell {names[k]}")
             elif numbers[k] <= one.low or numbers[k] >= one.high:
                 notes.append(f"{names[k]} ends at {numbers[k]:.4g}, an end of its range")
@@ -295,6 +245,18 @@ def notes_on(
             notes.append(
                 f"{names[i]} and {names[j]} are tied (correlation {correlation[i, j]:.3f}): fix one to tell the other"
             )
+    return notes
+
+
+def _notes_on_data(data: Data) -> list[str]:
+    """What is odd about the values themselves."""
+    notes = []
+    if data.negative.any():
+        share = ", ".join(f"{name} {100.0 * n / len(data):.2g} %" for name, n in zip(NAMES, data.negative, strict=True))
+        notes.append(f"{int(data.negative.sum())} of {3 * len(data)} values are negative ({share})")
+    for why in ("saturated", "not finite"):
+        if why in data.out:
+            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and left out")
     return notes
 
 

@@ -1,6 +1,6 @@
 """Nonlinear least squares by Levenberg and Marquardt, with derivatives from Dr.Jit.
 
-One kernel evaluates the residuals of all data and their derivatives, in forward mode; of a colour whose channels do not
+One kernel evaluates the residuals of all data and their derivatives, in forward mode; of a color whose channels do not
 mix in `eval`, one derivative serves all three. The normal equations are then sums over rows, which BLAS makes. A pass
 over 1.46 million cells and six numbers moves some 70 MB, and is bound by that and by exp, log and sqrt.
 """
@@ -23,13 +23,14 @@ from .parameters import CHANNELS, Free, ranges, start_of, with_drjit
 
 Array = backend.Array
 BLOCK = 1 << 16  # rows that BLAS sums in float32 at a time
-SMALL = 1e-3  # of the largest value: where "log" turns from relative to absolute
+SMALL = 1e-3  # of the largest value: where "log" and "relative" turn from relative to absolute
+NEAR = 0.1  # relative difference under which a series is more accurate than the logarithm in float32
 
 
 # --------------------------------------------------------------------------- metrics
 
 METRICS = {
-    "relative": "difference over the model's own value, which noise of the data cannot bias",
+    "relative": "difference over the model's own value, which noise of the data cannot bias; its logarithm from 2 on",
     "log": "log(1 + f cos / c), c a thousandth of the brightest value in the data's median channel: nearly relative",
     "log1p": "log(1 + f cos), as Low2012",
     "cuberoot": "(f cos)^(1/3), near to what eyes see",
@@ -38,7 +39,7 @@ METRICS = {
 
 
 def metric(name: str, value: Array, floor: Array) -> Array:
-    """A value on the scale on which differences are measured, of one channel; "relative" ones are weighted instead."""
+    """A value on the scale on which differences are measured, of one channel; for "relative" see `deviance`."""
     dr = backend.drjit()
     if name in ("linear", "relative"):
         return value
@@ -46,6 +47,36 @@ def metric(name: str, value: Array, floor: Array) -> Array:
         size = dr.maximum(dr.abs(value), 1e-9)
         return dr.copysign(dr.exp(dr.log(size) / 3.0), value)
     return dr.copysign(dr.log(1.0 + dr.abs(value) / (1.0 if name == "log1p" else floor)), value)
+
+
+def deviance(model: Array, value: Array, floor: Array) -> Array:
+    """Residual r of a model f against a value v, r^2 = 2 rho, of the metric "relative".
+
+    Least squares of (v - f) / (f + c), weighed by the model where it stands, solve sum((v - f) / (f + c)^2 df) = 0.
+    These are the quasi-likelihood's equations for a standard deviation in proportion to f + c (Wedderburn1974), however
+    the noise is distributed: they have the truth for a root if v is right in the mean. But nothing is minimized by
+    them: a model of 0 has as good a root. What has that derivative is the deviance of the gamma distribution,
+
+        rho = u - log(1 + u),  u = (v - f) / (f + c),
+
+    which a model of 0 makes large. From u = 1 on (data twice the model, which noise does not make) rho is log(1 + u)
+    plus a constant: its derivative stops there, as Huber's does (Huber1964), and as it stops at u = -1 by itself. So no
+    value counts more than 1 / (f + c). A value under -c / 2 has v + c, at least 0, in the derivative as it is; the
+    constant is that of -c / 2, since no model is negative.
+    """
+    dr = backend.drjit()
+    size = dr.abs(model)
+    nearest = dr.maximum(value, -0.5 * floor)
+    share = dr.maximum(value + floor, 0.0) / (nearest + floor)
+    u = (nearest - size) / (size + floor)
+    small = dr.abs(u) < NEAR
+    # 2 rho / u^2 = 2 sum of (-u)^k / (k + 2)
+    s = dr.select(small, u, 0.0)
+    series = 1.0 + s * (-2 / 3 + s * (1 / 2 + s * (-2 / 5 + s * (1 / 3 + s * (-2 / 7 + s / 4)))))
+    b = dr.select(small, 1.0, u)
+    logarithm = dr.log(1.0 + b)
+    rho = dr.select(b > 1.0, logarithm + (1.0 - 2.0 * np.log(2.0)), share * b - logarithm)
+    return dr.select(small, -s * dr.sqrt(series), -dr.copysign(dr.sqrt(2.0 * rho), b))
 
 
 # --------------------------------------------------------------------------- residuals and their derivatives
@@ -70,6 +101,7 @@ class Problem:
 
     material  what is fitted, free its parameters that move
     name      of the metric
+    floor     value of "log" where it turns absolute; floors (3,) those of "relative", of each channel
     """
 
     material: BSDF
@@ -77,18 +109,20 @@ class Problem:
     data: Data
     name: str = "log"
     floor: float = 0.0
+    floors: Floats | None = None
     _given: tuple[Array, Array, list[Array]] | None = field(default=None, repr=False)
-    _weights: list[Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.name not in METRICS:
             raise InputError(f"unknown metric '{self.name}'", "metric", " | ".join(METRICS))
         if self.floor <= 0.0:
             self.floor = max(SMALL * float(np.percentile(np.abs(self.data.value), 99.0)), 1e-6)
+        if self.floors is None:
+            self.floors = floors_of(self.data.value)
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
-        """The numbers that one derivative is taken along: each alone, or the three of a colour together."""
+        """The numbers that one derivative is taken along: each alone, or the three of a color together."""
         dr, types = backend.drjit(), backend.types("float32")
         groups: list[list[int]] = []
         at = 0
@@ -103,7 +137,7 @@ class Problem:
                 seen = with_drjit(self.material, self.free, values, types).eval(wo, wi)
                 dr.forward_from(values[together[0]])
                 others = np.abs([backend.to_numpy(dr.grad(seen[c]), len(probe)) for c in (1, 2)])
-                if others.max() > 0.0:  # a colour that acts as a whole, by its mean
+                if others.max() > 0.0:  # a color that acts as a whole, by its mean
                     groups += [[column] for column in together]
                     continue
             groups.append(together)
@@ -127,24 +161,18 @@ class Problem:
     def _floor(self, types: backend.Types) -> Any:
         return backend.float_of(self.floor, types)
 
-    def reweigh(self, numbers: Floats) -> None:
-        """Weigh by the values of the material with these numbers: 1 / (|f cos| + c)."""
-        if self.name != "relative":
-            return
-        types = backend.types("float32")
-        wo, wi, _ = self._loaded(types)
-        dr, floor = backend.drjit(), self._floor(types)
-        values = [backend.float_of(float(x), types) for x in numbers]
-        seen = with_drjit(self.material, self.free, values, types).eval(wo, wi)
-        self._weights = [1.0 / (dr.abs(seen[c]) + floor) for c in range(CHANNELS)]
-        dr.eval(self._weights)
-
-    def _residual(self, seen: Array, types: backend.Types) -> list[Array]:
+    def _residual(self, values: Array, types: backend.Types) -> list[Array]:
         wanted = self._loaded(types)[2]
-        found = [metric(self.name, seen[c], self._floor(types)) - wanted[c] for c in range(CHANNELS)]
-        if self._weights is not None:
-            found = [r * w for r, w in zip(found, self._weights, strict=True)]
-        return found
+        if self.name == "relative":
+            assert self.floors is not None, "set when it was made"
+            floors = [backend.float_of(float(floor), types) for floor in self.floors]
+            return [deviance(values[c], wanted[c], floors[c]) for c in range(CHANNELS)]
+        return [metric(self.name, values[c], self._floor(types)) - wanted[c] for c in range(CHANNELS)]
+
+    def cost(self, numbers: Floats) -> float:
+        """Sum of the squared residuals; infinite where one is not finite."""
+        total = sum(float(np.sum(r.astype(np.float64) ** 2)) for r in self.residuals(numbers))
+        return total if np.isfinite(total) else np.inf
 
     def residuals(self, numbers: Floats) -> list[NDArray[np.float32]]:
         """Of each channel, (N,)."""
@@ -188,8 +216,15 @@ class Problem:
         return found
 
 
+def floors_of(value: Floats) -> Floats:
+    """Where "relative" turns absolute, of each channel, (3,): by the data alone, a thousandth of its brightest values.
+    Values under 0 do not count for it: in real files they lie in highlights whose color is out of gamut."""
+    brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
+    return np.maximum(SMALL * brightest, 1e-6)
+
+
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
-    """Which numbers of a material one derivative is taken along: each alone, or a colour's three where its channels do
+    """Which numbers of a material one derivative is taken along: each alone, or a color's three where its channels do
     not mix; found by asking a few directions."""
     w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
     w[..., 2] = np.abs(w[..., 2]) + 0.1
@@ -286,38 +321,3 @@ def solve(
         if drop < tolerance and moved < 1e-4:
             break
     return Solution(numbers, cost, taken)
-
-
-def reweighed(problem: Problem, start: Floats, times: int) -> Solution:
-    """Weigh by the material where it stands, and step; so many times. Of metrics without weights, steps alone."""
-    best = Solution(start, np.inf, 0)
-    for _ in range(times):
-        problem.reweigh(best.numbers)
-        best = solve(problem, best.numbers, steps=1)
-    return best
-
-
-def covariance(problem: Problem, numbers: Floats) -> Floats:
-    """Covariance of the numbers, (K, K): the sandwich over runs of neighbours, which holds for errors of any size that
-    are alike within a run (Liang1986). A number that the data do not move at all has an infinite variance."""
-    count = problem.count
-    rows = problem.data.row
-    runs = int(rows.max()) + 1 if len(rows) else 1
-    hessian, pushes = np.zeros((count, count)), np.zeros((runs, count))
-    for residual, jacobian, which in problem.linearized(numbers):
-        for column, number in enumerate(which):
-            pushes[:, number] += np.bincount(rows, weights=residual * jacobian[:, column], minlength=runs)
-        for start in range(0, len(residual), BLOCK):
-            j = jacobian[start : start + BLOCK]
-            hessian[np.ix_(which, which)] += j.T @ j
-    scale = np.sqrt(np.diag(hessian))
-    told = scale > 0.0
-    found = np.full((count, count), 0.0)
-    found[np.diag_indices(count)] = np.inf
-    if told.any():
-        s = scale[told]
-        inverse = np.linalg.pinv(hessian[np.ix_(told, told)] / np.outer(s, s), rcond=1e-9) / np.outer(s, s)
-        used = int(np.count_nonzero(np.bincount(rows, minlength=runs)))
-        spread = pushes[:, told].T @ pushes[:, told] * (used / max(used - count, 1))
-        found[np.ix_(told, told)] = inverse @ spread @ inverse
-    return found

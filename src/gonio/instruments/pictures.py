@@ -24,6 +24,7 @@ from ..bridge import engine
 from ..bridge.types import BSDFPlugin
 from ..catalog import notation
 from ..errors import InputError, did_you_mean
+from ..fitting.certainty import certainty, information
 from ..fitting.fit import NORMAL_95, moving_of, notes_on
 from ..fitting.parameters import CHANNELS, Free, start_of, with_values
 from ..fitting.solver import Linearized, columns_of, solve
@@ -230,7 +231,7 @@ class Problem:
         self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
         self.depth = depth
         self.wanted = wanted.astype(np.float64)
-        # a mean of neighbours: a pixel's own noise must not weigh it
+        # a mean of neighbors: a pixel's own noise must not weigh it
         level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
         lit = level[level > 0.0]
         self.weight = 1.0 / (level + DARK * float(np.median(lit)))
@@ -300,23 +301,7 @@ def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: flo
     height, width = problem.wanted.shape[:2]
     row, column = np.indices((height, width)) // TILE
     tile = (row * (-(-width // TILE)) + column).ravel()
-    hessian = np.zeros((problem.count, problem.count))
-    pushes = np.zeros((int(tile.max()) + 1, problem.count))
-    for residual, slope, which in problem.linearized(numbers):
-        hessian[np.ix_(which, which)] += slope.T @ slope
-        for place, number in enumerate(which):
-            pushes[:, number] += np.bincount(tile, weights=residual * slope[:, place], minlength=len(pushes))
-    scale = np.sqrt(np.diag(hessian))
-    told = scale > 0.0
-    covariance = np.full(hessian.shape, 0.0)
-    if told.any():
-        s = np.outer(scale[told], scale[told])
-        inverse = np.linalg.pinv(hessian[np.ix_(told, told)] / s, rcond=1e-9) / s
-        covariance[np.ix_(told, told)] = inverse @ (pushes.T @ pushes)[np.ix_(told, told)] @ inverse
-    errors = np.where(told, np.sqrt(np.diag(covariance)), np.inf)
-    size = np.where(told & (errors > 0.0), errors, 1.0)
-    correlation = covariance / np.outer(size, size)
-    np.fill_diagonal(correlation, 1.0)
+    sure = certainty(*information(problem.linearized(numbers), tile, problem.count))
     names = tuple(name for one in problem.free for name in one.names)
     shown = problem.render(numbers)
     materials, at = {}, 0
@@ -328,12 +313,12 @@ def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: flo
         materials,
         names,
         numbers,
-        errors,
-        correlation,
+        sure.errors,
+        sure.correlation,
         tuple(losses),
         float(np.abs(shown - problem.wanted).mean() / np.abs(problem.wanted).mean()),
         problem.wanted.astype(np.float32),
         shown.astype(np.float32),
-        tuple(notes_on(problem.free, numbers, errors, correlation, names)),
+        tuple(notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold)),
         seconds,
     )

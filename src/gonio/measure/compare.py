@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from .. import files
 from ..errors import InputError
 from ..ops import backend
 from . import format_of, read
+from .formats.merl import Merl
 from .tables.base import Floats, Measurement
 
 PAIRS = 1 << 16
@@ -21,7 +24,18 @@ SURE = 0.03
 GRAZING = 0.03  # smallest cosine of view: within 1.7 degrees of the horizon every format extrapolates
 
 
-def difference(table: Measurement, other: Measurement, pairs: int = PAIRS, seed: int = 1) -> float:
+class Comparable(Protocol):
+    """What a difference is measured of."""
+
+    @property
+    def rgb(self) -> Callable[[Floats, Floats], Floats]: ...
+    @property
+    def draw(self) -> Callable[..., Any]: ...
+    @property
+    def pdf(self) -> Callable[..., Any]: ...
+
+
+def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: int = 1) -> float:
     """E |other - table| / E |table| of f cos theta_i, over views of even cosine and all light, mean of the channels.
 
     The pairs are sampled by both tables' densities and by the cosine, a third each, so that narrow lobes count by their
@@ -39,7 +53,7 @@ def difference(table: Measurement, other: Measurement, pairs: int = PAIRS, seed:
 
 
 def _round(
-    table: Measurement, other: Measurement, pairs: int, rng: np.random.Generator
+    table: Comparable, other: Comparable, pairs: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """|other - table| and |table| at random pairs, over their density."""
     types = backend.types("float64")
@@ -73,6 +87,8 @@ class Converted:
     resampled  whether its values were computed by evaluating the source; otherwise the numbers are the same
     error      its distance from the source, see `difference`
     size       bytes
+    resolution, reciprocity  how far the file lies from the source's reciprocal part, and that from the source: what
+               cells lose, and what a format loses that holds one value for a pair and its exchange; these overlap
     """
 
     path: Path
@@ -80,14 +96,28 @@ class Converted:
     resampled: bool
     error: float
     size: int
+    resolution: float = 0.0
+    reciprocity: float = 0.0
 
     def as_dict(self) -> dict[str, object]:
         return {**vars(self), "path": str(self.path), "output": str(self.path)}
 
 
-def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> Converted:
+class ReciprocalPart:
+    """A table with one value f per pair and its exchange: least squares of both, as in `half_difference.sampled`."""
+
+    def __init__(self, table: Measurement) -> None:
+        self.draw, self.pdf, self._rgb = table.draw, table.pdf, table.rgb
+
+    def rgb(self, wo: Floats, wi: Floats) -> Floats:
+        o, i = wo[:, 2:], wi[:, 2:]
+        return np.asarray((self._rgb(wo, wi) * i + self._rgb(wi, wo) * o) / (i * i + o * o) * i)
+
+
+def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi: int | None = None) -> Converted:
     """Write a table in the format of another suffix; its error is measured on the written file.
 
+    phi  cells of phi_d in a MERL file: 180, or 360 for nonreciprocal tables
     Raises InputError if the source cannot be read, or the format cannot be written.
     """
     table, path = read(source), Path(output)
@@ -98,11 +128,17 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> C
     if not table.isotropic and kind.writes not in (table.name, "any"):
         hint = ".bsdf and .gonio preserve the anisotropy"
         raise InputError(f"{kind.name} files hold isotropic materials, this one is anisotropic", str(path), hint)
-    resampled = kind.resampled(table)
+    if phi is not None and (not isinstance(kind, Merl) or phi not in (180, 360)):
+        raise InputError(f"{phi} given for a {kind.name} file", "phi", "180 or 360 cells of phi_d, for .binary files")
+    resampled = kind.resampled(table, phi) if isinstance(kind, Merl) else kind.resampled(table)
     data = kind.write(resampled)
-    error = difference(table, kind.read(data, str(path)))
+    made = kind.read(data, str(path))
+    error, resolution, reciprocity = difference(table, made), 0.0, 0.0
+    if resampled is not table and made.reciprocal and not table.reciprocal:
+        even = ReciprocalPart(table)
+        resolution, reciprocity = difference(even, made), difference(table, even)
     files.write_whole(target, data)
-    return Converted(path, resampled.name, resampled is not table, error, len(data))
+    return Converted(path, resampled.name, resampled is not table, error, len(data), resolution, reciprocity)
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

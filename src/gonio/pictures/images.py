@@ -144,10 +144,11 @@ def from_screen(values: NDArray[np.floating]) -> RGB:
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def png_bytes(values: NDArray[np.uint8], metadata: Metadata | None = None) -> bytes:
-    """An 8-bit RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks."""
+def png_bytes(values: NDArray[np.uint8] | NDArray[np.uint16], metadata: Metadata | None = None) -> bytes:
+    """An RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks; of 16 bits where they are uint16."""
     height, width = values.shape[:2]
-    rows = values.reshape(height, width * 3)
+    bits = 8 * values.dtype.itemsize
+    rows = np.frombuffer(values.astype(f">u{bits // 8}").tobytes(), np.uint8).reshape(height, -1)
     # Filter 2 (difference to the row above, modulo 256) halves the size of smooth pictures.
     difference = np.diff(rows, axis=0, prepend=np.uint8(0))
     filtered = np.concatenate([np.full((height, 1), 2, np.uint8), difference], axis=1)
@@ -163,8 +164,8 @@ def png_bytes(values: NDArray[np.uint8], metadata: Metadata | None = None) -> by
     return b"".join(
         [
             b"\x89PNG\r\n\x1a\n",
-            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
-            chunk(b"sRGB", b"\0"),
+            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)),
+            *([chunk(b"sRGB", b"\0")] if bits == 8 else []),  # 16 bits hold what a camera measured
             *(text(_PREFIX + key, _one_line(value)) for key, value in (metadata or {}).items()),
             chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
             chunk(b"IEND", b""),

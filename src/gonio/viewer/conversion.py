@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..catalog import documents, operands
 from ..catalog.operands import Kind
-from ..errors import GonioWarning
+from ..errors import GonioWarning, InputError
 from ..measure import compare
 from ..owner import public
 from ..pictures import exposures, images
@@ -21,7 +21,8 @@ class Conversion:
     output   the file
     summary  what it is, in one line
     notices  what the format does not hold, and what was clipped
-    facts    of pictures `exposure` (stops, or None), of tables `kind`, `resampled`, `error` and `size` (bytes)
+    facts    of pictures `exposure` (stops, or None), of tables `kind`, `resampled`, `error`, `size` (bytes), and the
+             parts of the error, `resolution` and `reciprocity`
     """
 
     output: Path
@@ -38,7 +39,9 @@ class Conversion:
 
 
 @public
-def convert(source: str | Path, output: str | Path, *, exposure: exposures.Exposure = 0.0) -> Conversion:
+def convert(
+    source: str | Path, output: str | Path, *, exposure: exposures.Exposure = 0.0, phi: int | None = None
+) -> Conversion:
     """Write a picture, measured values, or another program's material in the format of another suffix.
 
         go.convert("ball.exr", "ball.png", exposure="auto")
@@ -47,28 +50,45 @@ def convert(source: str | Path, output: str | Path, *, exposure: exposures.Expos
     source    a picture, a file of measured values, or one that describes a material (.gltf, .mtlx, .json)
     output    the file to write
     exposure  of a .png: stops, or "auto"
+    phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
+              nonreciprocal values; by default that of the table if it has such cells, otherwise 180
     Warns (GonioWarning) of what the format does not hold. Raises InputError for formats that cannot be read or written.
     """
-    result = converted(str(source), Path(output), exposure)
+    result = converted(str(source), Path(output), exposure, phi)
     for notice in result.notices:
         warnings.warn(notice, GonioWarning, stacklevel=4)  # past the checks and the lock
     return result
 
 
-def converted(source: str, output: Path, exposure: exposures.Exposure = 0.0, location: str = "source") -> Conversion:
+def converted(
+    source: str,
+    output: Path,
+    exposure: exposures.Exposure = 0.0,
+    phi: int | None = None,
+    location: str = "source",
+) -> Conversion:
     """As `convert`, without its warnings; `location` is the place of an error about the source."""
     kind = operands.kind_of(source, {Kind.PICTURE, Kind.TABLE, Kind.DOCUMENT}, location)
+    if phi is not None and kind is not Kind.TABLE:
+        raise InputError(f"{phi} given for {source}, which is not a table of measured values", "phi", "omit it")
     if kind is Kind.DOCUMENT:
         notices = documents.convert(source, output)
         return Conversion(output, str(output), notices, {"notices": notices})
     if kind is Kind.TABLE:
-        table = compare.convert(source, output)
-        how = "resampled" if table.resampled else "the same values"
-        summary = (
-            f"{output}  {table.size / 1e6:.2f} MB, {table.kind}, {how}: {100.0 * table.error:.2g} % off on average"
-        )
-        return Conversion(output, summary, (), table.as_dict())
+        table = compare.convert(source, output, phi)
+        return Conversion(output, _table_summary(table), (), table.as_dict())
     shown = images.convert(Path(source), output, exposure)
     summary = str(output) if shown.exposure is None else f"{output}  exposure {shown.exposure:+g} EV"
     facts: dict[str, object] = {"exposure": shown.exposure, "notice": shown.notice}
     return Conversion(output, summary, (shown.notice,) if shown.notice else (), facts)
+
+
+def _table_summary(table: compare.Converted) -> str:
+    """What was written, its error, and the causes of it."""
+    how = "resampled" if table.resampled else "the same values"
+    text = f"{table.path}  {table.size / 1e6:.2f} MB, {table.kind}, {how}: {100.0 * table.error:.2g} % off on average"
+    if table.reciprocity:
+        asymmetry, coarse = 100.0 * table.reciprocity, 100.0 * table.resolution
+        hint = "; --phi 360 preserves it" if table.path.suffix.lower() == ".binary" else ""
+        text += f"\n  of which {coarse:.2g} % by resolution, {asymmetry:.2g} % by the asymmetry of the table{hint}"
+    return text

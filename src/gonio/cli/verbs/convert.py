@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument
+from typer import Argument, Option
 
 from ..options import Exposure, Json, output_option
 from ..output import print_warnings
@@ -19,6 +19,10 @@ def convert(
     *,
     output: Annotated[Path, output_option("FILE", "The file; its suffix names the format.")],
     exposure: Exposure = "0.0",
+    phi: Annotated[
+        int | None,
+        Option("--phi", metavar="DEG", help="Range of phi_d in a .binary: 180, or 360 for nonreciprocal values."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a picture, a measured material, or another program's material in another format.
@@ -33,12 +37,13 @@ def convert(
       gonio convert ball.exr -o ball.png --exposure auto
       gonio convert ball.exr -o ball.hdr
       gonio convert gold.binary -o gold.bsdf
+      gonio convert paint.bsdf -o paint.binary --phi 360
       gonio convert paint.mtlx -o paint.json
     """
     from ...pictures import exposures
     from ...viewer.conversion import converted
 
-    result = converted(source, output, exposures.parse(exposure), "IN")
+    result = converted(source, output, exposures.parse(exposure), phi, "IN")
     if as_json:
         print(json.dumps(result.as_dict()))
         return

@@ -66,6 +66,6 @@ def _on_fit(scene: Scene, found: Fitted) -> Iterator[str]:
         if abs(value) > FAR:
             yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
     if found.problem.alike > ALIKE:
-        yield "neighbouring pixels err alike: the calibration is off by more than it states, or the model is wrong"
+        yield "neighboring pixels err alike: the calibration is off by more than it states, or the model is wrong"
     if fit.relative > max(WRONG, 3.0 * found.noise):
         yield f"the model is {100.0 * fit.relative:.0f} % off on average: intervals are those of a model that is wrong"

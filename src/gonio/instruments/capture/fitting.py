@@ -3,334 +3,29 @@ intensities. Each of those has the prior that the calibration states, and what t
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...fitting import fit as tables
+from ...fitting.certainty import groups_of, null_space
 from ...fitting.data import Data
 from ...fitting.fit import Fit
-from ...fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
-from ...fitting.solver import Linearized, columns_of, solve
+from ...fitting.parameters import ranges, start_of, with_values
+from ...fitting.solver import solve
 from ...material import BSDF
-from ...ops import backend
-from . import geometry
 from .calibration import Floats, Uncertainty
-from .geometry import Array
-from .pixels import GAUSS, Chosen, Pixels, Scene, constant, directions, seen
+from .pixels import Chosen, Pixels, Scene, directions
+from .problem import Faults, Problem, across, inverse_of, middle_of
 
 FEW = 12_000  # pixels on which the way is found; the last steps are taken on all
-CHUNK = 1 << 17  # pixels at a time, so that memory stays flat
-FARTHEST = 8.0  # standard deviations to which a fault of the calibration may go
 LEAST_NOISE = 1e-4  # relative: below it pixels are as good as exact, and a number of exactly 0 could not be divided by
-BALL = ("ball.x", "ball.y", "ball.radius")
-LAMP = ("right", "down", "intensity")
+CERTAIN = 20.0  # standard deviations of its own noise, from which on a pixel tells what other noise there is
+MEDIAN_CHI2 = 0.454936  # of a squared normal number
 
-
-class Rows(NamedTuple):
-    """Pixels of one lamp in one channel: residuals (N,), derivatives (N, K), which numbers these are along, tiles."""
-
-    residual: NDArray[np.floating]
-    slope: NDArray[np.floating]
-    which: list[int]
-    tile: NDArray[np.int64]
-    lamp: int
-
-
-@dataclass(frozen=True)
-class Faults:
-    """What the calibration leaves open, each as a number of its standard deviations.
-
-    ball       pixels to the right and down, and relative radius
-    scale      relative, of all intensities
-    direction  radians, of each lamp, to the right and down as seen from the sample
-    intensity  relative, of each lamp
-    """
-
-    ball: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    scale: float = 0.0
-    direction: float = 0.0
-    intensity: float = 0.0
-
-    @classmethod
-    def of(cls, stated: Uncertainty, scene: Scene) -> Faults:
-        center, radius = scene.ball.off if scene.ball is not None else (0.0, 0.0)
-        center = center if stated.center is None else stated.center
-        radius = radius if stated.radius is None else stated.radius
-        return cls((center, center, radius), stated.scale, float(np.radians(stated.light)), stated.intensity)
-
-    def names(self, lamps: Sequence[str], ball: bool) -> list[str]:
-        """Of those that are open, the shared ones first."""
-        found = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
-        found += ["scale"] if self.scale > 0.0 else []
-        return found + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
-
-    def slack(self, scene: Scene) -> tuple[float, float]:
-        """By how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: three
-        standard deviations."""
-        ball = (
-            0.0
-            if scene.ball is None
-            else float(np.hypot(self.ball[0] * scene.ball.pixel / scene.ball.radius, self.ball[2]))
-        )
-        return 3.0 * ball, 3.0 * self.direction
-
-    @property
-    def of_lamp(self) -> tuple[str, ...]:
-        return (*(LAMP[:2] if self.direction > 0.0 else ()), *(LAMP[2:] if self.intensity > 0.0 else ()))
-
-
-@dataclass
-class Problem:
-    """Residuals of pixels: (predicted - seen) / standard deviation, and of each fault its own number.
-
-    material  what is fitted, `moving` its parameters
-    noise     relative standard deviation of a pixel
-    alike     by how many pixels one counts, since neighbours err alike: their weight is divided by it
-    """
-
-    material: BSDF
-    moving: list[Free]
-    scene: Scene
-    parts: Sequence[Pixels]
-    faults: Faults
-    noise: float = 0.01
-    alike: float = 1.0
-    free: list[Free] = field(init=False)
-    _weights: list[Floats] | None = field(default=None, repr=False)
-
-    def __post_init__(self) -> None:
-        with_ball = any(part.kind == "ball" for part in self.parts)
-        self.open = self.faults.names(self.scene.names, with_ball)
-        self.free = [*self.moving, *(Free(name, "float", -FARTHEST, FARTHEST, False) for name in self.open)]
-        self.own = sum(one.count for one in self.moving)
-
-    @property
-    def count(self) -> int:
-        return self.own + len(self.open)
-
-    # ------------------------------------------------------------------ columns
-
-    @cached_property
-    def columns(self) -> list[list[int]]:
-        """Of the material's numbers, those that one derivative is taken along: each alone, or a colour's three."""
-        return columns_of(self.material, self.moving)
-
-    def of_row(self, lamp: int, channel: int) -> list[int]:
-        """Which numbers the derivatives of a row are along, in the order in which `_derived` gives them."""
-        shared = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
-        names = [*BALL, "scale", *(f"{self.scene.names[lamp]}.{name}" for name in LAMP)]
-        return shared + [self.own + self.open.index(name) for name in names if name in self.open]
-
-    # ------------------------------------------------------------------ prediction
-
-    def predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        """Radiance of pixels, (N, 3), the mean over four points of each; and its derivatives (N, 3, K)."""
-        values, derivatives = [], []
-        for start in range(0, len(part), CHUNK):
-            found = self._predicted(part.at(np.arange(start, min(start + CHUNK, len(part)))), numbers, derive)
-            values.append(found[0])
-            derivatives.append(found[1])
-        together = np.concatenate([d for d in derivatives if d is not None]) if derive else None
-        return np.concatenate(values), together
-
-    def _predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        dr, types = backend.drjit(), backend.types("float32")
-        scene, faults = self.scene, self.faults
-        rows = len(part)
-        corners = np.array([[x, y] for x in (-GAUSS, GAUSS) for y in (-GAUSS, GAUSS)])
-        place = (part.place[:, None] + corners).reshape(-1, 2)
-        ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
-        which = types.module.UInt32(np.repeat(part.lamp, len(corners)).astype(np.uint32))
-
-        own = [backend.float_of(float(x), types) for x in numbers[: self.own]]
-        at = dict(zip(self.open, numbers[self.own :], strict=True))
-        ball = [backend.float_of(float(at.get(name, 0.0)), types) for name in BALL]
-        turns = self._turns(at, types)
-        groups = [[own[column] for column in columns] for columns in self.columns]
-        with_ball = part.kind == "ball"
-        groups += [[one] for name, one in zip(BALL, ball, strict=True) if name in self.open]
-        groups += [[one] for one in turns if faults.direction > 0.0]
-        if derive:
-            for group in groups:
-                dr.enable_grad(group)
-        lamps = self._lamps(turns, types)
-        lamp = types.vec3(*(dr.gather(types.float, component, which) for component in lamps))
-        found = seen(scene, part.kind, ray, lamp, self._ball(ball, types) if with_ball else None)
-        value = with_drjit(self.material, self.moving, own, types).eval(found.wo, found.wi)
-        light = [dr.gather(types.float, backend.float_of(c, types), which) for c in self._brightness(at).T]
-        radiance = [light[c] * value[c] / found.square for c in range(CHANNELS)]
-        slopes: list[list[Array]] = []
-        if derive:
-            everything = [one for group in groups for one in group]
-            for group in groups:
-                dr.clear_grad(everything)
-                dr.clear_grad(radiance)
-                for one in group:
-                    dr.set_grad(one, 1.0)
-                for one in group:
-                    dr.enqueue(dr.ADMode.Forward, one)
-                dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearInterior)
-                slopes.append([dr.grad(r) for r in radiance])
-        radiance = [dr.detach(r) for r in radiance]
-        dr.eval(radiance, slopes)
-
-        def mean(x: Array) -> Floats:
-            return np.asarray(backend.to_numpy(x, rows * len(corners)).reshape(rows, -1).mean(axis=1), np.float64)
-
-        shown = np.stack([mean(r) for r in radiance], -1)
-        if not derive:
-            return shown, None
-        slope = [np.stack([mean(d) for d in group], -1) for group in slopes]
-        # in the order of `of_row`: material, ball, scale, lamp's direction, lamp's intensity
-        before = len(slope) - (2 if faults.direction > 0.0 else 0)
-        slope[before:before] = [faults.scale * shown] if faults.scale > 0.0 else []
-        slope += [faults.intensity * shown] if faults.intensity > 0.0 else []
-        return shown, np.stack(slope, -1)
-
-    def _ball(self, off: list[Array], types: backend.Types) -> tuple[Array, Array]:
-        """Centre and radius with their faults."""
-        placed = self.scene.ball
-        assert placed is not None, "a photograph shows it"
-        right, down = across(placed.center)
-        sd = self.faults.ball
-        center = constant(placed.center, types)
-        for axis, one, amount in ((right, off[0], sd[0]), (down, off[1], sd[1])):
-            center = center + constant(axis * placed.pixel * amount, types) * one
-        larger = 1.0 + backend.float_of(sd[2], types) * off[2]
-        radius = backend.float_of(placed.radius, types)
-        # an outline that is too large is that of a ball that was taken as too near
-        return (center, radius * larger) if placed.given else (center / larger, radius)
-
-    def _lamps(self, turns: list[Array], types: backend.Types) -> Array:
-        """Places of the lamps with the faults of their directions."""
-        middle = middle_of(self.scene)
-        away = self.scene.lamps - middle
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
-        axes = [across(one) for one in away]
-        toward = backend.vector_of(away / distance, 3, types)
-        sd = backend.float_of(self.faults.direction, types)
-        for number, one in enumerate(turns):
-            toward = toward + backend.vector_of(np.array([axis[number] for axis in axes]), 3, types) * (one * sd)
-        length = backend.drjit().rsqrt(toward.x * toward.x + toward.y * toward.y + toward.z * toward.z)
-        return constant(middle, types) + toward * (length * backend.float_of(distance[:, 0], types))
-
-    def corrected(self, numbers: Floats) -> Scene:
-        """The scene with its faults put right, as far as the pixels told them."""
-        types = backend.types("float64")
-        at = dict(zip(self.open, numbers[self.own :], strict=True))
-        ball = self.scene.ball
-        if ball is not None:
-            center, radius = self._ball([backend.float_of(float(at.get(name, 0.0)), types) for name in BALL], types)
-            ball = replace(ball, center=backend.to_numpy(center, 1)[0], radius=float(backend.to_numpy(radius, 1)[0]))
-        lamps = backend.to_numpy(self._lamps(self._turns(at, types), types), len(self.scene.names))
-        return replace(self.scene, ball=ball, lamps=lamps, intensities=self._brightness(at))
-
-    def _turns(self, at: Mapping[str, float], types: backend.Types) -> list[Array]:
-        return [
-            backend.float_of(np.array([at.get(f"{lamp}.{name}", 0.0) for lamp in self.scene.names]), types)
-            for name in LAMP[:2]
-        ]
-
-    def _brightness(self, at: Mapping[str, float]) -> Floats:
-        own = np.array([[at.get(f"{lamp}.{LAMP[2]}", 0.0)] for lamp in self.scene.names])
-        together = self.faults.scale * at.get("scale", 0.0)
-        return np.asarray(self.scene.intensities * np.exp(together + self.faults.intensity * own))
-
-    # ------------------------------------------------------------------ residuals
-
-    def reweigh(self, numbers: Floats) -> None:
-        """Weigh pixels by the standard deviation that the prediction tells."""
-        self._weights = [self._weight(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
-
-    def _weight(self, part: Pixels, predicted: Floats) -> Floats:
-        floor = 1e-6 * float(np.abs(part.value).max())
-        # a pixel that a fault has moved into the dark is not weighed by the dark
-        size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
-        spread = np.sqrt((self.noise * size) ** 2 + part.step**2 + floor**2)
-        return np.asarray(1.0 / (spread * np.sqrt(self.alike)))
-
-    def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
-        """Of each part (pixels, predicted - seen, predicted)."""
-        found = []
-        for part in self.parts:
-            predicted, _ = self.predicted(part, numbers, False)
-            found.append((part, predicted - part.value, predicted))
-        return found
-
-    def linearized(self, numbers: Floats) -> list[Linearized]:
-        """By lamp and channel, and the priors."""
-        return [(one.residual, one.slope, one.which) for one in self.rows(numbers)] + self._priors(numbers)
-
-    def _priors(self, numbers: Floats) -> list[Linearized]:
-        if not self.open:
-            return []
-        faults = list(range(self.own, self.count))
-        return [(numbers[self.own :], np.eye(len(faults)), faults)]
-
-    def rows(self, numbers: Floats) -> list[Rows]:
-        """By lamp and channel."""
-        if self._weights is None:
-            self.reweigh(numbers)
-        assert self._weights is not None
-        found: list[Rows] = []
-        for part, weight in zip(self.parts, self._weights, strict=True):
-            predicted, slope = self.predicted(part, numbers, True)
-            assert slope is not None
-            residual, slope = (predicted - part.value) * weight, slope * weight[..., None]
-            edges = np.searchsorted(part.lamp, np.arange(len(self.scene.names) + 1))
-            for lamp, (start, end) in enumerate(itertools.pairwise(edges)):
-                if start == end:
-                    continue
-                for channel in range(CHANNELS):
-                    which = self.of_row(lamp, channel)
-                    rows = slice(int(start), int(end))
-                    found.append(Rows(residual[rows, channel], slope[rows, channel], which, part.tile[rows], lamp))
-        return found
-
-    # ------------------------------------------------------------------ how sure
-
-    def information(self, numbers: Floats) -> tuple[Floats, Floats]:
-        """(J^T J, the sum of squares of the tiles' pushes J^T r), of the pixels alone."""
-        hessian = np.zeros((self.count, self.count))
-        tiles = 1 + max(int(part.tile.max()) for part in self.parts)
-        whole = np.zeros((tiles, self.count))
-        for residual, slope, which, tile, _ in self.rows(numbers):
-            hessian[np.ix_(which, which)] += slope.T @ slope
-            for column, number in enumerate(which):
-                whole[:, number] += np.bincount(tile, weights=residual * slope[:, column], minlength=tiles)
-        return hessian, whole.T @ whole
-
-    def prior(self) -> Floats:
-        """What the calibration says, as information: 1 for each fault."""
-        return np.diag(np.r_[np.zeros(self.own), np.ones(len(self.open))])
-
-
-def middle_of(scene: Scene) -> Floats:
-    """What lamps are turned about: the ball's middle, or the flat sample's."""
-    if scene.ball is not None:
-        return scene.ball.center
-    flat = scene.flat
-    assert flat is not None, "there is one of them"
-    return np.asarray(np.array(flat.base) + 0.5 * (np.array(flat.edge0) + np.array(flat.edge1)))
-
-
-def across(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to a direction, and to each other."""
-    aside = np.array([1.0, 0.0, 0.0]) if abs(direction[0]) < 0.8 * np.linalg.norm(direction) else np.array([0, 1.0, 0])
-    down = np.cross(direction, aside)
-    down /= np.linalg.norm(down)
-    right = np.cross(down, direction)
-    return right / np.linalg.norm(right), down
-
-
-# ---------------------------------------------------------------------- the fit
+__all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "middle_of"]
 
 
 @dataclass(frozen=True)
@@ -339,7 +34,7 @@ class Fitted:
 
     fit      its parameters, as `go.fit` gives them
     faults   what came of each open fault of the calibration: (in its own standard deviations, how sure)
-    noise    relative, of a pixel about the fit
+    noise    mean standard deviation of pixels about the fit, over their mean
     problem  as it was solved, numbers what solved it
     """
 
@@ -421,13 +116,26 @@ def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
 
 
 def _noise(problem: Problem, numbers: Floats) -> float:
-    """Relative standard deviation of pixels about the prediction, robust, what quantisation does taken off."""
-    found = []
+    """Relative standard deviation of pixels about the prediction, beside that of their photons, reading and
+    quantisation: with it half of the bright ones lie within the quartiles of their spread."""
+    squares, variances = [], []
     for part, off, predicted in problem.off(numbers):
-        bright = predicted > 20.0 * part.step + 1e-3 * float(np.percentile(predicted, 99.0))
-        found.append(off[bright] / predicted[bright])
-    together = np.concatenate(found)
-    return max(1.4826 * float(np.median(np.abs(together))) if len(together) else 0.0, LEAST_NOISE)
+        bright = predicted > 1e-3 * float(np.percentile(predicted, 99.0))
+        squares.append((off / np.where(bright, predicted, 1.0))[bright] ** 2)
+        variances.append(part.variance(predicted)[bright] / predicted[bright] ** 2)
+    square, variance = np.concatenate(squares), np.concatenate(variances)
+    if not len(square):
+        return LEAST_NOISE
+    # those that are told best, as far as there are enough of them
+    told = variance <= max(1.0 / CERTAIN**2, float(np.quantile(variance, 0.1)))
+    square, variance = square[told], variance[told]
+    low, high = LEAST_NOISE**2, max(float(square.max()), LEAST_NOISE**2) * 4.0
+    if np.median(square / (low + variance)) <= MEDIAN_CHI2:
+        return LEAST_NOISE
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if np.median(square / (middle + variance)) > MEDIAN_CHI2 else (low, middle)
+    return float(np.sqrt(high))
 
 
 def _alike(problem: Problem, numbers: Floats) -> float:
@@ -447,7 +155,9 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     covariance = inverse @ (spread + prior) @ inverse
     # where few tiles tell a number, their residuals are small for that very reason: no smaller than by the noise alone
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
-    errors = np.sqrt(np.where(np.diag(hessian + prior) > 0.0, variance, np.inf))
+    untold = groups_of(null_space(hessian + prior))
+    variance[[number for group in untold for number in group]] = np.inf
+    errors = np.sqrt(variance)
     own = slice(0, problem.own)
     correlation = _correlation(covariance[own, own])
     material = with_values(problem.material, problem.moving, numbers[own])
@@ -468,12 +178,13 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
         float(np.abs(off).sum() / max(float(size.sum()), 1e-30)),
         float(3 * runs * np.log(max(mean, 1e-300)) + problem.own * np.log(3 * runs)),
         len(off),
-        tuple(tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names)),
+        tuple(tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names, untold)),
         time.perf_counter() - started,
         _data(problem.scene, _some(Chosen(tuple(problem.parts), {}), FEW)),
     )
     faults = zip(problem.open, numbers[problem.own :], errors[problem.own :], strict=True)
-    return Fitted(fit, {name: (float(v), float(e)) for name, v, e in faults}, problem.noise, problem, numbers)
+    of_faults = {name: (float(v), float(e)) for name, v, e in faults}
+    return Fitted(fit, of_faults, problem.relative_spread(numbers), problem, numbers)
 
 
 def _correlation(covariance: Floats) -> Floats:
@@ -490,14 +201,3 @@ def _apart(problem: Problem, hessian: Floats) -> Floats:
     kept = np.flatnonzero([True] * problem.own + [not one for one in bright])
     inverse = inverse_of((hessian + problem.prior())[np.ix_(kept, kept)])
     return _correlation(inverse[: problem.own, : problem.own])
-
-
-def inverse_of(matrix: Floats) -> Floats:
-    """The inverse of an information matrix, 0 along what nothing is known of."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    told = np.diag(matrix) > 0.0
-    found = np.zeros_like(matrix)
-    s = scale[told]
-    even = matrix[np.ix_(told, told)] / np.outer(s, s)
-    found[np.ix_(told, told)] = np.linalg.pinv(even, rcond=1e-12) / np.outer(s, s)
-    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...pictures import formats, images
+from . import series
 from .calibration import Calibration, Exposure, Shot
+from .series import Exposed, Noise
 
 Floats = NDArray[np.float64]
-NOISE = 0.01  # relative, by which exposures are weighed against each other beside their steps
 STEPS = 255  # of a file of 8 bits, which is the least that cameras write
 
 
@@ -22,16 +23,22 @@ STEPS = 255  # of a file of 8 bits, which is the least that cameras write
 class Photograph:
     """What a camera saw, in its own linear unit a second.
 
-    name       of its file, the first of a series
-    shot       what the calibration says of it
-    radiance   (H, W, 3); nan where every exposure was saturated
-    step       (H, W, 3), standard deviation of what quantisation does to it, 0 in files of floating-point numbers
+    name         of its file, the first of a series
+    shot         what the calibration says of it
+    radiance     (H, W, 3); nan where every exposure was saturated
+    step         (H, W, 3), its standard deviation by quantisation, and in a series by photons and reading
+    photon       (H, W, 3), derivative of the square of `step` along the radiance; 0 where the noise is not known
+    noise        of the camera, as a series of exposures tells it
+    scale_error  relative, of all radiance, by exposure times that contradict each other
     """
 
     name: str
     shot: Shot
     radiance: Floats
     step: Floats
+    photon: Floats = field(default_factory=lambda: np.zeros(()))
+    noise: Noise | None = None
+    scale_error: float = 0.0
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -40,28 +47,18 @@ class Photograph:
 
 def read(shot: Shot, calibration: Calibration, folder: Path) -> Photograph:
     """A photograph, its exposures merged. Raises InputError, with the file's name, where it cannot be used."""
-    total, weights = np.zeros(()), np.zeros(())
-    best = np.zeros(())
-    for one in shot.pictures:
-        values, step, seconds = _exposed(one, calibration, folder)
-        light, spread = values / seconds, step / seconds
-        # The mean that is least uncertain (Debevec1997 weighs alike); saturated values say nothing.
-        weight = np.where(np.isnan(values), 0.0, 1.0 / (spread**2 + (NOISE * np.nan_to_num(light)) ** 2 + 1e-30))
-        total = total + weight * np.nan_to_num(light)
-        best = best + np.where(weight > 0.0, weight**2 * spread**2, 0.0)
-        weights = weights + weight
-    with np.errstate(invalid="ignore", divide="ignore"):
-        radiance = np.where(weights > 0.0, total / weights, np.nan)
-        step = np.where(weights > 0.0, np.sqrt(best) / weights, 0.0)
+    exposures = [_exposed(one, calibration, folder) for one in shot.pictures]
+    merged = series.merge(exposures)
+    noise = merged.noise if len(exposures) > 1 else None
     name = str(folder / shot.pictures[0].file)
-    found = Photograph(name, shot, radiance, step)
-    if found.saturated.all():
+    photograph = Photograph(name, shot, merged.light, merged.spread, merged.photon, noise, merged.scale_error)
+    if photograph.saturated.all():
         raise InputError("saturated throughout", name, "expose it for a shorter time, or add such an exposure")
-    return found
+    return photograph
 
 
-def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> tuple[Floats, Floats, float]:
-    """(light (H, W, 3), standard deviation of its quantisation, seconds) of a picture; nan where it is saturated."""
+def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
+    """A picture's signal, linear, nan where it is saturated."""
     path = folder / one.file
     where = str(path)
     try:
@@ -94,12 +91,13 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> tuple[Flo
     if seconds is None:
         raise InputError("no exposure time", where, 'add "seconds" to it in the calibration file')
     if not whole:
-        return values, np.zeros_like(values), seconds
+        return Exposed(where, values, np.zeros_like(values), seconds, np.inf)
     steps = 65535 if _sixteen(values) else STEPS
     clipped = values >= calibration.saturation
     high, low = (_light(values + side * 0.5 / steps, calibration) for side in (1.0, -1.0))
     light = np.where(clipped, np.nan, _light(values, calibration))
-    return light, (high - low) / np.sqrt(12.0), seconds
+    ceiling = float(_light(np.array(calibration.saturation), calibration))
+    return Exposed(where, light, (high - low) / np.sqrt(12.0), seconds, ceiling)
 
 
 def _sixteen(values: Floats) -> bool:

@@ -71,9 +71,10 @@ class Pixels:
     kind    "ball" or "flat"
     place   (N, 2), pixel coordinates of their middles
     lamp    (N,), which lamp
-    tile    (N,), which run of neighbours
+    tile    (N,), which run of neighbors
     value   (N, 3), radiance in the camera's unit
-    step    (N, 3), standard deviation of its quantisation
+    step    (N, 3), its standard deviation by quantisation, and in a series of exposures by photons and reading
+    photon  (N, 3), derivative of the square of `step` along the radiance
     """
 
     kind: Kind
@@ -82,6 +83,15 @@ class Pixels:
     tile: NDArray[np.int64]
     value: Floats
     step: Floats
+    photon: Floats
+
+    def variance(self, radiance: Floats) -> Floats:
+        """Of `value` as `step` and `photon` tell it, (N, 3), if the radiance were this.
+
+        The variance of merged exposures is concave along the radiance (a parallel sum of straight lines), so that its
+        tangent at `value` stays above it, and above 0.
+        """
+        return np.maximum(self.step**2 + self.photon * (np.abs(radiance) - np.maximum(self.value, 0.0)), 0.0)
 
     def __len__(self) -> int:
         return len(self.place)
@@ -95,13 +105,14 @@ class Pixels:
             tile=self.tile[chosen],
             value=self.value[chosen],
             step=self.step[chosen],
+            photon=self.photon[chosen],
         )
 
 
 def seen(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
     """What rays see of a sample under lamps.
 
-    ball  its centre and radius, where they are not the scene's
+    ball  its center and radius, where they are not the scene's
     """
     types = backend.types_like(type(ray))
     if kind == "ball":
@@ -189,6 +200,7 @@ def choose(
                 tile[kept],
                 shot.radiance[row, column][kept],
                 shot.step[row, column][kept],
+                np.broadcast_to(shot.photon, shot.step.shape)[row, column][kept],
             )
         )
     parts = tuple(_joined(group) for group in gathered.values() if group)
@@ -214,6 +226,7 @@ def _joined(group: list[Pixels]) -> Pixels:
         np.concatenate([one.tile for one in group]),
         np.concatenate([one.value for one in group]),
         np.concatenate([one.step for one in group]),
+        np.concatenate([one.photon for one in group]),
     )
     return whole.at(np.argsort(whole.lamp, kind="stable"))
 

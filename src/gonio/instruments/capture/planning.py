@@ -172,5 +172,5 @@ def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
         parts.append((some[kept], which[kept]))
     where, which = np.concatenate([p for p, _ in parts]), np.concatenate([w for _, w in parts])
     blank = np.zeros((len(where), 3))
-    part = Pixels(setting.kind, where, which, np.zeros(len(where), np.int64), blank, blank + setting.step)
+    part = Pixels(setting.kind, where, which, np.zeros(len(where), np.int64), blank, blank + setting.step, blank)
     return part, len(place) / len(some)

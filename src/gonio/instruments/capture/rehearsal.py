@@ -25,6 +25,7 @@ from ...render.finish import picture_of
 from ...render.prepare import prepare
 from ...render.request import Request
 from .calibration import NAME, Calibration, Floats, made
+from .series import Noise
 
 
 @public
@@ -33,7 +34,7 @@ def take(
     material: BSDF,
     folder: str | Path,
     *,
-    noise: float = 0.0,
+    noise: float | Noise = 0.0,
     bits: int | None = None,
     spp: int = 16,
     seed: int = 1,
@@ -43,9 +44,9 @@ def take(
 
     calibration  what a calibration file holds; ball and lamps with their places, no lens distortion
     material     of the sample
-    noise        relative standard deviation of each value
-    bits         8 writes .png files of whole numbers by the calibration's response (linear or srgb), and it
-                 must name them so; None keeps radiance, in .exr, .hdr or .npz
+    noise        relative standard deviation of each value; or a camera's read noise, photons and relative noise
+    bits         8 or 16 writes .png files of whole numbers by the calibration's response (linear or srgb; of 16 bits
+                 linear), and it must name them so; None keeps radiance, in .exr, .hdr or .npz
     spp          samples a pixel
     stated       the calibration that is written, where it is to differ: for faults
     """
@@ -58,25 +59,38 @@ def take(
         for one in shot.pictures:
             if one.seconds is None:
                 raise InputError(f"no exposure time of '{one.file}'", "calibration", 'add "seconds"')
-            values = radiance * one.seconds * (1.0 + noise * rng.normal(size=radiance.shape))
+            values = _noisy(radiance * one.seconds, noise, rng)
             path = target / one.file
             if bits is None:
                 images.write(path, values.astype(np.float32))
-            elif bits == 8:
-                files.write_whole(path, images.png_bytes(_stored(values, told)))
+            elif bits in (8, 16):
+                files.write_whole(path, images.png_bytes(_stored(values, told, bits)))
             else:
-                raise InputError(f"{bits} bits given, 8 or None expected", "bits")
+                raise InputError(f"{bits} bits given, 8, 16 or None expected", "bits")
     text = json.dumps(dict(stated if stated is not None else calibration), indent=1)
     files.write_whole(target / NAME, text.encode())
     return target
 
 
-def _stored(values: Floats, calibration: Calibration) -> np.ndarray:
-    if calibration.response == "srgb":
+def _noisy(signal: Floats, noise: float | Noise, rng: np.random.Generator) -> Floats:
+    """A signal (H, W, 3) as a camera reads it."""
+    if not isinstance(noise, Noise):
+        return np.asarray(signal * (1.0 + noise * rng.normal(size=signal.shape)))
+    gain = np.maximum(noise.gain, 1e-12)
+    photons = np.minimum(np.maximum(signal, 0.0) / gain, 1e15)  # more than a generator counts are as good as exact
+    read, relative = (np.sqrt(part) * rng.normal(size=signal.shape) for part in (noise.read, noise.relative))
+    return np.asarray(rng.poisson(photons) * gain + read + relative * signal)
+
+
+def _stored(values: Floats, calibration: Calibration, bits: int) -> np.ndarray:
+    if calibration.response == "srgb" and bits == 8:
         return images.to_screen(values.astype(np.float32))
     if calibration.response != "linear":
-        raise InputError("a response by a curve cannot be rehearsed", "calibration", '"linear" or "srgb"')
-    return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        raise InputError(
+            "this response cannot be rehearsed", "calibration", '"linear", or "srgb" with 8 bits, expected'
+        )
+    highest = 2**bits - 1
+    return (np.clip(values, 0.0, 1.0) * highest + 0.5).astype(np.uint8 if bits == 8 else np.uint16)
 
 
 def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF, spp: int, seed: int) -> Floats:

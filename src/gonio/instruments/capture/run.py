@@ -169,6 +169,7 @@ def capture(
     grazing      degrees: pixels seen or lit from beyond are left out
     param        path -> value of parameters that are held
     free         paths of parameters that move although they stay by themselves
+    progress     called before each step, with its name
     Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
     throughout, or that show no sample.
     """
@@ -181,14 +182,17 @@ def capture(
         shots.append(photographs_of.read(shot, stated, folder))
     scene = _scene(stated, shots)
     progress("chooses pixels")
-    slack = fitting.Faults.of(stated.uncertainty, scene).slack(scene)
+    # exposure times that contradict each other leave the level of all light open by as much
+    scale = float(np.hypot(stated.uncertainty.scale, max(shot.scale_error for shot in shots)))
+    uncertainty = stated.uncertainty.model_copy(update={"scale": scale})
+    slack = fitting.Faults.of(uncertainty, scene).slack(scene)
     chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
     found = None
     if model is not None:
         progress("fits")
-        found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=param, free=free)
+        found = fitting.fitted(scene, chosen, model, uncertainty, fixed=param, free=free)
         scene = found.problem.corrected(found.numbers)
     gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     warnings = advice.on(scene, chosen, found)

@@ -58,7 +58,7 @@ class Left(NamedTuple):
 
     angle      of incidence, by its number
     direction  turned so that its light lay above x
-    weight     what is left of it, a colour
+    weight     what is left of it, a color
     bounces    facets that it met
     escaped    whether it left at all
     lost       whether rounding brought it below the surface; what did neither was absorbed
@@ -84,7 +84,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)
     angle = number // dr.opaque(mi.UInt32, each)
     rng = mi.PCG32(size=count, initstate=dr.opaque(mi.UInt64, seed), initseq=dr.opaque(mi.UInt64, first))
-    # over the period along a Z-shaped curve: rays that are neighbours meet the same facets, which is 3 times as fast
+    # over the period along a Z-shaped curve: rays that are neighbors meet the same facets, which is 3 times as fast
     along_curve = mi.Float64(number % dr.opaque(mi.UInt32, each)) + mi.Float64(rng.next_float32())
     index = mi.UInt32(dr.minimum(along_curve * dr.opaque(mi.Float64, 2.0**32 / each), 2.0**32 - 1.0))
     u, v = (2.0**-16 * (mi.Float(_every_other(index >> bit)) + rng.next_float32()) for bit in (0, 1))

@@ -2,7 +2,7 @@
 
 A map is a grid over the disk of equal area, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), the light above x. The
 surface turns under the light, so y and -y are the same and half the disk is kept. The detector's opening is a cone; in
-the maps it is the squares whose centres lie in it, between the four centres around its axis. What it collects is
+the maps it is the squares whose centers lie in it, between the four centers around its axis. What it collects is
 divided by the projected solid angle of those same squares above the horizon, so that f is an average over them.
 """
 
@@ -162,7 +162,7 @@ class Rough(Specimen):
         return total / solid[:, None]
 
     def _places(self, wo: Floats, wi: Floats) -> tuple[list[NDArray[np.int64]], list[Floats]]:
-        """The four squares whose centres are around wo, and their weights."""
+        """The four squares whose centers are around wo, and their weights."""
         flat = np.hypot(wi[:, 0], wi[:, 1])
         pole = flat < 1e-9  # of light from above every azimuth is as good; that of wo needs none
         some = np.where(pole, 1.0, flat)
@@ -201,7 +201,7 @@ def grey(facet: BSDF) -> bool:
 
 
 def centres(side: int) -> Floats:
-    """The direction of each square's centre, (side, 2 side, 3); beyond the disk they lie below the horizon."""
+    """The direction of each square's center, (side, 2 side, 3); beyond the disk they lie below the horizon."""
     y, x = np.meshgrid((np.arange(side) + 0.5) / side, (np.arange(2 * side) + 0.5) / side - 1.0, indexing="ij")
     square = np.minimum(x * x + y * y, 2.0)
     scale = np.sqrt(2.0 - square)

@@ -114,8 +114,10 @@ def derive(model: _OpenPBR) -> Between:
     )
     f_metal = white
     if model.has("base_metalness"):
-        places = FEW_PLACES if filmed else PLACES
-        f_metal = averaged([model.metal(x + zeros_like(rough), eta, medium) for x in places])
+        f_metal = averaged([model.bare_metal(x + zeros_like(rough)) for x in PLACES])
+        if filmed:
+            few = [x + zeros_like(rough) for x in FEW_PLACES]
+            f_metal = f_metal + averaged([model.metal(x, eta, medium) - model.bare_metal(x) for x in few])
     sheet = colors_of_sheet(model, bare, filmed, rough, eta) if model.geometry_thin_walled else None
     glass, other = None, None
     if model.refracts:
@@ -173,10 +175,7 @@ def at_places(
     bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
     if not model.has("thin_film_weight"):
         return bare, (), zeros_like(ratio)
-    filmed = tuple(
-        (model.clear_film(cos, eta, medium) - one) * model.thin_film_weight
-        for cos, one in zip(cosines, bare, strict=True)
-    )
+    filmed = tuple(model.clear_film(cos, eta, medium) * model.thin_film_weight for cos in cosines)
     return bare, filmed, mean(averaged(list(filmed)))
 
 

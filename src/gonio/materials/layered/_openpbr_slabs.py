@@ -240,27 +240,36 @@ class _OpenPBR(BSDF):
 
     # ------------------------------------------------------------------ reflectances
 
-    def film_reflectance(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
-        """R of the film over a base of index eta + i k, both relative to the medium, at a cosine outside."""
+    def film_change(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
+        """Change of R by the film over a base of index eta + i k, both relative to the medium, at a cosine outside.
+
+        It is R with the film minus R with a film of thickness 0 by the same formula. The base without the film has its
+        own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to Fresnel's
+        equations: with this difference, a film of thickness 0, or of the medium's index, changes nothing.
+        """
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
         thickness = 1000.0 * self.thin_film_thickness
-        one = film.Film(eta, k, self.thin_film_ior / medium, thickness, "belcour-barla", self.wavelengths)
-        return film.reflectance(inner, one)
+        index = self.thin_film_ior / medium
+        filmed, bare = (
+            film.reflectance(inner, film.Film(eta, k, index, one, "belcour-barla", self.wavelengths))
+            for one in (thickness, 0.0 * thickness)
+        )
+        return filmed - bare
 
     @function
     def clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """R of the film over the dielectric."""
+        """What the film adds to R of the dielectric."""
         white = ops.ones_like(self.base_color)
         # the same value for all channels, so that compilers evaluate it once
         alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))
-        return self.film_reflectance(cos, alike, None, medium)
+        return self.film_change(cos, alike, None, medium)
 
     def glossy(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
         """F of the dielectric from outside, without its tint."""
         bare = ops.ones_like(self.base_color) * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
         if not self.has("thin_film_weight"):
             return bare
-        return mix(bare, self.clear_film(cos, eta, medium), self.thin_film_weight)
+        return clamp(bare + self.clear_film(cos, eta, medium) * self.thin_film_weight, 0.0, 1.0)
 
     @function
     def bare_metal(self, cos: Scalar) -> Spectrum:
@@ -279,8 +288,8 @@ class _OpenPBR(BSDF):
         least, root = (1.0 - r) / (1.0 + r), sqrt(r)
         n = self.specular_color * least + (1.0 - self.specular_color) * ((1.0 + root) / (1.0 - root))
         k = safe_sqrt((r * sqr(n + 1.0) - sqr(n - 1.0)) / (1.0 - r))
-        filmed = self.film_reflectance(cos, n, k, medium) * minimum(self.specular_weight, 1.0)
-        return mix(bare, filmed, self.thin_film_weight)
+        added = self.film_change(cos, n, k, medium) * minimum(self.specular_weight, 1.0)
+        return clamp(bare + added * self.thin_film_weight, 0.0, 1.0)
 
     def sheet(self, cos: Scalar, f: Spectrum, eta: Scalar) -> tuple[Spectrum, Spectrum]:
         """Light that a thin sheet with face reflectance f reflects and transmits, all bounces included."""

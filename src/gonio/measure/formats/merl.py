@@ -53,10 +53,16 @@ class Merl(Format):
         values[~table.valid] = -1.0
         return struct.pack("<3i", *table.values.shape[:3]) + np.moveaxis(values, -1, 0).astype("<f8").tobytes()
 
-    def resampled(self, source: Measurement) -> Measurement:
-        """The table itself if it has MERL's cells; else the values at the center of each cell."""
+    def resampled(self, source: Measurement, phi: int | None = None) -> Measurement:
+        """The table itself if it has MERL's cells; else the values at the center of each cell.
+
+        phi  cells of phi_d: 180 over half a turn, or 360 over a complete one, which preserves nonreciprocal values;
+             None: as many as the table has, else 180
+        """
         if isinstance(source, HalfDifference) and source.values.shape[:3] in ((*CELLS, 180), (*CELLS, 360)):
-            halves = source.values.shape[2] == 180
-            if halves == (source.turn < 4.0):
+            cells = source.values.shape[2]
+            if (cells == 180) == (source.turn < 4.0) and phi in (None, cells):
                 return source
-        return sampled(source.rgb, (*CELLS, 180), title=source.title, source=source.source)
+        cells = 180 if phi is None else phi
+        turn = np.pi if cells == 180 else 2.0 * np.pi
+        return sampled(source.rgb, (*CELLS, cells), turn, title=source.title, source=source.source)

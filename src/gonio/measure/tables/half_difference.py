@@ -17,6 +17,8 @@ from ..warp import named
 from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
+GRAZING = 0.03  # cosine of light under which a value f cos theta_i tells nothing of f: 1.7 degrees from the horizon
+
 
 class HalfDifference(Guided, Measurement):
     """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
@@ -180,15 +182,21 @@ def sampled(
 ) -> HalfDifference:
     """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at the centers of the cells.
 
-    A cell whose center lies below the surface is invalid: -1. Half a turn of phi_d holds one value for a pair and its
-    exchange: the mean of both.
+    A cell whose center lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
+    exchange, whose values are f cos theta_i and f cos theta_o if the material is reciprocal. Least squares of both give
+
+        f = (v cos theta_i + v' cos theta_o) / (cos^2 theta_i + cos^2 theta_o).
+
+    The mean of the quotients would divide the error of a value at grazing light by a cosine close to 0.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
     values = np.full((len(wo), 3), -1.0)
     lit = lowest > 1e-9
-    sampled_values = value(wo[lit], wi[lit]) / wi[lit, 2:]
-    if turn < 4.0:
-        sampled_values = 0.5 * (sampled_values + value(wi[lit], wo[lit]) / wo[lit, 2:])
-    values[lit] = np.maximum(sampled_values, 0.0)
+    cosine_o, cosine_i = wo[lit, 2:], wi[lit, 2:]
+    forward = value(wo[lit], wi[lit])
+    f = (forward * cosine_i + value(wi[lit], wo[lit]) * cosine_o) / (cosine_i**2 + cosine_o**2)
+    if turn > 4.0:  # a cell of its own for each, but the quotient is unreliable at grazing light
+        f = np.where(cosine_i > GRAZING, forward / cosine_i, f)
+    values[lit] = np.maximum(f, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

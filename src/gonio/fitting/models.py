@@ -1,0 +1,139 @@
+"""What is fitted: a model by name or a sum of such, and which of its parameters move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..catalog import notation
+from ..errors import InputError
+from ..material import BSDF, tree
+from ..materials.combined.sum import Sum
+from ..measure.tables.base import Floats
+from .certainty import groups_of, null_space
+from .data import Data
+from .parameters import Free, free_of, start_of
+from .solver import Problem, normal_equations
+from .starts import random_starts
+
+SHORT = {
+    "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
+    "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
+}
+FIXED = {"ggx": ("k",), "beckmann": ("k",)}
+AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
+GENERIC = 512  # directions at which parameters are compared
+
+
+class Model(NamedTuple):
+    """What is fitted: a material, the paths that stay as they are, and others' least values."""
+
+    material: BSDF
+    fixed: tuple[str, ...] = ()
+    least: Mapping[str, float] = {}
+
+
+def modelled(text: str, lobes: int = 1) -> Model:
+    """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
+
+    lobes  how many of the last one are added up. "ggx" and "beckmann" are a microfacet lobe of that distribution with
+    Schlick's Fresnel term of an index without absorption, so that color is all in eta.
+    """
+    if lobes < 1:
+        raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
+    parts = [part.strip() for part in text.split("+")]
+    if not all(parts):
+        raise InputError(f"'{text}' is no sum of materials", "model", 'such as "lambert+ggx"')
+    parts += parts[-1:] * (lobes - 1)
+    made: list[Model] = []
+    for part in parts:
+        head, bracket, rest = part.partition("(")
+        spelled = SHORT.get(head, head)
+        if bracket:
+            own = spelled.partition("(")[2].rstrip(")")
+            spelled = f"{spelled.partition('(')[0]}({','.join(filter(None, [own, rest.removesuffix(')')]))})"
+        material = notation.named(spelled)[0]
+        given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
+        made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
+    whole = made[0]
+    for other in made[1:]:
+        fixed = (*(f"a.{path}" for path in whole.fixed), *(f"b.{path}" for path in other.fixed))
+        least = {f"a.{p}": v for p, v in whole.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
+        whole = Model(Sum(whole.material, other.material), fixed, least)
+    return whole
+
+
+def moving_of(
+    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
+) -> tuple[BSDF, list[Free]]:
+    """A model with the values that `fixed` holds, and its parameters that move; as `fit` takes them."""
+    return moving_with_notes(model, lobes, fixed, free)[:2]
+
+
+def moving_with_notes(
+    model: str | BSDF, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
+) -> tuple[BSDF, list[Free], list[str]]:
+    """The same, and what a reader must know of it."""
+    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
+    given = dict(fixed or {})
+    if given:
+        texts = {path: value for path, value in given.items() if isinstance(value, str)}
+        others = {path: value for path, value in given.items() if path not in texts}
+        material = tree.replace(notation.changed(material, texts), others)
+    moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
+    moving = [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
+    return without_duplicates(material, moving, tuple(free))
+
+
+def without_duplicates(
+    material: BSDF, moving: list[Free], wanted: Sequence[str] = ()
+) -> tuple[BSDF, list[Free], list[str]]:
+    """(material, parameters that move, notes): of parameters of several parts that do the same, such as two Lambert
+    parts' albedos, one moves, or those that are `wanted`. The others stay at 0 where the first does without them.
+
+    Such are found by the null space of the derivatives at random numbers along random directions, where nothing but
+    the model's own form ties its numbers.
+    """
+    parts = {one.path.rpartition(".")[0] for one in moving}
+    if len(parts) < 2:
+        return material, moving, []
+    owner = [one for one in moving for _ in range(one.count)]
+    numbers = random_starts(start_of(material, moving), moving)[0]
+    notes: list[str] = []
+    for group in groups_of(null_space(_generic(material, moving, numbers))):
+        same = list(dict.fromkeys(owner[k].path for k in group))
+        kept = next((path for path in same if path in wanted), same[0])
+        for path in same:
+            one = next((one for one in moving if one.path == path), None)
+            if path == kept or path in wanted or one is None or path.rpartition(".")[0] == kept.rpartition(".")[0]:
+                continue
+            zero = (0.0, 0.0, 0.0) if one.count > 1 else 0.0
+            without = tree.replace(material, {path: zero}) if one.low == 0.0 and one.kind != "alpha" else None
+            rest = [other for other in moving if other.path != path]
+            if without is not None and _moves(without, rest, kept):
+                material = without
+                notes.append(f"{path} is held at 0: {kept} does the same")
+            else:
+                notes.append(f"{path} is held as it is: {kept} does the same")
+            moving = rest
+    return material, moving, notes
+
+
+def _moves(material: BSDF, moving: list[Free], path: str) -> bool:
+    """Whether a parameter still does something."""
+    numbers = random_starts(start_of(material, moving), moving)[0]
+    diagonal = np.diag(_generic(material, moving, numbers))
+    own = [one.path == path for one in moving for _ in range(one.count)]
+    return bool(np.all(diagonal[own] > 0.0))
+
+
+def _generic(material: BSDF, moving: list[Free], numbers: Floats) -> Floats:
+    """J^T J of a material's values along directions of all kinds."""
+    w = np.random.default_rng(7).normal(size=(2, GENERIC, 3))
+    w[..., 2] = np.abs(w[..., 2]) + 0.1
+    w /= np.linalg.norm(w, axis=-1, keepdims=True)
+    data = Data(w[0], w[1], np.ones((GENERIC, 3)), np.zeros(GENERIC, np.int64))
+    return normal_equations(Problem(material, moving, data, "linear"), numbers)[2]

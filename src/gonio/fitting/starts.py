@@ -1,0 +1,54 @@
+"""Where fits begin."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ..material import BSDF
+from ..measure.tables.base import Floats
+from .parameters import Free, ranges, start_of
+
+WIDTHS = (0.03, 0.1, 0.3, 0.7)  # of lobes, tried as starts
+INDICES = (0.5, 2.0)  # of colors without an upper end, such as indices, whose default may be a place without a slope
+STARTS = 24  # tried at most
+RANDOM = 6  # more, drawn at random
+OPEN = 4.0  # how far numbers without an upper end are drawn
+
+
+def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
+    """Where to begin: as the material is, and at other widths of its lobes, each lobe its own, and other indices."""
+    first = start_of(material, free)
+    found = [first]
+    open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
+    firsts = [first, *(np.where(open_ended, value, first) for value in INDICES if open_ended.any())]
+    places = np.cumsum([0, *(one.count for one in free)])
+    lobes = [int(at) for at, one in zip(places, free, strict=False) if one.kind == "alpha" or _exponent(one)]
+    for widths in itertools.combinations_with_replacement(WIDTHS, len(lobes)):
+        for begin in firsts:
+            other = begin.copy()
+            for at, width in zip(lobes, widths, strict=True):
+                one = free[int(np.searchsorted(places, at, side="right")) - 1]
+                value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
+                other[at] = np.clip(value, one.low, one.high)
+            found.append(other)
+    return found[:STARTS] + random_starts(first, free)
+
+
+def random_starts(first: Floats, free: list[Free]) -> list[Floats]:
+    """Where to begin beside: anywhere in the ranges of the numbers, those that are open as far as `OPEN`."""
+    low, high, ratio = ranges(free)
+    high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
+    low = np.where(low < -1e5, -high, low)
+    rng = np.random.default_rng(23)
+    found = []
+    for _ in range(RANDOM):
+        share = rng.random(len(first))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
+    return found
+
+
+def _exponent(one: Free) -> bool:
+    return one.kind == "float" and one.ratio and one.high >= 1e3
