@@ -85,9 +85,9 @@ def examine() -> Report:
             findings.append(Finding("missing", "render on cuda", f"no CUDA device answers; {hint}"))
         else:
             findings.append(Finding("bad", f"render on {device}", problem))
-    found = denoise.available()
-    if found:
-        findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {found}"))
+    pyoidn_version = denoise.available()
+    if pyoidn_version:
+        findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {pyoidn_version}"))
     else:
         findings.append(Finding("missing", "denoiser", f"for --denoise: {denoise.INSTALL}"))
     return Report(tuple(findings), devices)
@@ -102,21 +102,21 @@ def _package(name: str, subject: str, install: str) -> Finding:
 
 def _libraries() -> list[Finding]:
     """Every LLVM in reach, the one that will be used first, and why the others are not."""
-    found = []
+    findings = []
     chosen = False
     for library in llvm.libraries():
         subject = f"LLVM {library.version or '?'}"
         place = f"{library.path} ({library.source})"
         if not library.usable:
             why = f"older than {llvm.OLDEST_USABLE}, it would abort the process" if library.version else "no libLLVM"
-            found.append(Finding("missing", subject, f"{place}: {why}; not used"))
+            findings.append(Finding("missing", subject, f"{place}: {why}; not used"))
         else:
-            found.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
+            findings.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
             chosen = True
-    if not any(finding.state == "ok" for finding in found):
+    if not any(finding.state == "ok" for finding in findings):
         hint = f"pip install karellen-llvm-core (Linux x86-64), or any LLVM >= {llvm.OLDEST_USABLE} of the system"
-        found.append(Finding("bad", "LLVM", f"none that can be used; {hint}"))
-    return found
+        findings.append(Finding("bad", "LLVM", f"none that can be used; {hint}"))
+    return findings
 
 
 def _try(device: str) -> tuple[str, str]:

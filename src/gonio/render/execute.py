@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..scene import mitsuba_scene
 from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Progress, run
-from ..work import crew
+from ..work import executor
 from . import checkpoints
 from .checkpoints import Keeper
 from .prepare import Prepared
@@ -55,10 +55,10 @@ def execute(
     if isinstance(prepared.render, until.Until):
         drawing = prepared.render
         goal = lambda: drawing.goal  # noqa: E731
-        if crew.current().remote:
+        if executor.current().remote:
             what = "workers render parts of a picture, and its error is that of the whole"
             raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif crew.current().remote and prepared.render.done < prepared.spp:
+    elif executor.current().remote and prepared.render.done < prepared.spp:
         tiles.travelling(prepared)  # what cannot travel is said before anything is written
         assert isinstance(prepared.render, integrators.Render)
         gathered = tiles.Gathered(prepared.render, prepared.spp)
@@ -90,13 +90,13 @@ def execute(
     return stopped, keeper
 
 
-def by_crew(
+def execute_all(
     prepared: Sequence[Prepared],
     *,
     interrupted: Callable[[], object] = lambda: False,
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
-    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
+    """Run several renders at once by the current executor; `finished` is called with the index of each that is done."""
     from ..transport import integrators
     from . import tiles
 

@@ -37,11 +37,11 @@ class Sources:
 
     def identity(self) -> dict[str, str]:
         """A hash or a name of each thing that the picture depends on, by what a person calls it."""
-        found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
-        found |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
+        identity = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
+        identity |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
-            found[f"file {name}"] = facts.file_hash(path)
-        return found
+            identity[f"file {name}"] = facts.file_hash(path)
+        return identity
 
 
 def _hash(content: bytes) -> str:
@@ -54,9 +54,9 @@ def _device(mi: ModuleType) -> str:
     return f"{variant}, {facts.processor() if variant.startswith('llvm') else engine.cuda_device()}"
 
 
-def check(found: Facts, identity: Mapping[str, str], where: str) -> None:
+def check(saved: Facts, identity: Mapping[str, str], where: str) -> None:
     """Raise InputError that names the first thing that is not as it was."""
-    before = found.get("identity")
+    before = saved.get("identity")
     before = before if isinstance(before, dict) else {}
     for name in [*identity, *before]:
         old, new = before.get(name), identity.get(name)

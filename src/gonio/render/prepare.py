@@ -51,7 +51,7 @@ def prepare(request: Request, writes: bool = False) -> Prepared:
     if request.material is None and not os.path.exists(request.scene):
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, request.spectral, request.threads)
-    with garbage.kept():
+    with garbage.paused():
         if request.is_mitsuba:
             prepared = _prepare_mitsuba(request, mi)
         else:
@@ -104,7 +104,7 @@ def _prepare_lab(request: Request, mi: ModuleType, names_output: bool) -> Prepar
             raise InputError(what, option, "leave the polarizer out")
         mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    built = scene.built(description, mi, gathers=not request.gradient)
+    built = scene.built(description, mi, merge_materials=not request.gradient)
     render: Renders
     if request.gradient:
         from ..scene.derivatives import along
@@ -189,17 +189,17 @@ def _own(settings: Settings) -> dict[str, images.Value]:
     """What a picture says about one of our own integrators."""
     from ..transport import sampler
 
-    found: dict[str, images.Value] = {
+    metadata: dict[str, images.Value] = {
         "integrator": settings.integrator,
         "sampler": " and ".join(sampler.DEFAULT) if settings.sampler == "default" else settings.sampler,
         "seed": settings.seed,
     }
-    return found | ({"max_depth": settings.max_depth} if settings.program.takes_depth else {})
+    return metadata | ({"max_depth": settings.max_depth} if settings.program.takes_depth else {})
 
 
 def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str, images.Value]:
     """What a picture says about how it was made."""
-    found: dict[str, images.Value] = {
+    metadata: dict[str, images.Value] = {
         "scene": str(request.scene),
         **how,
         "variant": str(mi.variant()),
@@ -207,10 +207,10 @@ def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     if request.until_error is not None:
-        found["until_error"] = request.until_error
+        metadata["until_error"] = request.until_error
     if request.denoise:
-        found["denoised"] = f"OIDN, pyoidn {denoise.available()}"
-    return found
+        metadata["denoised"] = f"OIDN, pyoidn {denoise.available()}"
+    return metadata
 
 
 def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:

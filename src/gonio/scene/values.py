@@ -68,7 +68,7 @@ def _not_a_flag(value: object) -> object:
     return value
 
 
-def _whole(value: object) -> object:
+def _integer(value: object) -> object:
     # JSON does not tell 8 from 8.0
     return int(value) if isinstance(value, float) and value.is_integer() else _not_a_flag(value)
 
@@ -80,7 +80,7 @@ def _bounded(value: float) -> float:
 
 
 Number = Annotated[float, Strict(), BeforeValidator(_not_a_flag), AfterValidator(_bounded)]
-Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
+Whole = Annotated[int, Strict(), BeforeValidator(_integer)]
 Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 

@@ -77,7 +77,7 @@ class MitsubaRender:
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
-        with garbage.kept():
+        with garbage.paused():
             tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
             return np.array(tensor, dtype=np.float32)
 

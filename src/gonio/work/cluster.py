@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GonioError, GonioWarning, InputError, MachineError
-from . import crew, garbage, reachable
+from . import executor, garbage, reachable
 from .kept import Arrays
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ class Cluster:
             text = " ".join(str(error).split())[:200]
             what = f"no scheduler answers: {text}"
             raise MachineError(what, str(self._address or "--workers"), "see docs/cluster.md") from error
-        self._stack.enter_context(crew.working(self))
+        self._stack.enter_context(executor.using(self))
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -206,9 +206,9 @@ class Cluster:
     # ------------------------------------------------------------------ the work
 
     def run(
-        self, function: crew.Function, arguments: Sequence[tuple[crew.Argument, ...]], files: Mapping[str, Path]
+        self, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """As `Crew.run`; (-1, {}) where nothing was done for a while."""
+        """As `Executor.run`; (-1, {}) where nothing was done for a while."""
         if not arguments:
             return
         for _ in self._check():
@@ -272,7 +272,7 @@ class _Job:
     """The parts of one call of `run`: which are out, to whom, since when."""
 
     def __init__(
-        self, cluster: Cluster, function: crew.Function, arguments: Sequence[tuple[crew.Argument, ...]]
+        self, cluster: Cluster, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]]
     ) -> None:
         assert cluster._client is not None
         self.cluster, self.client, self.function, self.arguments = cluster, cluster._client, function, arguments

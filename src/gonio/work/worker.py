@@ -20,13 +20,15 @@ from distributed import Worker, WorkerPlugin, get_worker
 from distributed.security import Security
 
 from ..errors import MachineError
-from . import crew, facts
+from . import executor, facts
 from .kept import Arrays
 
 _one = threading.Lock()  # Dr.Jit has one owner, also where a worker was given several threads
 
 
-def do(function: crew.Function, arguments: tuple[crew.Argument, ...], wanted: dict[str, str]) -> tuple[float, Arrays]:
+def do(
+    function: executor.Function, arguments: tuple[executor.Argument, ...], wanted: dict[str, str]
+) -> tuple[float, Arrays]:
     """One part, and the seconds that it took."""
     with _one:
         gc.disable()  # see `cluster.Cluster`: garbage is collected below, in this thread
@@ -35,8 +37,8 @@ def do(function: crew.Function, arguments: tuple[crew.Argument, ...], wanted: di
         with contextlib.suppress(ValueError):
             worker = get_worker()
             name = str(worker.address)
-            found = {p.content_hash: p.path for p in worker.plugins.values() if isinstance(p, File)}
-            crew._files.set(found)
+            paths = {p.content_hash: p.path for p in worker.plugins.values() if isinstance(p, File)}
+            executor._files.set(paths)
         compare(wanted, about(), name)
         try:
             return time.perf_counter() - started, function(*arguments)
