@@ -30,7 +30,7 @@ from gonio.render.request import Request
 from gonio.work import cluster, executor
 from gonio.work.cluster import Cluster
 
-PACE = cluster.PACE
+START_INTERVAL = cluster.START_INTERVAL
 SCENE = Path(__file__).parent.parent / "examples/phong"
 
 
@@ -62,7 +62,7 @@ def main() -> None:
     )
     options = parser.parse_args()
     rates, bands = [], []
-    cluster.PACE = 0.0  # all at once: the model is of workers that have joined
+    cluster.START_INTERVAL = 0.0  # all at once: the model is of workers that have joined
     print("workers  parts/s  MB/s   s/part: measured efficiency (model)")
     for workers in map(int, options.workers.split(",")):
         with Cluster(workers=workers) as one:
@@ -77,7 +77,7 @@ def main() -> None:
                 model = predicted(count, seconds, workers, rates[-1], 0.0, 1024, bands[-1])
                 row.append(f"{seconds:g}: {measured:.0%} ({model:.0%})")
             print(f"{workers:7}  {rates[-1]:7.0f}  {bands[-1] / 1e6:4.0f}   {',  '.join(row)}", flush=True)
-    cluster.PACE = PACE
+    cluster.START_INTERVAL = START_INTERVAL
     rate, band = statistics.median(rates), statistics.median(bands)
     prepared = prepare(Request(SCENE, spp=1))
     spec, _ = tiles.travelling(prepared)

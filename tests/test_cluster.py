@@ -88,7 +88,7 @@ def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
 def test_a_picture_has_the_same_bits(
     two: Cluster, scene: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, object]
 ) -> None:
-    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)  # six parts of 64 lanes
+    monkeypatch.setattr(tiles, "MAX_SAMPLES", 1)  # six parts of 64 lanes
     alone = go.render(scene, spp=5, **options)  # type: ignore[arg-type]
     with executor.using(two):
         assert np.array_equal(go.render(scene, spp=5, **options), alone)  # type: ignore[arg-type]
@@ -147,7 +147,7 @@ def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
 def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
     two: Cluster, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)
+    monkeypatch.setattr(tiles, "MAX_SAMPLES", 1)
     alone = go.render(scene, spp=6)
     for other in (two, executor.LocalExecutor()):
         path, seen = tmp_path / type(other).__name__, list[int]()
@@ -217,7 +217,7 @@ def test_a_cluster_that_cannot_be_is_one_clear_error(
 ) -> None:
     from gonio.work import cluster
 
-    monkeypatch.setattr(cluster, "ANSWER", 0.5)
+    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.5)
     with pytest.raises(go.GonioError, match=what), Cluster(**given):  # type: ignore[arg-type]
         pass
 

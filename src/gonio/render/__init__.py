@@ -34,8 +34,8 @@ def render(
         picture = go.render("gold.json")        # the result of a fit, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
-    scene          a scene's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; where an
-                   option below is None, the scene's own value holds
+    scene          a scene's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; an
+                   option below that is None takes the scene's value
     output         file to write: .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
@@ -50,17 +50,18 @@ def render(
     denoise        run Open Image Denoise over the result
     exposure       brightness of a .png in stops; "auto" chooses it by the picture's luminance
     allow_outside  allow the scene to read files outside its folder
-    allow_code     allow the scene to run materials in Python files, "ward.py:Ward", and native plugins of Mitsuba in its
+    allow_code     allow the scene to run materials in Python files, "ward.py:Ward", and native Mitsuba plugins in its
                    folder `plugins`
     overrides      values by their paths in the scene, as in `gonio study`; a value may be a material
     checkpoint     file for the sums so far, written every few seconds; if it exists, the render continues from it, with
                    bit-identical results. None writes it beside the output if the render takes more than a minute
     until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
                    pixel (65,536 if None); warns if they did not suffice
-    gradient       paths of numbers and colors of materials; the result is then (1 + paths, height, width, 3): the picture
-                   and its derivative along each path. The path of a color means all three channels together,
+    gradient       paths of numbers and colors of materials; the result is then (1 + paths, height, width, 3): the
+                   picture and its derivative along each path. The path of a color means all three channels together,
                    "....albedo.r" a single one. Equal materials are one material and change together
-    Warns (GonioWarning) of suspicious scenes, of a .png that clips, and when it continues from a checkpoint. Raises InputError, MachineError.
+    Warns (GonioWarning) of suspicious scenes, of a .png that clips, and when it continues from a checkpoint.
+    Raises InputError, MachineError.
     """
     from ..catalog import notation, operands
     from ..material import BSDF
@@ -98,8 +99,8 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None writes the output of the original request, if it named one: as it is if it lies in the
-                checkpoint's folder, else under its name beside the checkpoint, with a warning
+    output      file to write; None writes the output of the original request, if it named one: at its place if that
+                lies in the checkpoint's folder, else under its name beside the checkpoint, with a warning
     spp         samples per pixel in all; None uses those of the original request
     allow_code  allow the scene to run the Python files that it names
     Raises InputError if the checkpoint is damaged or if anything that the picture depends on has changed.

@@ -35,10 +35,10 @@ from .request import Request
 from .request_json import described, request_of
 
 ALIGNED = 64  # lanes: a multiple of any processor's vector width and of the camera's tiles of rays
-MOST_SAMPLES = 1 << 25  # per part: some seconds on one machine
-LEAST_SAMPLES = 1 << 21  # per part: with fewer, sending it costs too much
-HANDED_OUT = 1 << 17  # samples that a worker traces while one part is submitted
-LONGEST_PASS = 2.0  # seconds: a worker need not react to Ctrl-C, and each pass costs 15 ms of Python
+MAX_SAMPLES = 1 << 25  # per part: some seconds on one machine
+MIN_SAMPLES = 1 << 21  # per part: with fewer, sending it costs too much
+SAMPLES_PER_SUBMISSION = 1 << 17  # samples that a worker traces while one part is submitted
+MAX_PASS = 2.0  # seconds: a worker need not react to Ctrl-C, and each pass costs 15 ms of Python
 PARTS = 20  # per worker at least, so that no worker idles long at the end
 
 
@@ -152,7 +152,7 @@ def advance(
 def part_size(total: int, workers: int) -> int:
     """Samples per part for `total` samples in all: few enough to occupy all workers, many enough that submitting parts,
     at about 10 ms each, keeps pace with the workers (`benchmarks/cluster.py`)."""
-    return min(max(total // (PARTS * workers), LEAST_SAMPLES, workers * HANDED_OUT), MOST_SAMPLES)
+    return min(max(total // (PARTS * workers), MIN_SAMPLES, workers * SAMPLES_PER_SUBMISSION), MAX_SAMPLES)
 
 
 def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
@@ -214,7 +214,7 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
         def remember(progress: Progress) -> None:
             _rates[spec] = progress.rate
 
-        passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * LONGEST_PASS / lanes), report=remember)
+        passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * MAX_PASS / lanes), report=remember)
         return {name: np.array(values) for name, values in render.state().items()}
 
 

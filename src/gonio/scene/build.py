@@ -28,7 +28,7 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-MANY = 64  # from so many materials of one structure on one stands for them
+MERGE_FROM = 64  # from so many materials of one structure on one stands for them
 
 # Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
 # format's +y, +z, +x: u about y from z toward x, v from +y.
@@ -234,7 +234,7 @@ class _Builder:
         for index, shape in enumerate(self.description.shapes):
             if shape.material is not None and isinstance(shape, (schema.Sphere, schema.Parallelogram)):
                 places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
-        if len(places) < MANY:
+        if len(places) < MERGE_FROM:
             return
         from ..transport.fast import by_shape
 
@@ -247,7 +247,7 @@ class _Builder:
                 group.rows.append(dict(by_shape.properties(plugin)))
                 members.append(material)
         for group, members in groups.values():
-            if len(members) < MANY:
+            if len(members) < MERGE_FROM:
                 continue
             try:
                 bsdf = self.load(group.plugin(self.mi), places[members[0]])

@@ -19,7 +19,7 @@ from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
 
-SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
+MAX_SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
 
 
 def read(
@@ -176,9 +176,9 @@ def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
         problems.setdefault(where, (what, hint))
     (where, (what, hint)), *others = problems.items()
     lines = [what]
-    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: SHOWN - 1]]
-    if len(others) >= SHOWN:
-        lines.append(f"and {len(others) - SHOWN + 1} more")
+    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: MAX_SHOWN - 1]]
+    if len(others) >= MAX_SHOWN:
+        lines.append(f"and {len(others) - MAX_SHOWN + 1} more")
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 

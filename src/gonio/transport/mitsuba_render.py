@@ -53,7 +53,7 @@ class MitsubaRender:
         weighted = picture.astype(np.float64) * samples
         if self._sum is not None and self._sum.shape != weighted.shape:
             what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
-            raise InputError(what, "checkpoint", "render anew without it")
+            raise InputError(what, "checkpoint", "render again without it")
         self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += samples
