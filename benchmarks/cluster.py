@@ -1,4 +1,4 @@
-"""What a crew costs: parts a second and bytes a part, a model made of them, and the model against processes here.
+"""The cost of a cluster: parts per second, bytes per part, and a model of them compared with processes of this machine.
 
     python benchmarks/cluster.py [--workers 2,4,8] [--render]
 
@@ -27,10 +27,10 @@ import numpy as np
 from gonio.render import tiles
 from gonio.render.prepare import prepare
 from gonio.render.request import Request
-from gonio.work import cluster, crew
+from gonio.work import cluster, executor
 from gonio.work.cluster import Cluster
 
-PACE = cluster.PACE
+START_INTERVAL = cluster.START_INTERVAL
 SCENE = Path(__file__).parent.parent / "examples/phong"
 
 
@@ -43,7 +43,7 @@ def nothing(seconds: float, size: int) -> dict[str, np.ndarray]:
 def timed(count: int, seconds: float, size: int = 1024) -> float:
     """Seconds for so many parts."""
     begun = time.perf_counter()
-    for _ in crew.each(nothing, [(seconds, size)] * count):
+    for _ in executor.each(nothing, [(seconds, size)] * count):
         pass
     return time.perf_counter() - begun
 
@@ -57,10 +57,12 @@ def predicted(parts: int, seconds: float, workers: int, rate: float, begin: floa
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--workers", default="2,4,8")
-    parser.add_argument("--render", action="store_true", help="also time a render of a minute, alone and by crews")
+    parser.add_argument(
+        "--render", action="store_true", help="also time a render of a minute, by one process and by clusters"
+    )
     options = parser.parse_args()
     rates, bands = [], []
-    cluster.PACE = 0.0  # all at once: the model is of workers that have joined
+    cluster.START_INTERVAL = 0.0  # all at once: the model is of workers that have joined
     print("workers  parts/s  MB/s   s/part: measured efficiency (model)")
     for workers in map(int, options.workers.split(",")):
         with Cluster(workers=workers) as one:
@@ -75,7 +77,7 @@ def main() -> None:
                 model = predicted(count, seconds, workers, rates[-1], 0.0, 1024, bands[-1])
                 row.append(f"{seconds:g}: {measured:.0%} ({model:.0%})")
             print(f"{workers:7}  {rates[-1]:7.0f}  {bands[-1] / 1e6:4.0f}   {',  '.join(row)}", flush=True)
-    cluster.PACE = PACE
+    cluster.START_INTERVAL = START_INTERVAL
     rate, band = statistics.median(rates), statistics.median(bands)
     prepared = prepare(Request(SCENE, spp=1))
     spec, _ = tiles.travelling(prepared)
@@ -118,20 +120,21 @@ def beginning() -> float:
     return took[0] - min(took[1:])
 
 
-def against_one(crews: list[int]) -> None:
-    """A render of over a minute by each crew, and before and after each by one process with two threads."""
+def against_one(worker_counts: list[int]) -> None:
+    """A render of over a minute by each cluster, and before and after each by one process with two threads."""
     go.render(SCENE, spp=16)
     spp = 4000
     spp = int(spp * 75 / cost(spp)[0])
     seconds, processor, alone = cost(spp)
     print(f"alone: {seconds:.1f} s, {processor:.1f} s of processor, {spp} spp", flush=True)
-    for workers in crews:
-        by_crew, by_crew_processor, together = cost(spp, workers)
+    for workers in worker_counts:
+        by_cluster, by_cluster_processor, together = cost(spp, workers)
         after, after_processor, _ = cost(spp)
-        ratio = 2 * by_crew / (seconds + after), 2 * by_crew_processor / (processor + after_processor)
+        ratio = 2 * by_cluster / (seconds + after), 2 * by_cluster_processor / (processor + after_processor)
         same = "same bits" if np.array_equal(alone, together) else "OTHER BITS"
         print(
-            f"{workers} workers: {by_crew:.1f} s, {ratio[0]:.2f} of one ({seconds:.1f} s before, {after:.1f} s after); "
+            f"{workers} workers: {by_cluster:.1f} s, {ratio[0]:.2f} of one "
+            f"({seconds:.1f} s before, {after:.1f} s after); "
             f"{ratio[1]:.2f} of its processor time; {same}",
             flush=True,
         )
@@ -139,7 +142,7 @@ def against_one(crews: list[int]) -> None:
 
 
 def cost(spp: int, workers: int = 0) -> tuple[float, float, np.ndarray]:
-    """Seconds, seconds of the processor, and the picture; the crew's start and end are in it."""
+    """Seconds, seconds of the processor, and the picture; the cluster's start and end are in it."""
     begun, before = time.perf_counter(), sum(os.times()[:4])
     with Cluster(workers=workers) if workers else contextlib.nullcontext():
         picture = go.render(SCENE, spp=spp)

@@ -40,7 +40,7 @@ from scipy import stats
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render.request import UNTIL_MOST  # noqa: E402
+from gonio.render.request import MAX_SPP_UNTIL  # noqa: E402
 from gonio.transport import photon_maps, until  # noqa: E402
 from gonio.transport.integrators import Render, Settings  # noqa: E402
 
@@ -259,7 +259,7 @@ def promises(names: list[str], error: float) -> None:
             render.advance(spp)
             return render.image()
 
-        runs = [until.Until(loaded, settings(seed), error, UNTIL_MOST) for seed in range(RUNS)]
+        runs = [until.Until(loaded, settings(seed), error, MAX_SPP_UNTIL) for seed in range(RUNS)]
         for run in runs:
             stopped = passes.run(run, lambda run=run: run.goal, scene.size[0] * scene.size[1], timeout=LONGEST)
             if stopped:

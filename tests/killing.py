@@ -55,7 +55,7 @@ SCENE = {
 PROGRAM = """
 import sys
 from gonio.render import checkpoints
-checkpoints.EVERY, checkpoints.MOST_COST = .1, 1e9
+checkpoints.INTERVAL, checkpoints.MAX_COST = .1, 1e9
 from gonio import cli
 cli.main(sys.argv[1:])
 """

@@ -1,4 +1,4 @@
-"""A crew of processes gives the bits of one, whoever dies or freezes; what cannot travel is refused."""
+"""Several processes give bit-identical results to one, even if workers fail; what cannot travel is refused."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gonio.render.prepare import prepare
 from gonio.render.request import Request
 from gonio.transport import passes
 from gonio.transport.polarizer import PolarizedRender
-from gonio.work import crew, facts, parts
+from gonio.work import executor, facts, parts
 from gonio.work.cluster import Cluster
 
 if TYPE_CHECKING:
@@ -50,34 +50,34 @@ def refuse(x: float) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """Two workers; each test works with them by `crew.working`."""
+    """Two workers; each test works with them by `executor.using`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("GONIO_CACHE", str(tmp_path_factory.mktemp("cache")))
-        with Cluster(workers=2) as cluster, crew.working(crew.Here()):
+        with Cluster(workers=2) as cluster, executor.using(executor.LocalExecutor()):
             yield cluster
 
 
-def done(function: crew.Function, arguments: list[tuple[object, ...]]) -> dict[int, dict[str, np.ndarray]]:
-    return {index: found for index, found in crew.each(function, arguments) if index >= 0}
+def done(function: executor.Function, arguments: list[tuple[object, ...]]) -> dict[int, dict[str, np.ndarray]]:
+    return {index: found for index, found in executor.each(function, arguments) if index >= 0}
 
 
 def test_parts_are_done_by_all_and_each_is_done(two: Cluster) -> None:
-    with crew.working(two):
+    with executor.using(two):
         found = done(square, [(x, 0.05) for x in range(20)])
     assert [float(found[i]["x"][0]) for i in range(20)] == [x * x for x in range(20)]
     assert len({int(one["pid"][0]) for one in found.values()} - {os.getpid()}) == 2
 
 
 def test_a_part_that_fails_by_its_input_is_tried_once(two: Cluster) -> None:
-    with crew.working(two), pytest.raises(InputError, match="3 given") as caught:
+    with executor.using(two), pytest.raises(InputError, match="3 given") as caught:
         done(refuse, [(3,)])
     assert caught.value.hint == "give another"
 
 
 def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
-    with crew.working(two):
+    with executor.using(two):
         count = 0
-        for index, _ in crew.each(square, [(x, 0.3) for x in range(10)]):
+        for index, _ in executor.each(square, [(x, 0.3) for x in range(10)]):
             count += index >= 0
             if count == 2:
                 two._processes[0].kill()
@@ -88,9 +88,9 @@ def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
 def test_a_picture_has_the_same_bits(
     two: Cluster, scene: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, object]
 ) -> None:
-    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)  # six parts of 64 lanes
+    monkeypatch.setattr(tiles, "MAX_SAMPLES", 1)  # six parts of 64 lanes
     alone = go.render(scene, spp=5, **options)  # type: ignore[arg-type]
-    with crew.working(two):
+    with executor.using(two):
         assert np.array_equal(go.render(scene, spp=5, **options), alone)  # type: ignore[arg-type]
 
 
@@ -100,7 +100,7 @@ def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_pa
     table = go.bake("ggx", resolution=12, seed=1)
     parts.Parts("none").clear()
     os.environ["GONIO_CACHE"] += "-anew"
-    with crew.working(two):
+    with executor.using(two):
         together = go.study(scene, vary, spp=3)
         other = go.bake("ggx", resolution=12, seed=1)
     assert together._repr_png_() == alone._repr_png_()
@@ -122,7 +122,7 @@ def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
         return json.loads(re.sub(r'"seconds": [\d.e-]+', '"seconds": 0', text))
 
     alone = child.trial(task)
-    with crew.working(two):
+    with executor.using(two):
         assert plain(trials.trial(task)) == plain(alone)
     # one after the other, stopped after the second: the next run judges the third only
     monkeypatch.setenv("GONIO_CACHE", str(tmp_path))
@@ -147,25 +147,25 @@ def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
 def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
     two: Cluster, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)
+    monkeypatch.setattr(tiles, "MAX_SAMPLES", 1)
     alone = go.render(scene, spp=6)
-    for other in (two, crew.Here()):
+    for other in (two, executor.LocalExecutor()):
         path, seen = tmp_path / type(other).__name__, list[int]()
         prepared = prepare(Request(scene, checkpoint=path, spp=6))
-        with crew.working(two):
+        with executor.using(two):
             stopped, _ = execute(
                 prepared, report=lambda p, seen=seen: seen.append(p.done), interrupted=lambda seen=seen: seen
             )
         assert stopped == "interrupt" and path.is_file()
         lanes = checkpoints.load(path).arrays["lanes"]
         assert 0 < np.count_nonzero(lanes) < len(lanes)
-        with crew.working(other), pytest.warns(GonioWarning, match="% of the pixels are done"):
+        with executor.using(other), pytest.warns(GonioWarning, match="% of the pixels are done"):
             assert np.array_equal(go.resume(path), alone)
 
 
 def test_a_picture_goes_on_to_more_samples_by_a_crew(two: Cluster, scene: Path, tmp_path: Path) -> None:
     go.render(scene, spp=3, checkpoint=tmp_path / "c")
-    with crew.working(two), pytest.warns(GonioWarning, match="3 of 7"):
+    with executor.using(two), pytest.warns(GonioWarning, match="3 of 7"):
         assert np.array_equal(go.resume(tmp_path / "c", spp=7), go.render(scene, spp=7))
 
 
@@ -174,7 +174,7 @@ def test_files_travel_and_so_does_code_that_the_user_named(two: Cluster, scene: 
     (tmp_path / "flat.py").write_text(source)
     material = notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]
     alone = go.render(material, spp=2, size=(24, 16))
-    with crew.working(two):
+    with executor.using(two):
         assert np.array_equal(go.render(material, spp=2, size=(24, 16)), alone)
 
 
@@ -182,7 +182,7 @@ def test_what_cannot_travel_is_refused(two: Cluster, tmp_path: Path) -> None:
     from test_run import XML
 
     (tmp_path / "ball.xml").write_text(XML)
-    with crew.working(two), pytest.raises(InputError, match="one machine") as caught:
+    with executor.using(two), pytest.raises(InputError, match="one machine") as caught:
         go.render(tmp_path / "ball.xml", spp=2)
     assert "--integrator path" in caught.value.hint
     polarized = SimpleNamespace(render=object.__new__(PolarizedRender), request=None)
@@ -195,7 +195,11 @@ sys.path.insert(0, str(Path(__file__).parent / "render"))
 
 
 def test_another_version_is_refused_by_name(two: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as other, crew.working(two), pytest.raises(MachineError, match=r"worker .* gonio 9\.9"):
+    with (
+        monkeypatch.context() as other,
+        executor.using(two),
+        pytest.raises(MachineError, match=r"worker .* gonio 9\.9"),
+    ):
         other.setattr(facts, "__version__", "9.9")
         done(square, [(1,)])
 
@@ -213,7 +217,7 @@ def test_a_cluster_that_cannot_be_is_one_clear_error(
 ) -> None:
     from gonio.work import cluster
 
-    monkeypatch.setattr(cluster, "ANSWER", 0.5)
+    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.5)
     with pytest.raises(go.GonioError, match=what), Cluster(**given):  # type: ignore[arg-type]
         pass
 
@@ -289,7 +293,7 @@ def test_pictures_survive_workers_that_die_at_random(scene: Path, seed: int) -> 
 def test_a_frozen_worker_loses_nothing() -> None:
     with Cluster(workers=2) as cluster:
         count, frozen = 0, False
-        for index, _ in crew.each(square, [(x, 0.5) for x in range(12)]):
+        for index, _ in executor.each(square, [(x, 0.5) for x in range(12)]):
             count += index >= 0
             if count == 3 and not frozen:
                 frozen = True

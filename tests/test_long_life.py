@@ -58,13 +58,13 @@ def test_a_notebook_that_is_interrupted_can_go_on(scene: Path, monkeypatch: pyte
 
 
 def test_garbage_is_collected_again_after_an_error_and_not_before() -> None:
-    with pytest.raises(ValueError), garbage.kept(), garbage.kept():
+    with pytest.raises(ValueError), garbage.paused(), garbage.paused():
         assert not gc.isenabled()
         raise ValueError
     assert gc.isenabled()
     gc.disable()
     try:
-        with garbage.kept():
+        with garbage.paused():
             pass
         assert not gc.isenabled()  # somebody else's wish
     finally:

@@ -111,6 +111,7 @@ _MOVED = {
     "verify.reproduction": "verify.forensics.reproduction",
     "verify.watch": "verify.isolation.watch",
     "verify.worker": "verify.isolation.worker",
+    "work.crew": "work.executor",
 }
 
 

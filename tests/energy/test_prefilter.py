@@ -218,7 +218,7 @@ def test_a_bad_map_is_refused_by_its_name(tmp_path, capsys, monkeypatch, name):
         (["sky.exr", "--lut", "E"], "prefiltered"),
         (["sky.exr", "--resolution", "64"], "--resolution 64 does not go with"),
         (["sky.exr", "-o", "no/folder"], "does not exist"),
-        (["screen.png"], "cut off at white"),
+        (["screen.png"], "clipped at white"),
         (["ggx", "--lut", "E", "--levels", "3"], "--levels 3 does not go with"),
     ],
 )

@@ -75,9 +75,9 @@ def test_the_picture_is_that_of_the_single_materials(
 ) -> None:
     rng = np.random.default_rng(3)
     folder = written(tmp_path, [kind(rng) for _ in range(9)])
-    monkeypatch.setattr(build, "MANY", 100)
+    monkeypatch.setattr(build, "MERGE_FROM", 100)
     single = go.render(folder, spp=4)
-    monkeypatch.setattr(build, "MANY", 4)
+    monkeypatch.setattr(build, "MERGE_FROM", 4)
     loaded = build.build(read(folder), mi)
     balls = [shape for shape in loaded.shapes() if shape.class_name() == "Sphere"]
     assert len({shape.bsdf().id() or id(shape.bsdf()) for shape in balls}) < len(balls), "one stands for several"
@@ -90,7 +90,7 @@ def test_a_scene_of_two_structures_keeps_what_is_few(tmp_path: Path, monkeypatch
     rng = np.random.default_rng(4)
     folder = written(tmp_path, [*(paint(rng) for _ in range(6)), *(gold(rng) for _ in range(3)), {"type": "mirror"}])
     single = go.render(folder, spp=4)
-    monkeypatch.setattr(build, "MANY", 5)
+    monkeypatch.setattr(build, "MERGE_FROM", 5)
     assert go.render(folder, spp=4) == pytest.approx(single, rel=2e-4, abs=1e-5)
 
 
@@ -100,14 +100,14 @@ def test_what_light_goes_through_stays_single(tmp_path: Path, monkeypatch: pytes
     glasses[0]["absorption"] = [3.0, 0.0, 0.0]  # so that every medium is known to the path
     folder = written(tmp_path, glasses)
     single = go.render(folder, spp=2)
-    monkeypatch.setattr(build, "MANY", 4)
+    monkeypatch.setattr(build, "MERGE_FROM", 4)
     assert np.array_equal(go.render(folder, spp=2), single)
 
 
 def test_a_wrong_number_is_said_with_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     folder = written(tmp_path, [*(gold(rng) for _ in range(8)), {**gold(rng), "alpha": -0.2}])
-    monkeypatch.setattr(build, "MANY", 4)
+    monkeypatch.setattr(build, "MERGE_FROM", 4)
     with pytest.raises(go.InputError, match=r"shapes/8/material"):
         go.render(folder, spp=1)
 
@@ -115,7 +115,7 @@ def test_a_wrong_number_is_said_with_its_place(tmp_path: Path, monkeypatch: pyte
 def test_derivatives_are_along_one_materials_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(7)
     folder = written(tmp_path, [paint(rng) for _ in range(9)])
-    monkeypatch.setattr(build, "MANY", 4)
+    monkeypatch.setattr(build, "MERGE_FROM", 4)
     _, slope = go.render(folder, spp=4, max_depth=2, gradient=["shapes.4.material.albedo"])
     moved = np.abs(slope).sum(axis=2) > 0
     assert 0 < moved.mean() < 0.1, "of a ball in the middle, lit directly"

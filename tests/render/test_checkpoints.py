@@ -33,8 +33,8 @@ def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Passes of one sample, and a checkpoint after each of them."""
     monkeypatch.setattr(passes, "FIRST_PASS", 1)
     monkeypatch.setattr(passes, "PASS_SECONDS", 1e-9)
-    monkeypatch.setattr(checkpoints, "EVERY", 0.0)
-    monkeypatch.setattr(checkpoints, "MOST_COST", 1e9)
+    monkeypatch.setattr(checkpoints, "INTERVAL", 0.0)
+    monkeypatch.setattr(checkpoints, "MAX_COST", 1e9)
 
 
 def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options: object) -> None:
@@ -307,7 +307,7 @@ def test_a_long_render_has_a_checkpoint_beside_it_until_it_is_done(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     output, seen = tmp_path / "a.exr", []
-    monkeypatch.setattr(checkpoints, "LONG", 0.0)
+    monkeypatch.setattr(checkpoints, "LONG_JOB", 0.0)
 
     def look(progress: passes.Progress) -> None:
         time.sleep(0.05)  # the file is written by a thread of its own

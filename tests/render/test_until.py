@@ -18,7 +18,7 @@ from gonio.render.request import Request
 from gonio.transport import until
 from gonio.transport.integrators import Render, Settings, caustics
 from gonio.transport.integrators.progressive import SHARE, tiles
-from gonio.work import crew, kept
+from gonio.work import executor, kept
 
 OPTIONS = {"size": (48, 32), "seed": 5}
 
@@ -279,7 +279,7 @@ def test_who_cannot_tell_the_error_says_so(scene: Path, tmp_path: Path, monkeypa
     with pytest.raises(InputError, match="tells no error"):
         go.render(scene, until_error=0.1, spp=1)
     with monkeypatch.context() as other:
-        other.setattr(crew, "current", lambda: type("Crew", (), {"size": 4})())
+        other.setattr(executor, "current", lambda: type("Executor", (), {"size": 4})())
         with pytest.raises(InputError, match="workers render parts"):
             go.render(scene, until_error=0.1)
 

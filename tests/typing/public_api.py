@@ -134,8 +134,8 @@ picture = go.render(
     overrides={"shapes.1.material.p": 16, "shapes.0.material": gold},
 )
 assert_type(picture, NDArray[np.float32])
-with go.cluster(workers=2) as crew:
-    assert_type(crew, go.Cluster)
+with go.cluster(workers=2) as cluster:
+    assert_type(cluster, go.Cluster)
 assert_type(go.resume("phong.exr.checkpoint", spp=1024), NDArray[np.float32])
 
 difference = go.compare(picture, "reference.exr", metric="flip", tolerance=0.05, output="map.png")

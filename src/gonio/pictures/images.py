@@ -87,8 +87,8 @@ def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, expos
         content = _encoded(suffix, picture, settings, exposure)
     except Exception as error:  # whatever a library says: the picture must not be lost
         array = _npz_bytes(picture, {})
-        kept = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
-        hint = "nothing was written" if kept is None else f"it is kept as {kept}: `gonio convert` reads that"
+        rescued = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
+        hint = "nothing was written" if rescued is None else f"it is kept as {rescued}: `gonio convert` reads that"
         raise MachineError(f"cannot be written as {suffix}: {summary(error)}", str(path), hint) from error
     return files.write_whole(path, content)
 

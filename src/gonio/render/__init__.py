@@ -1,4 +1,4 @@
-"""Scenes to pictures: the machine, Mitsuba, the lab's scene format, integrators, image files."""
+"""From scenes to pictures: preparing a render, running it, checkpoints, and image files."""
 
 from __future__ import annotations
 
@@ -31,36 +31,37 @@ def render(
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
         picture = go.render("examples/phong", spp=64, overrides={"shapes.1.material.p": 16})
-        picture = go.render("gold.json")        # what a fit found, on a ball
+        picture = go.render("gold.json")        # the result of a fit, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
-    scene          the lab's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; what
-                   is None below is as the scene says
-    output         file to write, .exr, .hdr, .png or .npz; None writes nothing
+    scene          a scene's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; an
+                   option below that is None takes the scene's value
+    output         file to write: .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
     integrator     "direct", "path", "caustics", "light", "whitted", "normal", ...
-    max_depth      longest path, segments, for the integrators "path", "caustics" and "light"
-    sampler        where random numbers come from, such as "sobol"
-    seed           same seed, same picture, to the bit
+    max_depth      maximum path length in segments, for the integrators "path", "caustics" and "light"
+    sampler        source of the random numbers, such as "sobol"
+    seed           seed of the random numbers; the same seed gives a bit-identical picture
     device         "cpu", "cuda" or "auto"
-    spectral       light as wavelengths in place of red, green and blue: glass disperses, lamps have their spectra
-    threads        CPU cores to use, all where None
-    timeout        seconds, after which the picture so far is the picture
+    spectral       trace wavelengths instead of red, green and blue: glass disperses, and lamps have their spectra
+    threads        CPU cores to use; None uses all
+    timeout        seconds after which the render stops and returns the picture so far
     denoise        run Open Image Denoise over the result
-    exposure       of a .png: stops, or "auto" for one chosen by the picture's luminance
-    allow_outside  let the scene read files outside its folder
-    allow_code     let the scene name materials in Python files, "ward.py:Ward", and native plugins of Mitsuba in its
-                   folder `plugins`, which then run
-    overrides      values by their path in the scene, as `gonio study` varies them; materials too
-    checkpoint     file for the sums so far, written every few seconds; where it is there, the render goes on from it,
-                   to the same bits. None: beside the output, where the render takes over a minute
-    until_error    render until the picture's relMSE is estimated to be below this, within `spp` samples per pixel, or
-                   65,536; warns where that was too few
-    gradient       paths of numbers and colours of materials: what is returned is then (1 + paths, height, width, 3):
-                   the picture, and its derivative along each; of a colour along all three channels together, as
-                   "....albedo.r" along one. Materials that are equal are one, and move together
-    Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
+    exposure       brightness of a .png in stops; "auto" chooses it by the picture's luminance
+    allow_outside  allow the scene to read files outside its folder
+    allow_code     allow the scene to run materials in Python files, "ward.py:Ward", and native Mitsuba plugins in its
+                   folder `plugins`
+    overrides      values by their paths in the scene, as in `gonio study`; a value may be a material
+    checkpoint     file for the sums so far, written every few seconds; if it exists, the render continues from it, with
+                   bit-identical results. None writes it beside the output if the render takes more than a minute
+    until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
+                   pixel (65,536 if None); warns if they did not suffice
+    gradient       paths of numbers and colors of materials; the result is then (1 + paths, height, width, 3): the
+                   picture and its derivative along each path. The path of a color means all three channels together,
+                   "....albedo.r" a single one. Equal materials are one material and change together
+    Warns (GonioWarning) of suspicious scenes, of a .png that clips, and when it continues from a checkpoint.
+    Raises InputError, MachineError.
     """
     from ..catalog import notation, operands
     from ..material import BSDF
@@ -94,15 +95,15 @@ def resume(
     timeout: float | None = None,
     allow_code: bool = False,
 ) -> RGB:
-    """Go on with a render from its checkpoint: the picture, as `go.render` would have given it, to the bit.
+    """Continue a render from its checkpoint; the picture is bit-identical to that of an uninterrupted `go.render`.
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None is the one that was asked for, if one was: in the checkpoint's folder, or under its
-                name beside the checkpoint, with a warning
-    spp         samples per pixel in all; None is what was asked for
-    allow_code  let it run Python files that its scene names
-    Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
+    output      file to write; None writes the output of the original request, if it named one: at its place if that
+                lies in the checkpoint's folder, else under its name beside the checkpoint, with a warning
+    spp         samples per pixel in all; None uses those of the original request
+    allow_code  allow the scene to run the Python files that it names
+    Raises InputError if the checkpoint is damaged or if anything that the picture depends on has changed.
     """
     from . import checkpoints
     from .request import Request
@@ -120,7 +121,7 @@ def resume(
 
 
 def _picture(request: Request, level: int, notice: str = "") -> RGB:
-    """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
+    """Render the picture, write it if an output is named, and issue all warnings at the caller `level` frames up."""
     import warnings
 
     from ..bridge import engine

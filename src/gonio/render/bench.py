@@ -1,8 +1,8 @@
-"""How fast this machine is: rays, a material, two integrators, each beside Mitsuba's own in the same process.
+"""The speed of this machine: rays, a material and two integrators, compared with Mitsuba's own in the same process.
 
     gonio doctor --bench
 
-Alternating, so that a busy machine is busy for both; the best of some rounds counts, kernels compiled before.
+Both are timed alternately, so that other load affects both alike; the best of several rounds counts, after compilation.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from types import ModuleType
 from ..bridge import engine
 from ..bridge.types import BSDFPlugin, PluginDict, Scene
 
-LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU is done with a million before Python has launched the next
+LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU finishes a million before Python launches the next kernel
 SIZE, SPP = {"llvm": 256, "cuda": 1024}, 16
 ROUNDS = 5
 _ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at three wavelengths, as in benchmarks
@@ -23,7 +23,7 @@ _ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at t
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table: millions a second by Gonio and by Mitsuba; Gonio is 0 where only Mitsuba does it."""
+    """A row of the table: millions per second by Gonio and by Mitsuba; `gonio` is 0 for a task of Mitsuba alone."""
 
     what: str
     gonio: float
@@ -34,7 +34,7 @@ class Row:
 
 
 def measure(device: str = "cpu") -> tuple[str, list[Row]]:
-    """The machine in words, and the table. Raises MachineError where there is no such device."""
+    """A description of the machine, and the table. Raises MachineError if there is no such device."""
     mi = engine.load(device)
     lanes, size = (by_kind[mi.variant()[:4]] for by_kind in (LANES, SIZE))
     import drjit as dr
@@ -83,7 +83,7 @@ def measure(device: str = "cpu") -> tuple[str, list[Row]]:
 
 
 def _best(dr: ModuleType, count: int, *tasks: Callable[[], None]) -> list[float]:
-    """Millions a second of each of some tasks, which take turns."""
+    """Millions per second of each task; tasks are timed in turn."""
     least = [float("inf")] * len(tasks)
     for task in tasks:  # compile
         task()
@@ -98,7 +98,7 @@ def _best(dr: ModuleType, count: int, *tasks: Callable[[], None]) -> list[float]
 
 
 def _scene(mi: ModuleType, bsdf: str, size: int) -> Scene:
-    """A golden ball on a grey floor under a square lamp."""
+    """A golden ball on a gray floor under a square lamp."""
     to = mi.ScalarTransform4f
     gold: PluginDict = {"type": bsdf, "alpha": 0.2}
     gold |= {name: {"type": "rgb", "value": value} for name, value in (("eta", _ETA), ("k", _K))}

@@ -1,8 +1,8 @@
-"""Checkpoints of a render: the sums so far, and all that the picture depends on besides.
+"""Checkpoints of a render: the sums so far, and hashes of everything else that the picture depends on.
 
-A render that goes on from one gives the same bits as one that was never interrupted, since sums are carried on in the
-order of the samples. That holds as long as nothing else has changed; so the file has the hash of the scene, of every
-file that it names, of the settings, of Gonio's own code, and of what computes, and a change is refused by name.
+A render that continues from a checkpoint is bit-identical to an uninterrupted one, since samples are summed in the same
+order. This holds only if nothing else has changed. The file therefore contains hashes of the scene, of every
+file that it names, of the settings, of Gonio's own code, and the processor or GPU; an error names whatever has changed.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from ..work import garbage, kept
 from ..work.kept import Arrays, Facts
 from .identity import check
 from .prepare import Prepared
-from .request import MOST, Request
+from .request import MAX_COUNT, Request
 from .request_json import STRICT, described, request_of, validated
 
-EVERY = 3.0  # seconds between two checkpoints: with a pass and the writing, less than 5 are lost
-MOST_COST = 0.015  # of the time; where writing takes more, it is done less often
-LONG = 60.0  # seconds that a job must take for a checkpoint that nobody asked for
-SUFFIX = ".checkpoint"  # beside the picture
+INTERVAL = 3.0  # seconds between checkpoints: together with a pass and the writing, less than 5 s of work can be lost
+MAX_COST = 0.015  # fraction of the time; if writing costs more, checkpoints are written less often
+LONG_JOB = 60.0  # seconds that a job must take before an automatic checkpoint is written
+SUFFIX = ".checkpoint"  # of an automatic checkpoint, appended to the picture's name
 KIND = "render"
 
 
 def load(path: Path) -> kept.Kept:
-    """The checkpoint in a file, or the one before where it is damaged. Raises InputError where there is none, and for
-    facts that no render has."""
+    """The checkpoint in a file, or the previous one if it is damaged. Raises InputError if there is none, and for facts
+    that do not describe a render."""
     saved = kept.read(path)
     if saved.facts.get("kind") != KIND:
         raise InputError("this is no checkpoint of a render", str(path), "give one that `gonio render` has written")
@@ -46,34 +46,34 @@ def load(path: Path) -> kept.Kept:
 
 
 class _Facts(BaseModel):
-    """What a checkpoint says beside its sums."""
+    """The facts of a checkpoint, stored with its sums."""
 
     model_config = STRICT
     kind: str
-    done: int = Field(ge=0, le=MOST)
-    wanted: int = Field(ge=1, le=MOST)
+    done: int = Field(ge=0, le=MAX_COUNT)
+    wanted: int = Field(ge=1, le=MAX_COUNT)
     size: tuple[int, int]
-    output: str  # the picture's file, where the render writes one
+    output: str  # the picture's file, if the render writes one
     temporary: bool
     request: dict[str, Any] | None
     identity: dict[str, str]
 
 
 def restore(render: Renders, saved: kept.Kept, where: str) -> None:
-    """Carry the sums over."""
+    """Copy the sums of a checkpoint into a render. Raises InputError if they do not fit it."""
     try:
         render.restore(int(saved.facts["done"]), saved.arrays)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError("this checkpoint does not fit the picture", where, "render anew") from error
+        raise InputError("this checkpoint does not fit the picture", where, "render again without it") from error
 
 
 class Keeper:
-    """Writes checkpoints while a render goes on, by a thread of its own.
+    """Writes checkpoints during a render, in a separate thread.
 
     path       the file; None writes nothing
-    temporary  nobody asked for the file: it begins only once the job shows to take over `LONG` seconds, and goes when
-               the picture is there
-    long       seconds that such a job must take, `LONG` where None
+    temporary  the checkpoint is automatic: it is written only once the job is expected to take more than `LONG_JOB`
+               seconds, and removed after the picture has been written
+    long       seconds to use instead of `LONG_JOB`
     """
 
     def __init__(
@@ -86,14 +86,14 @@ class Keeper:
     ) -> None:
         self.path, self._prepared, self._temporary, self._clock = path, prepared, temporary, clock
         self.written = path is not None and kept.exists(path)
-        self._long = LONG if long is None else long
+        self._long = LONG_JOB if long is None else long
         self.error: GonioError | None = None
         self._began = self._last = clock()
         self._remaining = float("inf")
         self._thread: threading.Thread | None = None
-        self._held: Arrays | None = None  # what the thread reads stays alive until this one lets it go
+        self._held: Arrays | None = None  # keeps the arrays alive while the thread reads them
         self._identity: dict[str, str] = {}
-        self._cost = 0.0  # seconds that the last one took away from the render
+        self._cost = 0.0  # seconds of rendering time that the last checkpoint cost
         self._request = None if path is None else self._describe()
 
     def _describe(self) -> Facts | None:
@@ -106,15 +106,15 @@ class Keeper:
             return None
 
     def _short(self, now: float) -> bool:
-        """Whether the job is too short for a file that nobody asked for."""
+        """Whether the job is too short for an automatic checkpoint."""
         return self._temporary and not self.written and now - self._began + self._remaining < self._long
 
     def after_pass(self, progress: Progress) -> None:
-        """Write, where it is time for it."""
+        """Write a checkpoint if one is due."""
         now, self._remaining = self._clock(), progress.remaining
         if self._thread is not None and not self._thread.is_alive():
             self.close()
-        if self.path is None or now - self._last < max(EVERY, self._cost / MOST_COST) or self._short(now):
+        if self.path is None or now - self._last < max(INTERVAL, self._cost / MAX_COST) or self._short(now):
             return
         if self._thread is not None:
             return
@@ -122,20 +122,20 @@ class Keeper:
         self._begin()
 
     def end(self, stopped: bool) -> None:
-        """Write what there is, for a render that is to go on later, or to more samples."""
+        """Write a last checkpoint, so that the render can be continued later or to more samples."""
         self.close()
         if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
             self._begin()
             self.close()
 
     def remove(self) -> None:
-        """The picture is there: remove the file that nobody asked for."""
+        """Remove an automatic checkpoint after the picture has been written."""
         if self.path is not None and self._temporary:
             kept.remove(self.path)
             self.written = False
 
     def close(self) -> None:
-        """Wait for what is being written."""
+        """Wait until the current checkpoint is written."""
         if self._thread is not None:
             self._thread.join()
             garbage.resume()
@@ -153,7 +153,7 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
-        garbage.pause()  # until it has ended: see there
+        garbage.pause()  # until the thread has ended, see `work.garbage`
         self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 
@@ -161,7 +161,7 @@ class Keeper:
         assert self.path is not None
         began = time.thread_time()
         try:
-            if not self._identity:  # here, so that hashing large files costs the render nothing
+            if not self._identity:  # in this thread, so that hashing large files does not delay the render
                 self._identity = self._prepared.sources.identity()
             kept.write(self.path, {**about, "identity": self._identity}, arrays, previous=True)
             self.written, self.error = True, None
@@ -173,15 +173,15 @@ class Keeper:
 
 
 def default_path(output: Path) -> Path:
-    """Where the checkpoint of a picture is that nobody asked for."""
+    """The path of the automatic checkpoint of a picture."""
     return files.with_ending(output, SUFFIX)
 
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
-    """Go on from a checkpoint that an earlier run of the same render has left: (what to tell of it, whether it is one
-    that nobody asked for).
+    """Continue from a checkpoint that an earlier run of the same render left. Returns a notice, and whether the
+    checkpoint is an automatic one.
 
-    temporary  nobody asks for it now either: one that does not fit is left alone, and said
+    temporary  no checkpoint was requested: one that does not fit is removed, and the notice says so
     """
     if not kept.exists(path):
         return "", temporary
@@ -206,15 +206,15 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
 
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
-    """The request of a checkpoint, with what `gonio resume` was asked for (output, spp, timeout, threads); and what to
-    tell of where its picture is written.
+    """The request of a checkpoint with the options of `gonio resume` (output, spp, timeout, threads), and a notice of
+    where its picture is written.
 
-    writes  the picture is written, under the name that the scene gives it where the render was asked for no other
+    writes  the picture will be written, under the scene's name for it if the original request named no output
     """
     saved = load(path)
     if saved.facts["request"] is None:
-        what = "its material is known to the program alone that made it"
-        raise InputError(what, str(path), "call that program again with the same checkpoint")
+        what = "its material exists only in the program that rendered it"
+        raise InputError(what, str(path), "run that program again with the same checkpoint")
     old = request_of(saved.facts["request"], str(path), allow_code)
     output, notice = change.output, ""
     if output is None and (old.output is not None or writes):
@@ -232,7 +232,7 @@ def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = Fa
 
 def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
     """Where the picture of an untrusted checkpoint is written: the file that it names if that lies in the checkpoint's
-    folder, else one of that name beside the checkpoint; and what to tell of that."""
+    folder, else one of that name beside the checkpoint; and a notice of that."""
     folder = checkpoint.absolute().parent
     try:
         inside = output.resolve().is_relative_to(folder.resolve())

@@ -1,7 +1,7 @@
-"""What this machine can render with: found, missing, and how to get it.
+"""The rendering software of this machine: what is installed, what is missing, and how to install it.
 
-Dr.Jit ends the whole process where an LLVM or a driver disagrees with it, and no program survives to say so.
-So every trial runs in a process of its own.
+Dr.Jit aborts the whole process if an LLVM or a driver is incompatible, so that no error can be reported.
+Therefore every trial runs in a separate process.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .._version import __version__
 from ..bridge import engine
 from ..pictures import denoise
 
-# Rays through Embree or OptiX, a Gonio material by its plugin, a compiled kernel: all that a render needs.
+# Traces rays by Embree or OptiX, evaluates a Gonio material and compiles a kernel: all that a render needs.
 _TRIAL = """
 from gonio.bridge import engine
 mi = engine.load({device!r})
@@ -33,12 +33,12 @@ assert 5 < total < 25, total
 print("variant", mi.variant())
 print("threads", dr.thread_count())
 """
-_TRIAL_SECONDS = 120  # a cold start compiles for some seconds; a machine that needs longer cannot render either
+_TRIAL_SECONDS = 120  # a cold start compiles for some seconds; a machine that exceeds this cannot render either
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the report; `state` is "ok", "missing" (can be lived without) or "bad"."""
+    """One line of the report; `state` is "ok", "missing" (optional) or "bad"."""
 
     state: str
     subject: str
@@ -47,7 +47,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """All findings, what a trial on each device said, and whether anything can be rendered with."""
+    """All findings, the outcome of the trial on each device, and whether this machine can render at all."""
 
     findings: tuple[Finding, ...]
     devices: dict[str, str]  # device -> "" where it works, else what went wrong
@@ -66,7 +66,7 @@ class Report:
 
 
 def examine() -> Report:
-    """Look at everything; takes a few seconds, most of them in the trials."""
+    """Examine everything; takes a few seconds, most of them in the trials."""
     findings = [
         Finding("ok", "Gonio", f"{__version__}, Python {platform.python_version()}, {platform.platform(terse=True)}"),
         _package("mitsuba", "Mitsuba", "pip install mitsuba"),
@@ -85,9 +85,9 @@ def examine() -> Report:
             findings.append(Finding("missing", "render on cuda", f"no CUDA device answers; {hint}"))
         else:
             findings.append(Finding("bad", f"render on {device}", problem))
-    found = denoise.available()
-    if found:
-        findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {found}"))
+    pyoidn_version = denoise.available()
+    if pyoidn_version:
+        findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {pyoidn_version}"))
     else:
         findings.append(Finding("missing", "denoiser", f"for --denoise: {denoise.INSTALL}"))
     return Report(tuple(findings), devices)
@@ -101,28 +101,28 @@ def _package(name: str, subject: str, install: str) -> Finding:
 
 
 def _libraries() -> list[Finding]:
-    """Every LLVM in reach, the one that will be used first, and why the others are not."""
-    found = []
+    """Every LLVM that can be loaded, which one will be used, and why the others are not."""
+    findings = []
     chosen = False
     for library in llvm.libraries():
         subject = f"LLVM {library.version or '?'}"
         place = f"{library.path} ({library.source})"
         if not library.usable:
             why = f"older than {llvm.OLDEST_USABLE}, it would abort the process" if library.version else "no libLLVM"
-            found.append(Finding("missing", subject, f"{place}: {why}; not used"))
+            findings.append(Finding("missing", subject, f"{place}: {why}; not used"))
         else:
-            found.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
+            findings.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
             chosen = True
-    if not any(finding.state == "ok" for finding in found):
+    if not any(finding.state == "ok" for finding in findings):
         hint = f"pip install karellen-llvm-core (Linux x86-64), or any LLVM >= {llvm.OLDEST_USABLE} of the system"
-        found.append(Finding("bad", "LLVM", f"none that can be used; {hint}"))
-    return found
+        findings.append(Finding("bad", "LLVM", f"none that can be used; {hint}"))
+    return findings
 
 
 def _try(device: str) -> tuple[str, str]:
-    """Run the trial on a device in a process of its own: what went wrong ("" if nothing), and what it printed.
+    """Run the trial on a device in a separate process. Returns the problem ("" if there is none), and its output.
 
-    -P: without it, a numpy.py in the current folder would be run.
+    Without -P, Python would import a numpy.py from the current folder.
     """
     command = [sys.executable, "-P", "-c", _TRIAL.format(device=device)]
     try:

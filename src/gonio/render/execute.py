@@ -1,4 +1,4 @@
-"""A prepared render advanced to its samples, by this process or by workers, with checkpoints on the way."""
+"""Running a prepared render to its sample count, in this process or on workers, with checkpoints."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..errors import InputError
 from ..scene import mitsuba_scene
 from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Progress, run
-from ..work import crew
+from ..work import executor
 from . import checkpoints
 from .checkpoints import Keeper
 from .prepare import Prepared
 
 
 def of_scene(prepared: Prepared) -> AbstractContextManager[None]:
-    """Inside, what the plugins of a Mitsuba scene cannot do is an error of the scene's."""
+    """Report errors of the plugins of a Mitsuba scene as errors of the scene inside the `with` block."""
     if not prepared.request.is_mitsuba:
         return nullcontext()
     return mitsuba_scene.rendering(prepared.request.scene, isinstance(prepared.render, MitsubaRender))
@@ -33,12 +33,14 @@ def execute(
     interrupted: Callable[[], object] = lambda: False,
     tell: Callable[[str], None] = lambda text: None,
 ) -> tuple[str, Keeper]:
-    """Advance a render to its samples, from where an earlier run left it: why it ended, as `run` has it, and the keeper
-    of its checkpoints, which is told when the picture is written.
+    """Advance a render to its sample count, continuing an earlier run if there is a checkpoint.
 
-    temporary  the checkpoint of a long job whose request names none
-    long       seconds that such a job must take; a minute where None
-    tell       called at the start with what was found
+    Returns the reason for the end, as `run` does, and the keeper of the checkpoints, whose `remove` is to be called
+    when the picture has been written.
+
+    temporary  path of an automatic checkpoint, used for long jobs whose request names none
+    long       seconds from which a job counts as long; a minute if None
+    tell       called at the start with a notice if a checkpoint was found
     """
     from ..transport import integrators, until
     from . import tiles
@@ -55,11 +57,11 @@ def execute(
     if isinstance(prepared.render, until.Until):
         drawing = prepared.render
         goal = lambda: drawing.goal  # noqa: E731
-        if crew.current().remote:
+        if executor.current().remote:
             what = "workers render parts of a picture, and its error is that of the whole"
             raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif crew.current().remote and prepared.render.done < prepared.spp:
-        tiles.travelling(prepared)  # what cannot travel is said before anything is written
+    elif executor.current().remote and prepared.render.done < prepared.spp:
+        tiles.travelling(prepared)  # raises before anything is written
         assert isinstance(prepared.render, integrators.Render)
         gathered = tiles.Gathered(prepared.render, prepared.spp)
     keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
@@ -90,13 +92,13 @@ def execute(
     return stopped, keeper
 
 
-def by_crew(
+def execute_all(
     prepared: Sequence[Prepared],
     *,
     interrupted: Callable[[], object] = lambda: False,
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
-    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
+    """Run several renders at once by the current executor; `finished` is called with the index of each that is done."""
     from ..transport import integrators
     from . import tiles
 

@@ -1,4 +1,4 @@
-"""What becomes of a render: the picture, denoised where asked, and the file that it is written to."""
+"""The end of a render: the picture, denoised if requested, and the file that it is written to."""
 
 from __future__ import annotations
 
@@ -22,11 +22,14 @@ from .request import Request
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
+    """The result of a render.
 
-    error       relMSE of the picture as it is estimated, where it was rendered until an error
-    signal      the number of the signal that interrupted it, 0 where none did
-    checkpoint  file from which it goes on, None where there is none
+    spp         samples per pixel that were rendered
+    stopped     "", "interrupt" or "timeout"
+    exposure    exposure of a .png, in stops
+    error       estimated relMSE of the picture, if it was rendered until an error was reached
+    signal      number of the signal that interrupted it, 0 if none did
+    checkpoint  file from which it can be continued, None if there is none
     """
 
     output: Path
@@ -48,7 +51,7 @@ class Result:
 
 
 def estimated(prepared: Prepared) -> tuple[float | None, str]:
-    """The relMSE of the picture so far, where it is rendered until an error, and what is to be known of it."""
+    """The estimated relMSE of a picture rendered until an error is reached; a warning if it is too large."""
     wanted = prepared.request.until_error
     if wanted is None:
         return None, ""
@@ -56,7 +59,7 @@ def estimated(prepared: Prepared) -> tuple[float | None, str]:
     if error <= wanted:
         return error, ""
     if not math.isfinite(error):
-        return None, "too few samples to tell the relMSE"
+        return None, "too few samples to estimate the relMSE"
     done = f"{prepared.render.done} samples per pixel"
     return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
 
@@ -67,14 +70,14 @@ def render_to_file(
     notice: Callable[[], None] = lambda: None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Render a scene to a file; on Ctrl-C, SIGTERM and SIGHUP or at the time limit, the picture so far.
+    """Render a scene to a file; on Ctrl-C, SIGTERM, SIGHUP or at the time limit, write the picture so far.
 
     report  called after each pass
     notice  called at the first of these signals, from another thread
-    tell    called at the start with what an earlier run has left
+    tell    called at the start with a notice if an earlier run left a checkpoint
     """
     started = time.perf_counter()
-    with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
+    with Interrupts(notice) as interrupts:  # before the imports: one that is interrupted can crash
         prepared = prepare(request, writes=True)
         interrupts.check()
         checkpoint = checkpoints.default_path(prepared.output)
@@ -115,7 +118,7 @@ def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.
 
 
 def picture_of(render: Renders, denoised: bool, output: Path | None = None) -> NDArray[np.float32]:
-    """The picture, denoised where asked; where that fails, the noisy one is written to `output` before it is told."""
+    """The picture, denoised if requested; if that fails, write the noisy one to `output` and raise MachineError."""
     picture = render.image()
     if not denoised:
         return picture
@@ -126,5 +129,5 @@ def picture_of(render: Renders, denoised: bool, output: Path | None = None) -> N
         if output is None:
             raise
         images.write(output, picture)
-        hint = "it has the picture with its noise; leave --denoise out"
+        hint = "that file holds the noisy picture; leave --denoise out"
         raise MachineError(f"the picture was not denoised: {summary(error)}", str(output), hint) from error

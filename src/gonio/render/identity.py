@@ -1,4 +1,4 @@
-"""What a picture is made from: by its hashes a checkpoint knows whether anything has changed."""
+"""The inputs of a picture, whose hashes let a checkpoint detect any change."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..work.kept import Facts
 
 @dataclass(frozen=True)
 class Sources:
-    """What a picture is made from.
+    """The inputs of a picture.
 
-    text     writes down the scene as it is rendered, overrides and all; which takes a while where it is large
-    files    those that it names, by the name that it gives them
-    how      integrator, sampler, seed and what else there is to set
-    version  of Gonio and Mitsuba
-    device   what computes
+    text     returns the scene as it is rendered, including overrides, as text; slow for large scenes
+    files    the files that the scene names, by those names
+    how      integrator, sampler, seed and all other settings
+    version  versions of Gonio, Mitsuba and Dr.Jit
+    device   processor or GPU, and its compiler
     """
 
     text: Callable[[], str]
@@ -36,12 +36,12 @@ class Sources:
         return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
-        """A hash or a name of each thing that the picture depends on, by what a person calls it."""
-        found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
-        found |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
+        """A hash or name of each input of the picture, by the names that errors use."""
+        identity = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
+        identity |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
-            found[f"file {name}"] = facts.file_hash(path)
-        return found
+            identity[f"file {name}"] = facts.file_hash(path)
+        return identity
 
 
 def _hash(content: bytes) -> str:
@@ -49,14 +49,14 @@ def _hash(content: bytes) -> str:
 
 
 def _device(mi: ModuleType) -> str:
-    """What computes: another compiler or another processor may round otherwise."""
+    """The device and its compiler: another processor or compiler may round differently."""
     variant = str(mi.variant())
     return f"{variant}, {facts.processor() if variant.startswith('llvm') else engine.cuda_device()}"
 
 
-def check(found: Facts, identity: Mapping[str, str], where: str) -> None:
-    """Raise InputError that names the first thing that is not as it was."""
-    before = found.get("identity")
+def check(saved: Facts, identity: Mapping[str, str], where: str) -> None:
+    """Raise InputError that names the first input that has changed."""
+    before = saved.get("identity")
     before = before if isinstance(before, dict) else {}
     for name in [*identity, *before]:
         old, new = before.get(name), identity.get(name)
@@ -70,4 +70,4 @@ def check(found: Facts, identity: Mapping[str, str], where: str) -> None:
             what = f"the {name} is no longer there"
         else:
             what = f"the {name} has changed since the checkpoint was made"
-        raise InputError(what, where, "put back what it was, or render anew without this checkpoint")
+        raise InputError(what, where, "restore it, or render again without this checkpoint")

@@ -1,7 +1,8 @@
-"""How a scene is rendered: the options that requests, `go.render`, `go.study` and the command line share.
+"""The options of a render, shared by requests, `go.render`, `go.study` and the command line.
 
-`RenderOptions` declares them, with what the command line says of each. `RenderKeywords` are its types for checkers of
-`**options`, which Python has no way to take from a class. Nothing heavy is imported: `gonio render --help` reads this.
+`RenderOptions` declares them, with their help texts. `RenderKeywords` repeats their types for type checkers of
+`**options`, since Python cannot derive them from a class. This module imports nothing large, as `gonio render --help`
+reads it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ R = TypeVar("R")
 
 
 class Shown(NamedTuple):
-    """What the command line says of an option: what it takes, "" for a flag, and what it is for."""
+    """The help of an option: the placeholder of its value ("" for a flag) and a description."""
 
     metavar: str
     help: str
@@ -25,7 +26,7 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions:
-    """Options of a render; None: as the scene says."""
+    """Options of a render; None takes the scene's value."""
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None
@@ -61,8 +62,8 @@ class RenderKeywords(TypedDict, total=False):
 
 
 def takes_render_options(call: Callable[P, R]) -> Callable[P, R]:
-    """A function with `**options` under the signature that these stand for, with their defaults: for `help`, notebooks
-    and `checked`."""
+    """Decorate a function with `**options`: expand its signature to the options and their defaults, for `help`,
+    notebooks and `checked`."""
     signature = inspect.signature(call)
     own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
     types = {name: getattr(one, "__forward_arg__", one) for name, one in RenderKeywords.__annotations__.items()}

@@ -1,4 +1,4 @@
-"""From a request to a render that is ready to advance: the scene is read, Mitsuba started, the integrator chosen."""
+"""Preparing a render: read the scene of a request, start Mitsuba, and choose the integrator."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Renders
 from ..work import facts, garbage
 from .identity import Sources
-from .request import UNTIL_MOST, Request
+from .request import MAX_SPP_UNTIL, Request
 
 if TYPE_CHECKING:
     from ..bridge.types import Scene
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A scene loaded and ready to advance."""
+    """A loaded scene and a render that is ready to advance."""
 
     request: Request
     render: Renders
@@ -43,15 +43,15 @@ class Prepared:
 
 
 def prepare(request: Request, writes: bool = False) -> Prepared:
-    """Read the scene, start Mitsuba, make the render; raises InputError or MachineError.
+    """Read the scene, start Mitsuba and create the render. Raises InputError or MachineError.
 
-    writes  the picture will be written: under the name that the scene gives it, where the request names no output
+    writes  the picture will be written, under the scene's name for it if the request names no output
     """
     request.check()
     if request.material is None and not os.path.exists(request.scene):
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, request.spectral, request.threads)
-    with garbage.kept():
+    with garbage.paused():
         if request.is_mitsuba:
             prepared = _prepare_mitsuba(request, mi)
         else:
@@ -99,12 +99,12 @@ def _prepare_lab(request: Request, mi: ModuleType, names_output: bool) -> Prepar
     if degrees is not None:
         polarizer.check(settings, description.where("/camera/polarizer"))
         if request.until_error is not None or request.gradient:
-            what = "a picture through a polarizer is by Mitsuba's path tracer, which tells no error and no derivative"
+            what = "scenes with a polarizer are rendered by Mitsuba, without error estimate and derivatives"
             option = "gradient" if request.gradient else "--until-error"
             raise InputError(what, option, "leave the polarizer out")
         mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    built = scene.built(description, mi, gathers=not request.gradient)
+    built = scene.built(description, mi, merge_materials=not request.gradient)
     render: Renders
     if request.gradient:
         from ..scene.derivatives import along
@@ -137,18 +137,18 @@ def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.
 
 
 def _most(request: Request, spp: int) -> int:
-    """Samples per pixel: those asked for, those of the scene, or a bound where the error says how many."""
-    return request.spp or (spp if request.until_error is None else UNTIL_MOST)
+    """Samples per pixel: those requested, those of the scene, or the limit if an error determines their number."""
+    return request.spp or (spp if request.until_error is None else MAX_SPP_UNTIL)
 
 
 def _advice(render: Renders) -> list[str]:
-    """What to tell of the integrator that was chosen."""
+    """Notices about the chosen integrator."""
     text = getattr(render, "advice", "")
     return [text] if text else []
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
-    """The settings that a picture depends on, in words."""
+    """The settings that a picture depends on, as text."""
     ours = {} if settings is None else {**asdict(settings), "program": _code_of(settings.program)}
     others: dict[str, images.Value] = {**more, "features": request.denoise}
     if request.until_error is not None:
@@ -159,7 +159,7 @@ def _how(settings: Settings | None, request: Request, **more: images.Value) -> s
 
 
 def _code_of(program: type) -> str:
-    """A hash of the file of an integrator that is not Gonio's, its name where it is or where there is no file."""
+    """A hash of the source file of a user's integrator; the name if it is Gonio's or has no file."""
     if program.__module__.startswith("gonio."):
         return program.__name__
     try:
@@ -169,7 +169,7 @@ def _code_of(program: type) -> str:
 
 
 def _settings(scene: Settings, request: Request) -> Settings:
-    """The command line's wishes over the scene's."""
+    """The scene's settings, overridden by the request's."""
     from ..transport.integrators.base import Integrator, check_sampler
 
     if request.integrator is not None:
@@ -186,20 +186,20 @@ def _settings(scene: Settings, request: Request) -> Settings:
 
 
 def _own(settings: Settings) -> dict[str, images.Value]:
-    """What a picture says about one of our own integrators."""
+    """Metadata of a picture by one of Gonio's own integrators."""
     from ..transport import sampler
 
-    found: dict[str, images.Value] = {
+    metadata: dict[str, images.Value] = {
         "integrator": settings.integrator,
         "sampler": " and ".join(sampler.DEFAULT) if settings.sampler == "default" else settings.sampler,
         "seed": settings.seed,
     }
-    return found | ({"max_depth": settings.max_depth} if settings.program.takes_depth else {})
+    return metadata | ({"max_depth": settings.max_depth} if settings.program.takes_depth else {})
 
 
 def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str, images.Value]:
-    """What a picture says about how it was made."""
-    found: dict[str, images.Value] = {
+    """Metadata of a picture that say how it was rendered."""
+    metadata: dict[str, images.Value] = {
         "scene": str(request.scene),
         **how,
         "variant": str(mi.variant()),
@@ -207,10 +207,10 @@ def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     if request.until_error is not None:
-        found["until_error"] = request.until_error
+        metadata["until_error"] = request.until_error
     if request.denoise:
-        found["denoised"] = f"OIDN, pyoidn {denoise.available()}"
-    return found
+        metadata["denoised"] = f"OIDN, pyoidn {denoise.available()}"
+    return metadata
 
 
 def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
@@ -225,7 +225,7 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
                 what = "a Mitsuba scene's own integrator does not take this option"
                 raise InputError(what, option, "add --integrator path (or direct), or change it in the .xml")
     if request.gradient:
-        what = "a Mitsuba scene, and derivatives are along values of a scene of Gonio's format"
+        what = "derivatives of a Mitsuba scene are not supported, only those of scenes in Gonio's format"
         raise InputError(what, "gradient", "give a folder or a .json")
     adapter.register(mi)
     lights.register(mi)

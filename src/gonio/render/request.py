@@ -1,4 +1,4 @@
-"""What to render and how, as the command line and `go.render` ask for it."""
+"""The request for a render, as the command line and `go.render` make it."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from ..pictures import denoise, exposures, images
 from ..scene.film import check_film
 from .options import RenderOptions
 
-MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
-UNTIL_MOST = 1 << 16  # samples per pixel until an error is reached, where nobody says how many at most
-MOST_THREADS = 1024
+MAX_COUNT = 1 << 30  # samples per pixel, and path segments: kernels count them in 32 bits
+MAX_SPP_UNTIL = 1 << 16  # default limit of samples per pixel for `until_error`
+MAX_THREADS = 1024
 
 
 @dataclass(frozen=True)
 class Request(RenderOptions):
-    """What to render, and how."""
+    """A scene or a material, and how to render it."""
 
-    scene: Path  # of a material alone, its name
+    scene: Path  # for a material without a scene, its name
     output: Path | None = None
     timeout: float | None = None
     overrides: Mapping[str, object] = field(default_factory=dict)
-    material: BSDF | None = None  # to be shown on a ball, in place of a scene
-    checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
-    until_error: float | None = None  # relMSE at which to stop; `spp` is then the most
+    material: BSDF | None = None  # shown on a ball, in place of a scene
+    checkpoint: Path | None = None  # file of the sums so far; an existing one is continued
+    until_error: float | None = None  # relMSE at which to stop; `spp` is then the maximum
     gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
 
     @property
     def is_mitsuba(self) -> bool:
-        """Whether the scene is a Mitsuba scene's file."""
+        """Whether the scene is a Mitsuba XML file."""
         return self.material is None and self.scene.suffix.lower() == ".xml" and os.path.isfile(self.scene)
 
     def check(self) -> None:
-        """Raise InputError for an option that cannot be, before anything is loaded."""
-        if self.spp is not None and not 1 <= self.spp <= MOST:
-            raise InputError(f"{self.spp} samples per pixel", "--spp", f"give 1 to {MOST}")
-        if self.max_depth is not None and not 1 <= self.max_depth <= MOST:
-            raise InputError(f"depth {self.max_depth}", "--max-depth", f"give 1 to {MOST}")
+        """Raise InputError for an invalid option, before anything is loaded."""
+        if self.spp is not None and not 1 <= self.spp <= MAX_COUNT:
+            raise InputError(f"{self.spp} samples per pixel", "--spp", f"give 1 to {MAX_COUNT}")
+        if self.max_depth is not None and not 1 <= self.max_depth <= MAX_COUNT:
+            raise InputError(f"depth {self.max_depth}", "--max-depth", f"give 1 to {MAX_COUNT}")
         if self.seed is not None and not 0 <= self.seed < 1 << 32:
             raise InputError(f"seed {self.seed} is out of range", "--seed", "give 0 to 4294967295")
-        if self.threads is not None and not 1 <= self.threads <= MOST_THREADS:
-            raise InputError(f"{self.threads} threads asked for", "--threads", f"give 1 to {MOST_THREADS}")
+        if self.threads is not None and not 1 <= self.threads <= MAX_THREADS:
+            raise InputError(f"{self.threads} threads asked for", "--threads", f"give 1 to {MAX_THREADS}")
         if self.timeout is not None and not self.timeout > 0:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
         if self.until_error is not None:
@@ -72,7 +72,7 @@ class Request(RenderOptions):
 
 
 def check_error(error: float, spp: int | None) -> None:
-    """Raise InputError for an error that no picture has, or samples that tell none."""
+    """Raise InputError for an error that is not positive and finite, or for too few samples to estimate it."""
     if not (math.isfinite(error) and error > 0.0):
         raise InputError(f"a relMSE of {error:g}", "--until-error", "give more than 0, such as 0.01")
     if spp == 1:

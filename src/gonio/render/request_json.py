@@ -1,5 +1,5 @@
-"""A request as JSON: what a checkpoint and a worker of a cluster get. What is read is untrusted, as a scene is: every
-key, type and range is checked."""
+"""Requests as JSON, for checkpoints and for the workers of a cluster. The JSON is untrusted, as a scene is: every key,
+type and range is checked."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from ..material import BSDF
 from ..work.kept import Facts
 from .request import Request
 
-LEFT_OUT = ("checkpoint", "timeout")  # of a request: they are those of the command that goes on
+EXCLUDED = ("checkpoint", "timeout")  # fields not stored: the command that continues the render sets them
 STRICT = ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
 
 
 def described(request: Request) -> Facts:
-    """A request as a file can hold it. Raises InputError for a material that this program alone knows."""
+    """A request as plain values for a file. Raises InputError for a material that only this program defines."""
     values: Facts = {}
     for one in fields(Request):
         value = getattr(request, one.name)
-        if one.name in LEFT_OUT:
+        if one.name in EXCLUDED:
             continue
         if isinstance(value, Path):
             value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
@@ -49,7 +49,7 @@ def _plain(value: Any) -> Any:
 
 
 def request_of(given: Facts, where: str, allow_code: bool) -> Request:
-    """The request that `described` made. A file alone never makes Gonio run Python: `allow_code` is asked for again."""
+    """The inverse of `described`. A file alone never makes Gonio run Python: `allow_code` is required again."""
     if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
         raise InputError(
             "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
@@ -58,10 +58,10 @@ def request_of(given: Facts, where: str, allow_code: bool) -> Request:
     try:
         material = _rebuilt(values["material"])
         if not (material is None or isinstance(material, BSDF)):
-            raise InputError("no material", f"{where}#/request/material", "render anew")
+            raise InputError("no material", f"{where}#/request/material", "render again without it")
         request = Request(**{**values, "material": material, "overrides": _rebuilt(values["overrides"])})
     except RecursionError:
-        raise InputError("materials inside each other without end", where, "render anew") from None
+        raise InputError("the materials are nested too deeply", where, "render again without it") from None
     replace(request, output=None).check()
     return request
 
@@ -71,7 +71,7 @@ def _fields() -> type[BaseModel]:
     """The fields that `described` writes, with their types."""
     hints = get_type_hints(Request)
     hints |= {"material": dict[str, Any] | None, "overrides": dict[str, Any]}
-    types: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in LEFT_OUT}
+    types: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in EXCLUDED}
     return create_model("RequestFields", __config__=STRICT, **types)
 
 
@@ -79,21 +79,27 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -> Model:
-    """The facts of an untrusted file as `model` has them.
+    """The facts of an untrusted file, validated by `model`.
 
-    pointer  where they stand in the file
-    Raises InputError with the place and what is expected there.
+    pointer  JSON pointer to the facts in the file
+    Raises InputError with the location and what is expected there.
     """
     try:
-        return model.model_validate_json(json.dumps(given))  # from JSON a list is a tuple, and a text a path
+        return model.model_validate_json(
+            json.dumps(given)
+        )  # in JSON mode, pydantic accepts lists as tuples and strings as paths
     except ValidationError as error:
         if {"missing", "extra_forbidden"} & {one["type"] for one in error.errors(include_url=False)}:
-            raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None
+            raise InputError(
+                "this checkpoint is of another version of Gonio", where, "render again without it"
+            ) from None
         first = error.errors(include_url=False)[0]
         place = "/".join([pointer, *map(str, first["loc"])])
-        raise InputError(f"not as Gonio writes it: {first['msg']}", f"{where}#{place}", "render anew") from None
+        raise InputError(
+            f"not as Gonio writes it: {first['msg']}", f"{where}#{place}", "render again without it"
+        ) from None
     except (RecursionError, ValueError) as error:
-        raise InputError(f"not as Gonio writes it: {summary(error)}", where, "render anew") from None
+        raise InputError(f"not as Gonio writes it: {summary(error)}", where, "render again without it") from None
 
 
 def _rebuilt(value: Any) -> Any:

@@ -57,25 +57,25 @@ def bake(
     ndf: str | None = None,
     levels: int | None = None,
 ) -> Baked:
-    """Bake tables of directional albedo, its average, the split sum and rough glass, or an environment blurred for the
-    split sum; see what they hold and err by.
+    """Bake tables of directional albedo, its average, the split sum and rough glass, or an environment prefiltered for
+    the split sum; the manifest gives their content and their error.
 
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
     target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"; or a picture of an
               environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
-    output    folder to write, all files or none; None writes nothing
-    lut       of "E", "Eavg", "dfg", "glass"; None is all that the target has, but glass
+    output    folder to write to, all files or none; None writes nothing
+    lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass
     resolution  texels along each axis, 1 to 4096
     method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
               by the `sampler` "hammersley" or "independent" (of `seed`, 0 if None)
-    masking   of a distribution; a material brings its own
-    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
-    aspect    alpha_y / alpha_x of a distribution; other than 1 it adds the axis phi, of so many `azimuths`
-    ndf       of an environment: the distribution it is blurred by (ggx), into so many `levels` of roughness 0 to 1 (6);
-              `masking` is what the split sum is judged with
-    What was baked before comes from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
+    masking   masking of a distribution; a material has its own
+    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures as `store` and `flip` say)
+    aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
+    ndf       of an environment: the distribution for its prefiltering (default ggx), into `levels` levels of roughness
+              0 to 1 (default 6); the error of the split sum is measured with `masking`
+    Tables baked before come from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
     folder = None if output is None else files.check_folder(output)
@@ -130,14 +130,14 @@ def bake(
 
 
 def _check_default(options: dict[str, object], hint: str) -> None:
-    """InputError for options that do not belong to what is baked, where they were given."""
+    """Raise InputError for given options that do not apply to the target."""
     for name, value in options.items():
         if value != inspect.signature(bake).parameters[name].default:
             raise InputError(f"--{name} {value} does not go with this target", f"--{name}", hint)
 
 
 def _is_picture(target: str | Path | BSDF, lut: Sequence[str] | None) -> bool:
-    """Whether an environment is meant: by its suffix, or by what is asked for."""
+    """Whether the target is an environment, by its suffix or by the requested tables."""
     pictured = not isinstance(target, BSDF) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
     others = [name for name in lut or () if name != "prefiltered"]
     if pictured and others:
@@ -152,9 +152,9 @@ def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: in
     """The levels of an environment, written as pictures too."""
     source = images.read(picture)
     if not source.hdr:
-        what = "a screen's picture, which is cut off at white"
+        what = "an 8-bit picture, whose values are clipped at white"
         raise InputError(what, str(picture), "give linear radiance, .hdr or .exr")
-    if levels is None:  # as many as a small map has room for
+    if levels is None:  # fewer for a small map
         levels = min(prefilter.LEVELS, max(len(source.pixels).bit_length() - 1, 2))
     baked = prefilter.bake(source.pixels, ndf or "ggx", levels, masking or "smith-correlated", str(picture))
     if folder is not None:
@@ -199,7 +199,7 @@ def _named(text: str | None, family: Family[Any], option: str) -> str | None:
 
 
 def _own(target: str, name: str) -> str | BSDF:
-    """A material of a file, or the name of a distribution there."""
+    """A material from a Python file, or the name of a distribution from one."""
     thing = outside.thing(name, where="TARGET")
     material = getattr(thing, "family", BSDF.family) is BSDF.family
     return notation.named(target)[0] if material else outside.member(name, None, "TARGET", NDF.family)

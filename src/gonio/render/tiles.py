@@ -1,8 +1,8 @@
-"""A picture by a crew: each part is a few lanes of it, with all their samples.
+"""Rendering one picture on several workers: each part is a range of its lanes, with all their samples.
 
-Lanes know nothing of each other, and a part begins where a vector of the processor does, so that the same rays are
-traced together: the sums are those of one process, to the bit. Whoever does a part has the scene from its files, which
-travel by their content.
+Lanes are independent, and every part begins at a multiple of the processor's vector width, so that the same rays are
+traced together: the sums are bit-identical to those of one process. A worker loads the scene from copies of its files,
+which are sent once and identified by a hash of their content.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from ..transport.integrators import Render
 from ..transport.integrators.progressive import LANES
 from ..transport.passes import Progress
 from ..transport.polarizer import PolarizedRender
-from ..work import crew, facts
+from ..work import executor, facts
 from ..work.kept import Arrays, Facts
 from .prepare import Prepared, prepare
 from .request import Request
 from .request_json import described, request_of
 
-ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the camera's rays
-MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
-LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
-HANDED_OUT = 1 << 17  # samples that a worker does while one part is handed out
-LONGEST_PASS = 2.0  # seconds: nobody presses Ctrl-C on a worker, and a pass takes 15 ms of Python besides
-PARTS = 20  # for each worker at least, so that none waits long for the last
+ALIGNED = 64  # lanes: a multiple of any processor's vector width and of the camera's tiles of rays
+MAX_SAMPLES = 1 << 25  # per part: some seconds on one machine
+MIN_SAMPLES = 1 << 21  # per part: with fewer, sending it costs too much
+SAMPLES_PER_SUBMISSION = 1 << 17  # samples that a worker traces while one part is submitted
+MAX_PASS = 2.0  # seconds: a worker need not react to Ctrl-C, and each pass costs 15 ms of Python
+PARTS = 20  # per worker at least, so that no worker idles long at the end
 
 
 class Gathered:
-    """What a crew has sent so far, as `checkpoints.Keeper` sees a render."""
+    """The results received from workers so far, with the interface of a render, for `checkpoints.Keeper`."""
 
     def __init__(self, render: Render, wanted: int) -> None:
         self._render, self._wanted = render, wanted
@@ -58,19 +58,19 @@ class Gathered:
 
     @property
     def samples(self) -> int:
-        """Of all lanes together."""
+        """Samples so far, summed over all lanes."""
         return int(self.arrays[LANES].sum(dtype=np.int64))
 
     @property
     def pixels(self) -> int:
         return len(self.arrays[LANES])
 
-    def taken(self, lanes: slice) -> int:
-        """Samples of these lanes so far."""
+    def samples_in(self, lanes: slice) -> int:
+        """Samples so far, summed over these lanes."""
         return int(self.arrays[LANES][lanes].sum(dtype=np.int64))
 
     def put(self, lanes: slice, arrays: Arrays) -> None:
-        """Take the sums of a part that is done."""
+        """Store the sums of a finished part."""
         for name, values in arrays.items():
             self.arrays[name][lanes] = values
         self.arrays[LANES][lanes] = self._wanted
@@ -79,14 +79,14 @@ class Gathered:
         return {name: values.copy() for name, values in self.arrays.items()}
 
     def give(self) -> None:
-        """Make it what the render has."""
+        """Copy the sums into the render."""
         self._render.restore(self.done, self.arrays)
 
     def advance(self, count: int) -> None:
-        raise NotImplementedError("a crew does that")
+        raise NotImplementedError("workers advance it")
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        raise NotImplementedError("the render does that")
+        raise NotImplementedError("restore the render instead")
 
     def image(self) -> NDArray[np.float32]:
         self.give()
@@ -106,10 +106,11 @@ def advance(
     finished: Callable[[int], None] = lambda index: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Have a crew bring every lane of some renders to their samples; why it ended, as `passes.run` has it.
+    """Advance every lane of some renders to their sample counts on the workers; return the reason for the end, as
+    `passes.run` does.
 
     report    called after each part, with the progress of all renders together
-    finished  called with the number of a render whose last part is there
+    finished  called with the index of a render when its last part has arrived
     """
     begin, parts, arguments = clock(), [], []
     files: dict[str, Path] = {}
@@ -120,7 +121,7 @@ def advance(
         spec, named = travelling(prepared)
         files |= named
         done = gathered.arrays[LANES]
-        cuts = _cut(done, prepared.spp, part_size(total, crew.current().size))
+        cuts = _cut(done, prepared.spp, part_size(total, executor.current().size))
         left.append(len(cuts))
         for lanes in cuts:
             first = int(done[lanes.start])
@@ -128,11 +129,11 @@ def advance(
             arguments.append((spec, lanes.start, lanes.stop, first, prepared.spp, start))
             parts.append((number, lanes))
     before = now = sum(gathered.samples for _, gathered in jobs)
-    with contextlib.closing(crew.each(part, arguments, files=files)) as results:
+    with contextlib.closing(executor.each(part, arguments, files=files)) as results:
         for index, arrays in results:
             if index >= 0:
                 number, lanes = parts[index]
-                now += arguments[index][4] * (lanes.stop - lanes.start) - jobs[number][1].taken(lanes)
+                now += arguments[index][4] * (lanes.stop - lanes.start) - jobs[number][1].samples_in(lanes)
                 jobs[number][1].put(lanes, arrays)
                 rate = max(now - before, 1) / max(clock() - begin, 1e-9)
                 report(Progress(now // pixels, total // pixels, rate, (total - now) / rate))
@@ -149,13 +150,13 @@ def advance(
 
 
 def part_size(total: int, workers: int) -> int:
-    """Samples of a part, of so many in all: small enough for all to have some, large enough that whoever hands them
-    out keeps up, which takes 10 ms or so for each (`benchmarks/cluster.py`)."""
-    return min(max(total // (PARTS * workers), LEAST_SAMPLES, workers * HANDED_OUT), MOST_SAMPLES)
+    """Samples per part for `total` samples in all: few enough to occupy all workers, many enough that submitting parts,
+    at about 10 ms each, keeps pace with the workers (`benchmarks/cluster.py`)."""
+    return min(max(total // (PARTS * workers), MIN_SAMPLES, workers * SAMPLES_PER_SUBMISSION), MAX_SAMPLES)
 
 
 def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
-    """Ranges of lanes that still need samples, each of lanes that have as many; of about so many samples."""
+    """Ranges of lanes that still need samples, about `samples` each; all lanes of a range have equally many so far."""
     pixels = len(done)
     step = max(samples // wanted // ALIGNED, 1) * ALIGNED
     edges = sorted({*range(0, pixels, step), *(np.flatnonzero(np.diff(done)) + 1).tolist(), pixels})
@@ -164,9 +165,9 @@ def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
 
 
 def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
-    """A prepared render as text that a worker can make again, and the files that go with it, by content hash.
+    """A prepared render as text from which a worker can rebuild it, and the files that it needs, by content hash.
 
-    Raises InputError for what cannot travel.
+    Raises InputError for a render that cannot be distributed.
     """
     request, where = prepared.request, "cluster"
     if not isinstance(prepared.render, Render):
@@ -188,22 +189,20 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
             if not path.resolve().is_relative_to(folder):
                 raise InputError(f"'{name}' lies outside the scene's folder", where, "copy it there: it has to travel")
     places = {str(path.resolve()): facts.file_hash(path) for path in named.values()}
-    found = {"request": described(replace(request, output=None, threads=None)), "folder": folder}
-    text = json.dumps({**found, "files": places}, sort_keys=True)
+    payload = {"request": described(replace(request, output=None, threads=None)), "folder": folder}
+    text = json.dumps({**payload, "files": places}, sort_keys=True)
     return text, {content: Path(path) for path, content in places.items()}
 
 
-# ---------------------------------------------------------------------- where a part is done
+# ---------------------------------------------------------------------- on the worker
 
-_last: dict[
-    str, tuple[Prepared, tempfile.TemporaryDirectory[str]]
-] = {}  # the scene that is loaded; parts follow each other
-_copies: dict[str, Path] = {}  # of its files, by the paths that whoever asked has them at
-_rates: dict[str, float] = {}  # samples a second that its last part made
+_last: dict[str, tuple[Prepared, tempfile.TemporaryDirectory[str]]] = {}  # the loaded scene; consecutive parts share it
+_copies: dict[str, Path] = {}  # of its files, by their paths on the machine that submitted the job
+_rates: dict[str, float] = {}  # samples per second of its last part
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
-    """The sums of lanes [begin, end) with samples [first, last), added to those that were there."""
+    """The sums of lanes [begin, end): samples [first, last) added to `start`."""
     with _places_as_given():
         render = _prepared(spec).render
         assert isinstance(render, Render)
@@ -215,13 +214,13 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
         def remember(progress: Progress) -> None:
             _rates[spec] = progress.rate
 
-        passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * LONGEST_PASS / lanes), report=remember)
+        passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * MAX_PASS / lanes), report=remember)
         return {name: np.array(values) for name, values in render.state().items()}
 
 
 @contextlib.contextmanager
 def _places_as_given() -> Iterator[None]:
-    """An error names the files of whoever asked for the job, not their copies here."""
+    """Make errors name the files of the machine that submitted the job, not their copies here."""
     try:
         yield
     except Exception as error:
@@ -252,14 +251,14 @@ def _unpacked(known: Facts, folder: Path) -> Request:
     """The request, with its files in a folder of this machine."""
     text = json.dumps(known["request"])
     for path, content in known["files"].items():
-        # code finds what it imports beside it
+        # so that Python files find the modules that they import from their folder
         inside = os.path.relpath(path, known["folder"] or Path(path).anchor)
         target = folder / inside
         _copies[path] = target
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(crew.file(content), target)
+        shutil.copyfile(executor.file(content), target)
         text = text.replace(json.dumps(path)[1:-1] + ":", json.dumps(str(target))[1:-1] + ":")  # FILE.py:CLASS
     known_request = json.loads(text)
     if known["folder"]:
         known_request["scene"] = str(folder / os.path.relpath(known_request["scene"], known["folder"]))
-    return request_of(known_request, "cluster", allow_code=True)  # whoever asked for the job has allowed it
+    return request_of(known_request, "cluster", allow_code=True)  # allowed on the machine that submitted the job

@@ -38,8 +38,8 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         for x in range(TILES)
         for z in range(TILES)
     ]
-    beside = {"type": "parallelogram", "base": [-3.5, 4.5, 1.0], "edge0": [1.4, 0, 1.4], "edge1": [0, 1.2, 0]}
-    behind = {"type": "parallelogram", "base": [2.2, 2.0, -3.5], "edge0": [1.5, 0, 0], "edge1": [0, 1.5, 0]}
+    side_lamp = {"type": "parallelogram", "base": [-3.5, 4.5, 1.0], "edge0": [1.4, 0, 1.4], "edge1": [0, 1.2, 0]}
+    rear_lamp = {"type": "parallelogram", "base": [2.2, 2.0, -3.5], "edge0": [1.5, 0, 0], "edge1": [0, 1.5, 0]}
     return {
         "output": {"filename": f"{name}.png"},
         "sampler": {"type": "independent", "samples": 64},
@@ -53,8 +53,8 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         "scene": {
             "shapes": [{"type": "sphere", "center": [0, 1, 0], "radius": 1, "material": material}, *floor],
             "lights": [
-                {"type": "areaLight", "energy": [14, 14, 14], "shape": beside},
-                {"type": "areaLight", "energy": [7, 7.4, 8], "shape": behind},
+                {"type": "areaLight", "energy": [14, 14, 14], "shape": side_lamp},
+                {"type": "areaLight", "energy": [7, 7.4, 8], "shape": rear_lamp},
                 {"type": "environmentLight", "radiance": [0.35, 0.38, 0.42]},
             ],
         },

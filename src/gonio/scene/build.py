@@ -28,7 +28,7 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-MANY = 64  # from so many materials of one structure on one stands for them
+MERGE_FROM = 64  # from so many materials of one structure on one stands for them
 
 # Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
 # format's +y, +z, +x: u about y from z toward x, v from +y.
@@ -40,7 +40,7 @@ def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
     """
-    return built(description, mi, gathers=True).scene
+    return built(description, mi, merge_materials=True).scene
 
 
 @dataclass(frozen=True)
@@ -51,17 +51,17 @@ class Built:
     bsdfs: Mapping[MaterialPart, BSDFPlugin]
 
 
-def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> Built:
+def built(description: schema.SceneDescription, mi: ModuleType, merge_materials: bool = False) -> Built:
     """As `build`, with the materials, for who changes them.
 
-    gathers  let one BSDF, which is in no list, stand for very many materials that differ in numbers alone
+    merge_materials  let one BSDF, which is in no list, stand for very many materials that differ in numbers alone
     """
-    builder = _Builder(description, mi, gathers)
+    builder = _Builder(description, mi, merge_materials)
     return Built(builder.scene(), builder.bsdfs)
 
 
 class _Builder:
-    def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool) -> None:
+    def __init__(self, description: schema.SceneDescription, mi: ModuleType, merge_materials: bool) -> None:
         from ..bridge import adapter
         from ..transport.lights import lights  # here, since they start Dr.Jit
 
@@ -71,12 +71,13 @@ class _Builder:
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
-        self.gathers = gathers and fast.enabled() and mi.variant().endswith("rgb")  # spectra are upsampled one by one
+        # spectral variants upsample colors one by one
+        self.merge_materials = merge_materials and fast.enabled() and mi.variant().endswith("rgb")
         self.gathered: dict[MaterialPart, tuple[BSDFPlugin, Group, int]] = {}
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
-        if self.gathers:
+        if self.merge_materials:
             self.gather()
         shapes: PluginDict = {"type": "merge"}
         for index, shape in enumerate(self.description.shapes):
@@ -93,12 +94,12 @@ class _Builder:
         compute_boxes(merged)
         for index, one in enumerate(sorted(merged, key=shape_key)):
             scene[one.id() or f"merged{index}"] = one
-        found = self.load(scene, "/scene", optimize=False)
+        loaded = self.load(scene, "/scene", optimize=False)
         if self.gathered:
             from ..transport.fast import by_shape
 
-            by_shape.bind(self.mi, found, {id(group): group for _, group, _ in self.gathered.values()}.values())
-        return found
+            by_shape.bind(self.mi, loaded, {id(group): group for _, group, _ in self.gathered.values()}.values())
+        return loaded
 
     def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
         """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
@@ -189,8 +190,8 @@ class _Builder:
         """Mitsuba's own exact shape, where it has one."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
-            turned = shape.transform.rotate
-            axes = _SPHERE_AXES if turned is None else turned.matrix() @ _SPHERE_AXES
+            rotation = shape.transform.rotate
+            axes = _SPHERE_AXES if rotation is None else rotation.matrix() @ _SPHERE_AXES
             to_world[:3, :3] = shape.radius * axes
             to_world[:3, 3] = matrix[:3, :3] @ shape.center + matrix[:3, 3]
             return {"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world)}
@@ -233,7 +234,7 @@ class _Builder:
         for index, shape in enumerate(self.description.shapes):
             if shape.material is not None and isinstance(shape, (schema.Sphere, schema.Parallelogram)):
                 places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
-        if len(places) < MANY:
+        if len(places) < MERGE_FROM:
             return
         from ..transport.fast import by_shape
 
@@ -246,7 +247,7 @@ class _Builder:
                 group.rows.append(dict(by_shape.properties(plugin)))
                 members.append(material)
         for group, members in groups.values():
-            if len(members) < MANY:
+            if len(members) < MERGE_FROM:
                 continue
             try:
                 bsdf = self.load(group.plugin(self.mi), places[members[0]])
@@ -321,8 +322,8 @@ class _Builder:
     def leaning(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
         """A plugin inside one of those that lean its normal."""
         maps = (textures.bitmap(self.mi, values[..., [axis]], "bilinear", "repeat") for axis in (0, 1))
-        found = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
-        return {**found, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
+        perturbed = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
+        return {**perturbed, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
 
     def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
         """The image's own values."""

@@ -45,14 +45,14 @@ def along(description: SceneDescription, built: Built, path: str) -> Along:
     name = parameter if channel is None else head
     if name not in known:
         raise InputError(f"no parameter '{parameter}'", where, did_you_mean(parameter, [*known]))
-    found = Along(plugin, name, channel)
+    target = Along(plugin, name, channel)
     if channel is not None and known[name].kind != "spectrum":
         raise InputError(f"'{name}' is no colour", where, "leave the channel out")
-    if found.slot.textures:
+    if target.slot.textures:
         raise InputError("a texture gives this value", where, "give the material a plain number")
     if known[name].kind == "angle" or name.rpartition(".")[2] in ("absorption", "priority"):
         raise InputError(f"'{name}' has no derivative here", where, "name a width, a colour or an index")
     if model.delta != "never" or model.stochastic:
         what = "mirrors and smooth glass turn light by an index" if not model.stochastic else "its values are random"
         raise InputError(f"{what}: no derivative", where, "name a material that is rough")
-    return found
+    return target

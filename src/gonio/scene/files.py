@@ -9,10 +9,10 @@ from ..catalog import documents
 from ..errors import InputError, did_you_mean
 
 
-def located(file: str, beside: Path, where: str, allow_outside: bool = False) -> Path:
+def located(file: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
     """The path of a file that something in a folder names. InputError where it is missing or outside the folder."""
     file = documents.inside(file)[0]
-    return checked(Path(beside, file), file, beside, where, allow_outside)
+    return checked(Path(folder, file), file, folder, where, allow_outside)
 
 
 def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool = False) -> Path:

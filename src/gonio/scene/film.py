@@ -9,7 +9,7 @@ from ..errors import InputError
 # Per pixel: 9 sums in float64, twice (before and after a pass), lane order, picture as float64 and float32, the
 # file's bytes. It is the estimate by which a film is refused as too large.
 BYTES_PER_PIXEL = 250
-LONGEST_SIDE = 1 << 16  # pixels
+MAX_SIDE = 1 << 16  # pixels
 
 
 def check_film(size: tuple[int, int], where: str) -> None:
@@ -22,8 +22,8 @@ def check_film(size: tuple[int, int], where: str) -> None:
         gib = 1 << 30
         what = f"a film of {width}x{height} needs about {needed / gib:.0f} GiB"
         raise InputError(f"{what}, this machine has {memory() / gib:.0f} GiB", where, "give a smaller size")
-    if max(width, height) > LONGEST_SIDE:
-        what = f"a film of {width}x{height} is longer than {LONGEST_SIDE} pixels"
+    if max(width, height) > MAX_SIDE:
+        what = f"a film of {width}x{height} is longer than {MAX_SIDE} pixels"
         raise InputError(what, where, "give a smaller size")
 
 

@@ -143,21 +143,21 @@ class MaterialPart(Part):
 
     def arguments(self) -> dict[str, Argument]:
         """Parameter name -> value, for all that the file gives and all that the lab fixes."""
-        found: dict[str, Argument] = {}
+        arguments: dict[str, Argument] = {}
         if self.lab:
-            found.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
+            arguments.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
         for key, parameter in self.declared.items():
             if (value := self.get(key)) is not None:
-                found[parameter.name] = Argument(value, key)
+                arguments[parameter.name] = Argument(value, key)
         for dial, width in self.dials.items():
             if (value := self.get(dial)) is not None:
-                found[width] = Argument(value, dial, squared=True)
-        return found
+                arguments[width] = Argument(value, dial, squared=True)
+        return arguments
 
     @property
     def preset(self) -> str | None:
-        found: str | None = self.__dict__.get(_attribute("preset"))
-        return found
+        preset: str | None = self.__dict__.get(_attribute("preset"))
+        return preset
 
     def code(self) -> list[Path]:
         """The Python files of the user's that it runs: its own, those of a distribution, a masking term, ..., and what
@@ -233,9 +233,10 @@ class MaterialPart(Part):
         if self.preset is None:
             return
         sets = {name for preset in self.model.presets().values() for name in preset.values}
-        taken = [key for key, p in self.declared.items() if p.name in sets and self.get(key) is not None]
-        if taken:
-            raise invalid(f"both 'preset' and '{taken[0]}' are given", f"a preset sets {taken[0]}; keep one", "preset")
+        conflicting = [key for key, p in self.declared.items() if p.name in sets and self.get(key) is not None]
+        if conflicting:
+            what = f"both 'preset' and '{conflicting[0]}' are given"
+            raise invalid(what, f"a preset sets {conflicting[0]}; keep one", "preset")
         try:
             self.model.preset(self.preset)
         except InputError as error:
@@ -491,23 +492,23 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
     except GonioError as error:
         what = f"{error.where}: {error.what}" if error.where else error.what
         raise invalid(what, error.hint, "file") from None
-    fields: Any = _beside(documents.for_scenes(described.notation), Path(part.file).parent)
+    fields: Any = _relative_to_scene(documents.for_scenes(described.notation), Path(part.file).parent)
     if part.two_sided is not None:
         fields["two_sided"] = part.two_sided
-    found = _own(fields, info)
-    found._source, found._notices = part.file, described.notices
-    return found
+    material = _own(fields, info)
+    material._source, material._notices = part.file, described.notices
+    return material
 
 
-def _beside(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
+def _relative_to_scene(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
     """The notation with files that start from the scene's folder."""
-    found: dict[str, object] = {}
+    relative: dict[str, object] = {}
     for key, value in notation.items():
         if key == "file":
-            found[key] = (folder / str(value)).as_posix()
+            relative[key] = (folder / str(value)).as_posix()
         else:
-            found[key] = _beside(value, folder) if isinstance(value, dict) else value
-    return found
+            relative[key] = _relative_to_scene(value, folder) if isinstance(value, dict) else value
+    return relative
 
 
 def _tag(value: object) -> str | None:

@@ -3,7 +3,7 @@
 Disk, cone and cylinder are tessellated with exact normals and texture coordinates at the vertices. A full turn has
 `SEGMENTS` = 1024 segments: points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface, and
 dp/du, constant over a segment, is off by up to pi/1024 = 0.18 degrees, as are normals near a cone's apex; u is off by
-up to half a segment, 1/2048, near the centre of a disk and the apex of a cone.
+up to half a segment, 1/2048, near the center of a disk and the apex of a cone.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def disk(radius: float, inner_radius: float, phi_max: float) -> Triangles:
-    """In z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the centre."""
+    """In z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the center."""
     return _revolved(
         phi_max, rings=[(radius, 0.0, 0.0), (inner_radius, 0.0, 1.0 - inner_radius / radius)], slope=(0.0, 1.0)
     )
@@ -214,10 +214,10 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
     normals = mesh.normals
     if normals is not None:
         short = np.linalg.norm(normals, axis=1) < 1e-12
-        if short.any():  # some exporters write 0 0 0; there the faces around give the normal
-            around = np.zeros_like(normals)
-            np.add.at(around, faces.ravel(), np.repeat(crossed, 3, axis=0))
-            normals = np.where(short[:, None], around, normals)
+        if short.any():  # some exporters write 0 0 0; the adjacent faces give the normal there
+            face_normals = np.zeros_like(normals)
+            np.add.at(face_normals, faces.ravel(), np.repeat(crossed, 3, axis=0))
+            normals = np.where(short[:, None], face_normals, normals)
         normals = _unit(normals)
     return replace(mesh, faces=faces, normals=normals)
 
@@ -233,7 +233,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
         raise InputError(f"{path.name}:{line}: {what}", where, hint)
 
     def corner(token: bytes, line: int) -> tuple[int, int, int]:
-        found = [-1, -1, -1]
+        indices = [-1, -1, -1]
         for slot, text in enumerate(token.split(b"/")[:3]):
             if not text and slot > 0:
                 continue
@@ -246,8 +246,8 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
             if number == 0 or not 0 <= index < count:
                 kind = ("vertex", "texture coordinate", "normal")[slot]
                 refuse(line, f"the face names {kind} {number}, {count} are given above it", "numbers start at 1")
-            found[slot] = index
-        return found[0], found[1], found[2]
+            indices[slot] = index
+        return indices[0], indices[1], indices[2]
 
     for number, line in enumerate(data.split(b"\n"), start=1):
         words = line.split()

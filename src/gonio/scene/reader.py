@@ -19,7 +19,7 @@ from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
 
-SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
+MAX_SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
 
 
 def read(
@@ -55,14 +55,14 @@ def read(
     description._raw = raw
     if names_output:
         _check_output(description)
-    seen: dict[MaterialPart, list[tuple[str, str]]] = {}
+    checked: dict[MaterialPart, list[tuple[str, str]]] = {}
     for where, part in parts(description):
         if (name := part.__dict__.get("file")) is not None:
             description.locate(name, f"{where}/file")
         if isinstance(part, MaterialPart):
-            if part not in seen:
-                seen[part] = _check_material(description, where, part)
-            description._warnings += [f"{description.where(where + key)}: {text}" for key, text in seen[part]]
+            if part not in checked:
+                checked[part] = _check_material(description, where, part)
+            description._warnings += [f"{description.where(where + key)}: {text}" for key, text in checked[part]]
     return description
 
 
@@ -170,15 +170,15 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
     """The first error with place, expectation and hint; the next few in a line each."""
-    found: dict[str, tuple[str, str]] = {}
+    problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
         where, what, hint = _one(detail, raw)
-        found.setdefault(where, (what, hint))
-    (where, (what, hint)), *others = found.items()
+        problems.setdefault(where, (what, hint))
+    (where, (what, hint)), *others = problems.items()
     lines = [what]
-    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: SHOWN - 1]]
-    if len(others) >= SHOWN:
-        lines.append(f"and {len(others) - SHOWN + 1} more")
+    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: MAX_SHOWN - 1]]
+    if len(others) >= MAX_SHOWN:
+        lines.append(f"and {len(others) - MAX_SHOWN + 1} more")
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 

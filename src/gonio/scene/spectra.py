@@ -58,8 +58,8 @@ def _relative(light: LightSpectrum) -> Floats:
         rise = np.expm1(SECOND_RADIATION / (reference * light.temperature))
         return (reference / GRID) ** 5 * rise / np.expm1(SECOND_RADIATION / (GRID * light.temperature))
     if isinstance(light, values.Led):
-        found = [h * np.exp(-4.0 * np.log(2.0) * ((GRID - at) / width) ** 2) for at, width, h in light.peaks]
-        return np.sum(found, axis=0)
+        peaks = [h * np.exp(-4.0 * np.log(2.0) * ((GRID - at) / width) ** 2) for at, width, h in light.peaks]
+        return np.sum(peaks, axis=0)
     assert isinstance(light, values.MeasuredLight), "there are no others"
     return np.interp(GRID, light.wavelengths, light.values, left=0.0, right=0.0)
 
@@ -69,5 +69,5 @@ def _observer() -> Floats:
     from ..transport.scene_data import CIE_Y_INTEGRAL
 
     mi = engine.load()
-    found = mi.cie1931_xyz(mi.Float(GRID.astype(np.float32)))
-    return np.array([np.asarray(row, np.float64) for row in (found.x, found.y, found.z)]) / CIE_Y_INTEGRAL
+    observer = mi.cie1931_xyz(mi.Float(GRID.astype(np.float32)))
+    return np.array([np.asarray(row, np.float64) for row in (observer.x, observer.y, observer.z)]) / CIE_Y_INTEGRAL

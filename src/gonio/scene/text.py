@@ -73,8 +73,8 @@ class _Object(dict[str, Json]):
         super().__init__(pairs)
         self.twice: list[str] = []
         if len(self) < len(pairs):
-            seen: set[str] = set()
-            self.twice = [key for key, _ in pairs if key in seen or seen.add(key)]  # type: ignore[func-returns-value]
+            earlier: set[str] = set()
+            self.twice = [key for key, _ in pairs if key in earlier or earlier.add(key)]  # type: ignore[func-returns-value]
 
 
 class _NotFinite(str):

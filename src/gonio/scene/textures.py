@@ -1,4 +1,4 @@
-"""Images that a scene names: bounded, decoded to linear float32, and handed to Mitsuba as textures."""
+"""Images of a scene: their size is checked, they are decoded to linear float32 and passed to Mitsuba as textures."""
 
 from __future__ import annotations
 
@@ -35,26 +35,26 @@ def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | Non
             name, content = f"{name}#{inside}", _inside(path, inside)
             path = Path(stack.enter_context(TemporaryDirectory())) / "image"  # Mitsuba reads files
             path.write_bytes(content)
-        values, whole = _decoded(path, content, name, where)
+        values, integers = _decoded(path, content, name, where)
     if channel == "a":
         values = values[..., -1:] if values.shape[2] in (2, 4) else np.ones_like(values[..., :1])
     else:
         values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # without alpha
-        if whole and srgb:
+        if integers and srgb:
             values = images.from_screen(values)
         if channel is not None and values.shape[2] == 3:
             values = values[..., ["rgb".index(channel)]]
     values = np.ascontiguousarray(values, np.float32)
     if not np.isfinite(values).all():
         row, column = np.argwhere(~np.isfinite(values))[0][:2]
-        raise InputError(f"'{name}' is not finite at row {row}, column {column}", where, "mend the image")
+        raise InputError(f"'{name}' is not finite at row {row}, column {column}", where, "correct the image")
     return values
 
 
 def _inside(path: Path, index: str) -> bytes:
-    found = documents.parted(str(path))
-    assert found is not None, "the name says so"
-    return found[0].image(path, index)
+    document = documents.parted(str(path))
+    assert document is not None, "the name says so"
+    return document[0].image(path, index)
 
 
 def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decoded:
@@ -68,8 +68,8 @@ def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decod
 
 
 def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDict:
-    """A Mitsuba texture of values that are linear already. v = 0 is the top row there too."""
-    # With `raw` a colour reaches the material as it stands; spectral variants must make a spectrum of it.
+    """A Mitsuba texture of values that are already linear; v = 0 is the top row, as in Mitsuba."""
+    # With `raw`, a color reaches the material unchanged; spectral variants must convert it to a spectrum.
     raw = values.shape[2] == 1 or not mi.variant().endswith("spectral")
     return {
         "type": "bitmap",
@@ -83,10 +83,10 @@ def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDi
 def environment(mi: ModuleType, values: RGB) -> PluginDict:
     """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) is u = p/2pi, v = t/pi.
 
-    Mitsuba's `envmap` differs in two ways. It runs the other way round, (sin p, -cos p): mirrored left to right, and
-    turned by half a turn. And its rows lie at v = j/(h - 1), the poles included, not at (j + .5)/h: the rows are laid
-    out at twice the density, row 2j + 1 being row j, those between them means. A mean lies on the line between its
-    neighbours, so that linear interpolation is unchanged.
+    Mitsuba's `envmap` differs in two ways. Its azimuth runs the other way, (sin p, -cos p), so that the image is
+    mirrored left to right and rotated by half a turn. Its rows lie at v = j/(h - 1), including the poles, instead of
+    (j + 0.5)/h. The rows are therefore laid out at twice the density: row 2j + 1 is row j, and each row between two of
+    them is their mean, so that linear interpolation is unchanged.
     """
     values = np.broadcast_to(values, (*values.shape[:2], 3))
     rows = np.empty((2 * values.shape[0] + 1, values.shape[1], 3), np.float32)

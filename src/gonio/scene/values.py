@@ -22,7 +22,7 @@ from pydantic_core import PydanticCustomError
 from .text import kind_of
 
 VISIBLE = (380.0, 780.0)  # nm
-LARGEST = 1e18  # its square still fits a 32-bit float, so that lengths of vectors stay finite
+MAX_NUMBER = 1e18  # its square still fits a 32-bit float, so that lengths of vectors stay finite
 
 
 def invalid(what: str, hint: str, key: str = "") -> PydanticCustomError:
@@ -68,19 +68,19 @@ def _not_a_flag(value: object) -> object:
     return value
 
 
-def _whole(value: object) -> object:
+def _integer(value: object) -> object:
     # JSON does not tell 8 from 8.0
     return int(value) if isinstance(value, float) and value.is_integer() else _not_a_flag(value)
 
 
 def _bounded(value: float) -> float:
-    if abs(value) > LARGEST:
-        raise invalid(f"{value:g} is too large", f"numbers go up to {LARGEST:g}, what 32-bit arithmetic can square")
+    if abs(value) > MAX_NUMBER:
+        raise invalid(f"{value:g} is too large", f"numbers go up to {MAX_NUMBER:g}, what 32-bit arithmetic can square")
     return value
 
 
 Number = Annotated[float, Strict(), BeforeValidator(_not_a_flag), AfterValidator(_bounded)]
-Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
+Whole = Annotated[int, Strict(), BeforeValidator(_integer)]
 Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 

@@ -53,7 +53,7 @@ class MitsubaRender:
         weighted = picture.astype(np.float64) * samples
         if self._sum is not None and self._sum.shape != weighted.shape:
             what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
-            raise InputError(what, "checkpoint", "render anew without it")
+            raise InputError(what, "checkpoint", "render again without it")
         self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += samples
@@ -77,7 +77,7 @@ class MitsubaRender:
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
-        with garbage.kept():
+        with garbage.paused():
             tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
             return np.array(tensor, dtype=np.float32)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..catalog import outside
-from ..work import crew, facts, parts
+from ..work import executor, facts, parts
 from ..work.kept import Arrays
 from .isolation import child
 from .report import Report, significance
@@ -38,7 +38,7 @@ def trial(
 ) -> Report:
     """As `child.trial`, by the current executor of parts."""
     # Several processes here share the targets; quick looks end before anything could be lost.
-    if not crew.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
+    if not executor.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     began = time.perf_counter()
     names = {str(path): path for item in task.items for path in _files(item)}
@@ -70,7 +70,7 @@ def _judged(
     keys = [parts.key_of(one, threshold, sorted(hashes.items()), facts.code(), facts.versions()) for one in ones]
     files = {content: Path(name) for name, content in hashes.items()}
     judged: dict[int, list[Card]] = {}
-    for index, arrays in crew.each(part, arguments, keys, files):
+    for index, arrays in executor.each(part, arguments, keys, files):
         if index >= 0:
             # from the user's own folder, or from a worker that executes what it receives anyway
             judged[numbers[index]] = pickle.loads(arrays["cards"].tobytes())
@@ -97,7 +97,7 @@ def part(
         for name, content in hashes.items():
             if facts.file_hash(Path(name)) != content and isinstance(item.target, str):  # on another machine
                 copy = Path(folder, Path(name).name)
-                shutil.copyfile(crew.file(content), copy)
+                shutil.copyfile(executor.file(content), copy)
                 settings = tuple(text.replace(name, str(copy)) for text in item.settings)
                 item = item._replace(target=item.target.replace(name, str(copy)), settings=settings)
         report = child.trial(task._replace(items=[item]), limit=limit, memory=memory, threshold=threshold)

@@ -25,14 +25,14 @@ from ..errors import GonioWarning, InputError, encodable
 from ..material import BSDF
 from ..owner import public
 from ..pictures import exposures, images
-from ..render.execute import by_crew, execute
+from ..render.execute import execute, execute_all
 from ..render.finish import picture_of
 from ..render.options import RenderKeywords, takes_render_options
 from ..render.prepare import Prepared, prepare
 from ..render.request import Request
 from ..render.request_json import described
 from ..transport import passes
-from ..work import crew, parts
+from ..work import executor, parts
 from . import figures
 from .figures import Drawing
 from .sheet_layout import draw
@@ -151,7 +151,7 @@ def render_sheet(
     with passes.Interrupts() as interrupts, parts.job("study", *identity) as job:
         if job.found:
             tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
-        together = 2 * crew.current().size if crew.current().remote else 1  # of a crew each needs enough to do
+        together = 2 * executor.current().size if executor.current().remote else 1  # keeps every worker busy
         for start in range(0, len(cells), together):
             some = cells[start : start + together]
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
@@ -198,8 +198,8 @@ def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes
         pictures[key] = picture_of(one.render, one.request.denoise)
         job.put(key, {"picture": pictures[key]})
 
-    if crew.current().remote and missing:
-        by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
+    if executor.current().remote and missing:
+        execute_all([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
         interrupts.check()
     else:
         for number, (key, one) in enumerate(missing):

@@ -1,2 +1,2 @@
-"""Long work that nothing may undo: files of arrays that are whole or refused, parts of a job that are done once, and
-the crew that does them: this process, or a cluster."""
+"""Long jobs that survive interruptions: files of arrays that are complete or rejected, parts of a job that are computed
+once, and the executor that runs them: this process or a cluster."""

@@ -1,11 +1,11 @@
-"""Many processes, here or on many machines, by Dask. Dask is asked for only when a cluster is.
+"""Clusters: worker processes on this machine or on several, by Dask, which is imported only when a cluster is opened.
 
     with Cluster(workers=4):                          # processes of this machine
-    with Cluster("tcp://10.0.0.7:8786"):              # whatever has joined that scheduler
+    with Cluster("tcp://10.0.0.7:8786"):              # the workers that have joined that scheduler
 
-The part of a worker that fails, freezes or cannot be reached is done again by another one, and the first answer counts,
-since all answers have the same bits. A part that fails by its input fails the job, and is not tried again. A worker of
-another version of Gonio, or with another processor, would not give the same bits, and is refused by name.
+If a worker fails, freezes or cannot be reached, another one repeats its part, and the first result counts, since all
+results are bit-identical. A part that fails because of its input fails the job and is not repeated. A worker with
+another version of Gonio or another kind of processor would give different bits and is rejected by name.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GonioError, GonioWarning, InputError, MachineError
-from . import crew, garbage, reachable
+from . import executor, garbage, reachable
 from .kept import Arrays
 
 if TYPE_CHECKING:
@@ -36,31 +36,33 @@ if TYPE_CHECKING:
     from distributed.security import Security
 
 INSTALL = "pip install 'gonio[cluster]'"
-LOOK = 0.2  # seconds between two looks at who is alive and whether somebody wants to stop
-AHEAD = 4  # parts that each worker is given: one that it does, and what it goes on with while answers travel
-PATIENCE = 5.0  # seconds that a part may take longer than others before another worker is asked for it too
-FEW = 3.0  # times the median of the others that it may take
-SILENT = 8.0  # seconds without a sign of life after which a worker is given nothing more
-FROZEN = 30.0  # and after which one of this machine is ended, and another started
-MOST_COPIES = 5
-TOGETHER = 64  # results taken at once
-FETCH = 20.0  # seconds for that
-DEATHS = 3  # of workers while they did a part, after which it is the part's fault
-ANSWER = 10.0  # seconds for a scheduler to answer
-NOBODY = 60.0  # seconds to wait for the first worker
-PACE = 30.0  # seconds between starts of workers that have no core of their own: a start takes one of two cores 2.5 s
+POLL_INTERVAL = 0.2  # seconds between checks of the workers and for an interrupt
+PARTS_PER_WORKER = 4  # parts per worker: the one it computes, and others to continue with while results are sent
+MAX_DELAY = 5.0  # seconds that a part may take longer than usual before it is also given to another worker
+MAX_SLOWDOWN = 3.0  # multiple of the median time that a part may take in addition
+SILENT_AFTER = 8.0  # seconds without a heartbeat after which a worker gets no more parts
+FROZEN_AFTER = 30.0  # seconds without a heartbeat after which a local worker is killed and replaced
+MAX_COPIES = 5
+MAX_FETCHED = 64  # results fetched at once, at most
+FETCH_TIMEOUT = 20.0  # seconds that this may take
+MAX_LOSSES = 3  # workers that may be lost while they compute the same part; with one more, the part counts as the cause
+CONNECT_TIMEOUT = 10.0  # seconds to wait for a scheduler to answer
+JOIN_TIMEOUT = 60.0  # seconds to wait for the first worker
+START_INTERVAL = (
+    30.0  # seconds between starts of workers beyond the number of cores: each start occupies a core for 2.5 s
+)
 
 
 class Cluster:
-    """Workers of this machine, or those of a Dask scheduler; a context manager, inside which they do the parts.
+    """Workers of this machine or of a Dask scheduler; a context manager, inside which they run the parts of jobs.
 
-    address  of a scheduler, "tcp://host:8786" or "tls://..."
-    workers  so many processes of this machine instead; as many as it has cores at once, the others one by one while
-             the job goes on, since they take from those at work
-    security what Dask wants for a scheduler with TLS; Dask's own configuration where None
-    wait     seconds to wait for the first worker of a scheduler, which is told; then MachineError
-    Raises InputError for both or neither, and for what is no address, MachineError where Dask is missing or nobody
-    answers.
+    address   address of a scheduler, "tcp://host:8786" or "tls://..."
+    workers   number of processes to start on this machine instead; as many as it has cores start at once, the others
+              one by one while the job runs, since a start slows the running workers down
+    security  Dask's `Security` for a scheduler with TLS; None uses Dask's own configuration
+    wait      seconds to wait, with a warning, for the first worker of a scheduler; then MachineError is raised
+    Raises InputError for both or neither of `address` and `workers`, and for an invalid address; MachineError if Dask
+    is not installed or no scheduler answers.
     """
 
     remote = True
@@ -71,7 +73,7 @@ class Cluster:
         *,
         workers: int | None = None,
         security: Security | None = None,
-        wait: float = NOBODY,
+        wait: float = JOIN_TIMEOUT,
     ) -> None:
         if (address is None) == (workers is None):
             raise InputError("a cluster is an address or a number of workers", "cluster", "give one of the two")
@@ -89,9 +91,9 @@ class Cluster:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._begun = 0.0
         self._sent: set[str] = set()
-        self._told = False  # that it waits for a worker
+        self._warned = False  # whether the warning that it waits for a worker was issued
         self._stack = contextlib.ExitStack()
-        self.silent: dict[str, float] = {}  # seconds since each worker gave a sign of life, when it was last looked at
+        self.silent: dict[str, float] = {}  # seconds since each worker's last heartbeat, at the last check
         self.restarts = self.copies = 0
 
     # ------------------------------------------------------------------ open and close
@@ -103,10 +105,10 @@ class Cluster:
 
         quiet: dict[str, object] = {"distributed.scheduler.allowed-failures": 1000}
         quiet |= {"distributed.comm.timeouts.connect": "10s", "distributed.admin.low-level-log-length": 0}
-        # A worker that computes does not answer for a while; one that is frozen has its parts done by others anyway.
+        # A computing worker may not answer for a while; the parts of a frozen one are given to others anyway.
         quiet |= {"distributed.scheduler.worker-ttl": "300s"}
         self._stack.enter_context(dask.config.set(quiet))
-        garbage.pause()  # Dask has threads
+        garbage.pause()  # Dask runs threads
         self._stack.callback(garbage.resume)
         try:
             if self._wanted is not None:
@@ -121,21 +123,23 @@ class Cluster:
                 self._address = self._local.scheduler_address
                 self._processes = [self._start() for _ in range(min(self._wanted, _cores()))]
                 self._begun = time.monotonic()
-            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the errors are told here, in one line
-            self._client = _client(self._address, security=self._security, timeout=ANSWER, set_as_default=False)
-        except Exception as error:  # whatever a library makes of what answers
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported here, in one line
+            self._client = _client(
+                self._address, security=self._security, timeout=CONNECT_TIMEOUT, set_as_default=False
+            )
+        except Exception as error:  # libraries raise many kinds, depending on what answers
             self.close()
             text = " ".join(str(error).split())[:200]
             what = f"no scheduler answers: {text}"
             raise MachineError(what, str(self._address or "--workers"), "see docs/cluster.md") from error
-        self._stack.enter_context(crew.working(self))
+        self._stack.enter_context(executor.using(self))
         return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """End what was started here."""
+        """Stop the workers and the scheduler that were started here, and disconnect."""
         for process in self._processes:
             process.kill()
         self._stack.close()
@@ -149,7 +153,7 @@ class Cluster:
         self._processes = []
 
     def _start(self) -> subprocess.Popen[bytes]:
-        """A worker of this machine."""
+        """Start a worker on this machine."""
         assert self._wanted is not None and self._security is not None
         code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.work import worker; worker.serve()"
         process = subprocess.Popen([sys.executable, "-P", "-c", code], stdin=subprocess.PIPE, start_new_session=True)
@@ -161,14 +165,14 @@ class Cluster:
         assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             process.stdin.write(json.dumps(order).encode() + b"\n")
-            process.stdin.flush()  # and open it stays: when it ends, this process has, and so does the worker
+            process.stdin.flush()  # it stays open: when this process ends, the pipe closes and the worker ends too
         return process
 
-    # ------------------------------------------------------------------ who is there
+    # ------------------------------------------------------------------ workers
 
     @property
     def size(self) -> int:
-        """How many workers there are, or are to be."""
+        """Number of workers, including those yet to be started."""
         return self._wanted or max(len(self._alive()), 1)
 
     def _workers(self) -> dict[str, Any]:
@@ -176,26 +180,28 @@ class Cluster:
         return dict(self._client.scheduler_info(n_workers=-1)["workers"])
 
     def _alive(self) -> list[str]:
-        """Workers that have given a sign of life."""
+        """The workers with a recent heartbeat."""
         self.silent = {name: time.time() - one["last_seen"] for name, one in self._workers().items()}
-        return [name for name, seconds in self.silent.items() if seconds < SILENT]
+        return [name for name, seconds in self.silent.items() if seconds < SILENT_AFTER]
 
     def _check(self) -> Iterator[None]:
-        """Wait for the first worker, and look around while there is none. Raise MachineError where none comes, and one
-        that names a worker with another version, before it is given anything."""
+        """Wait for the first worker, yielding while there is none.
+
+        Raise MachineError if none joins in time, and, before any part is submitted, for a worker with another version.
+        """
         if self._wanted is not None:
             return
         assert self._client is not None
         started = time.monotonic()
         while not self._alive():
-            if not self._told:
-                self._told = True
+            if not self._warned:
+                self._warned = True
                 text = f"no worker has joined {self._address} yet: waiting for one, {self._wait:g} s at most"
                 warnings.warn(text, GonioWarning, stacklevel=2)
             if time.monotonic() - started > self._wait:
                 what = f"no worker has joined the scheduler within {self._wait:g} s"
                 raise MachineError(what, str(self._address), f"start `dask worker {self._address}`")
-            time.sleep(LOOK)
+            time.sleep(POLL_INTERVAL)
             yield
         from . import worker
 
@@ -203,12 +209,12 @@ class Cluster:
         for name, other in self._client.run(worker.about_or_why, on_error="return").items():
             worker.compare(own, other, str(name))
 
-    # ------------------------------------------------------------------ the work
+    # ------------------------------------------------------------------ jobs
 
     def run(
-        self, function: crew.Function, arguments: Sequence[tuple[crew.Argument, ...]], files: Mapping[str, Path]
+        self, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """As `Crew.run`; (-1, {}) where nothing was done for a while."""
+        """As `Executor.run`; (-1, {}) if no part has finished for a while."""
         if not arguments:
             return
         for _ in self._check():
@@ -224,7 +230,7 @@ class Cluster:
             job.cancel()
 
     def _send(self, files: Mapping[str, Path]) -> None:
-        """Files by content, once to each worker, also to those that join later."""
+        """Send files by content, once to each worker, including those that join later."""
         assert self._client is not None
         from . import worker
 
@@ -234,9 +240,11 @@ class Cluster:
                 self._sent.add(name)
 
     def _revive(self) -> None:
-        """Start a worker in place of one that has died, end one that is frozen, and start one that is still to come."""
-        if any(seconds > FROZEN for seconds in self.silent.values()):
-            names = {str(one["name"]) for one in self._workers().values() if time.time() - one["last_seen"] > FROZEN}
+        """Replace workers that have failed or frozen, and start the next one that is still missing."""
+        if any(seconds > FROZEN_AFTER for seconds in self.silent.values()):
+            names = {
+                str(one["name"]) for one in self._workers().values() if time.time() - one["last_seen"] > FROZEN_AFTER
+            }
             for process in self._processes:
                 if str(process.pid) in names:
                     process.kill()
@@ -247,12 +255,12 @@ class Cluster:
                 self.restarts += 1
                 self._processes[index] = self._start()
         more = len(self._processes) - _cores() + 1
-        if len(self._processes) < (self._wanted or 0) and time.monotonic() - self._begun > more * PACE:
+        if len(self._processes) < (self._wanted or 0) and time.monotonic() - self._begun > more * START_INTERVAL:
             self._processes.append(self._start())
 
 
 def _client(address: str | None, **options: object) -> Client:
-    """A client of the scheduler; where it cannot connect, it is kept from waiting 20 seconds for a farewell."""
+    """A client of the scheduler. If it cannot connect, mark it closed, since closing it would take 20 seconds."""
     from distributed import Client
 
     client = Client.__new__(Client)
@@ -269,10 +277,10 @@ def _cores() -> int:
 
 
 class _Job:
-    """The parts of one call of `run`: which are out, to whom, since when."""
+    """The parts of one call of `run`: which are submitted, to which workers, and since when."""
 
     def __init__(
-        self, cluster: Cluster, function: crew.Function, arguments: Sequence[tuple[crew.Argument, ...]]
+        self, cluster: Cluster, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]]
     ) -> None:
         assert cluster._client is not None
         self.cluster, self.client, self.function, self.arguments = cluster, cluster._client, function, arguments
@@ -280,28 +288,28 @@ class _Job:
         self.missing = set(self.waiting)
         self.out: dict[int, list[Future]] = {}
         self.since: dict[int, float] = {}
-        self.deaths: dict[int, int] = {}
+        self.losses: dict[int, int] = {}
         self.took: list[float] = []
         self.answers: queue.Queue[tuple[int, Future]] = queue.Queue()
         self.ready: deque[tuple[int, Arrays]] = deque()
         from . import worker
 
         self.about, self.do = worker.about(), worker.do
-        self.looked = 0.0
+        self.checked_at = 0.0
         self.alive: list[str] = []
 
     def hand_out(self) -> None:
-        """Give each worker enough to do, and what takes too long to a second one."""
-        while self.waiting and len(self.out) < AHEAD * self.cluster.size:
+        """Submit enough parts for every worker, and submit parts that take too long a second time."""
+        while self.waiting and len(self.out) < PARTS_PER_WORKER * self.cluster.size:
             self._submit(self.waiting.popleft())
         now = time.monotonic()
-        if now - self.looked < 1.0:
+        if now - self.checked_at < 1.0:
             return
-        self.looked = now
+        self.checked_at = now
         self.alive = self.cluster._alive()
         usual = statistics.median(self.took) if self.took else 60.0
-        for index in [i for i in self.out if now - self.since[i] > FEW * usual * AHEAD + PATIENCE]:
-            if len(self.out[index]) < MOST_COPIES:
+        for index in [i for i in self.out if now - self.since[i] > MAX_SLOWDOWN * usual * PARTS_PER_WORKER + MAX_DELAY]:
+            if len(self.out[index]) < MAX_COPIES:
                 self.cluster.copies += 1
                 self._submit(index)
 
@@ -317,19 +325,19 @@ class _Job:
         future.add_done_callback(lambda done: self.answers.put((index, done)))
 
     def next(self) -> tuple[int, Arrays]:
-        """A part that is done; (-1, {}) where none is for a while."""
+        """Index and result of a finished part; (-1, {}) if none has finished for a while."""
         if not self.ready:
             self._fetch()
         return self.ready.popleft() if self.ready else (-1, {})
 
     def _fetch(self) -> None:
-        """Take what is done from the workers that have it, all at once: one by one takes four times as long."""
+        """Fetch all finished results at once: one by one takes four times as long."""
         try:
-            answers = [self.answers.get(timeout=LOOK)]
+            answers = [self.answers.get(timeout=POLL_INTERVAL)]
         except queue.Empty:
             return
         with contextlib.suppress(queue.Empty):
-            while len(answers) < TOGETHER:
+            while len(answers) < MAX_FETCHED:
                 answers.append(self.answers.get_nowait())
         done: dict[int, Future] = {}
         for index, future in answers:
@@ -343,8 +351,8 @@ class _Job:
             return
         try:
             fetch = self.client._gather
-            results = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
-        except Exception:  # one of the workers died, or froze, with what it had: ask for each again, elsewhere
+            results = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH_TIMEOUT)
+        except Exception:  # a worker failed or froze and its results are lost: compute each part again elsewhere
             for index in done:
                 self._failed(index, TimeoutError())
             return
@@ -356,7 +364,7 @@ class _Job:
             self.ready.append((index, arrays))
 
     def _failed(self, index: int, error: BaseException) -> None:
-        """Raise what the part itself has raised; give it to another where its worker was lost."""
+        """Raise the error that the part itself raised; submit the part again if its worker was lost."""
         from asyncio import CancelledError
 
         from distributed.client import FutureCancelledError
@@ -365,9 +373,9 @@ class _Job:
         lost = isinstance(error, KilledWorker | FutureCancelledError | CancelledError | TimeoutError | OSError)
         if not lost or isinstance(error, GonioError):
             raise error
-        self.deaths[index] = self.deaths.get(index, 0) + 1
-        if self.deaths[index] > DEATHS:
-            raise MachineError(f"{DEATHS + 1} workers were lost over one part", "cluster", "see what they print")
+        self.losses[index] = self.losses.get(index, 0) + 1
+        if self.losses[index] > MAX_LOSSES:
+            raise MachineError(f"{MAX_LOSSES + 1} workers were lost over one part", "cluster", "see what they print")
         self._submit(index)
 
     def cancel(self) -> None:

@@ -1,4 +1,4 @@
-"""What the bits of a result depend on besides its input: the version and code of Gonio, and what computes."""
+"""What the bits of a result depend on besides its input: the version and code of Gonio, and the processor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PACKAGES = (  # whose code results depend on
 
 
 def versions() -> str:
-    """Gonio's and those of what it computes with."""
+    """The versions of Gonio, Mitsuba and Dr.Jit."""
     return ", ".join([f"gonio {__version__}", *(f"{name} {_version(name)}" for name in ("mitsuba", "drjit"))])
 
 
@@ -30,16 +30,16 @@ def _version(name: str) -> str:
 
 @lru_cache
 def code() -> str:
-    """Hash of Gonio's code that results depend on: a checkout changes between two versions, too."""
+    """A hash of the code of Gonio that results depend on; a checkout also changes between two versions."""
     package = Path(__file__).parent.parent
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in sorted(p for name in PACKAGES for p in (package / name).rglob("*.py")):
-        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return found.hexdigest()
+        digest.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def processor() -> str:
-    """The processor as far as rounding goes, and the LLVM that compiles for it."""
+    """The properties of the processor that affect rounding, and the version of LLVM that compiles for it."""
     import drjit as dr
 
     llvm = ".".join(map(str, dr.detail.llvm_version()))
@@ -48,7 +48,7 @@ def processor() -> str:
 
 @lru_cache
 def _vectors() -> str:
-    """The vector instructions of this processor, where the system tells."""
+    """The vector instructions of this processor, if the system reports them."""
     try:
         flags = set(Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
     except OSError:
@@ -57,7 +57,7 @@ def _vectors() -> str:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, "missing" where there is none."""
+    """SHA-256 of a file's content, "missing" if it cannot be read."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,7 +1,7 @@
-"""No garbage is collected where that would crash.
+"""Suspend garbage collection where it would crash.
 
-Python collects cycles wherever it happens to be. Where one holds a scene, Mitsuba takes its objects off Dr.Jit's
-lists: in the middle of a kernel that is being traced, or in another thread, that is a segmentation fault now and then.
+Python may collect cycles at any allocation. If a cycle holds a scene, Mitsuba removes its objects from Dr.Jit's
+registry. While a kernel is being traced, or in another thread, this occasionally causes a segmentation fault.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _was_on = False
 
 
 def pause() -> None:
-    """Collect nothing until `resume` has been called as often."""
+    """Suspend collection until `resume` has been called as often as `pause`."""
     global _pauses, _was_on
     with _lock:
         if _pauses == 0:
@@ -27,7 +27,7 @@ def pause() -> None:
 
 
 def resume() -> None:
-    """Collect again, if it was so before."""
+    """Undo one `pause`; the last one restores the former state."""
     global _pauses
     with _lock:
         _pauses -= 1
@@ -36,8 +36,8 @@ def resume() -> None:
 
 
 @contextlib.contextmanager
-def kept() -> Iterator[None]:
-    """Nothing is collected inside."""
+def paused() -> Iterator[None]:
+    """Suspend garbage collection inside the `with` block."""
     pause()
     try:
         yield

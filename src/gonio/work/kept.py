@@ -1,14 +1,13 @@
-"""Facts and arrays in one file, whole or not at all, which says itself whether it is undamaged.
+"""Files of facts and arrays that are written completely or not at all, and that detect damage.
 
-    "gonio kept 1\\n"   what it is
+    "gonio kept 1\\n"   magic number
     8 bytes            length of the header, little-endian
     header             JSON: {"facts": ..., "arrays": [[name, dtype, shape], ...]}
     arrays             one after the other, little-endian, in C order
-    4 bytes            CRC-32 of all before
+    4 bytes            CRC-32 of everything before
 
-A file that was cut short has another length than its header says, and damage shows in the sum. The file before is kept
-beside it as NAME.previous: whatever happens to the newest one, the one before is there. Nothing that is read here is
-ever run.
+A truncated file differs in length from what its header says, and the checksum detects damage. The preceding file
+remains beside it as NAME.previous, in case the newest one is damaged. Nothing that is read here is ever executed.
 """
 
 from __future__ import annotations
@@ -29,16 +28,16 @@ from numpy.typing import NDArray
 from .. import files
 from ..errors import InputError
 
-Facts: TypeAlias = dict[str, Any]  # what JSON holds
+Facts: TypeAlias = dict[str, Any]  # anything that JSON can hold
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 _MAGIC = b"gonio kept 1\n"
 _TYPES = ("float64", "float32", "int64", "uint32", "uint8", "bool")
-_CHUNK = 1 << 24  # bytes at a time, so that a sum needs no second copy
+_CHUNK = 1 << 24  # bytes at a time, so that the checksum needs no second copy
 
 
 class Kept(NamedTuple):
-    """What a file holds."""
+    """The content of a file."""
 
     facts: Facts
     arrays: Arrays
@@ -47,11 +46,11 @@ class Kept(NamedTuple):
 def write(
     path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous: bool = False, durable: bool = True
 ) -> None:
-    """Write the file; at every moment the old one or the new one is there.
+    """Write the file; at any time, either the old or the new one exists.
 
-    previous  keep the file that was there as NAME.previous
-    durable   force it to the disk
-    Raises MachineError where the disk is full, TypeError for an array of another type than a file can have.
+    previous  keep the existing file as NAME.previous
+    durable   flush it to the disk
+    Raises MachineError if the disk is full, TypeError for an array of a type that a file cannot hold.
     """
     parts = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for name, array in parts.items():
@@ -77,7 +76,7 @@ def write(
     files.write_whole(newest, fill, rescue=False, durable=durable)
     if path.exists():
         os.replace(path, _previous(path))
-    os.replace(newest, path)  # a death just before leaves the one before, under its other name
+    os.replace(newest, path)  # if the process ends just before this, NAME.previous remains
 
 
 def _bytes(array: NDArray[Any]) -> memoryview:
@@ -90,20 +89,22 @@ def _previous(path: Path) -> Path:
 
 
 def remove(path: Path) -> None:
-    """Remove the file, and what is kept beside it."""
+    """Remove the file, NAME.previous and unfinished files."""
     newest = files.with_ending(path, ".next")
-    left = path.parent.glob(f".{glob.escape(newest.name)}.*.part.next")  # of a process that was killed while it wrote
+    left = path.parent.glob(
+        f".{glob.escape(newest.name)}.*.part.next"
+    )  # left by a process that was killed while it wrote
     for name in (path, _previous(path), newest, *left):
         name.unlink(missing_ok=True)
 
 
 def exists(path: Path) -> bool:
-    """Whether there is such a file, or the one before it."""
+    """Whether the file or NAME.previous exists."""
     return os.path.isfile(path) or os.path.isfile(_previous(path))
 
 
 def read(path: Path) -> Kept:
-    """What the file holds, or the one before where it is damaged. Raises InputError where neither can be used."""
+    """The content of the file, or of NAME.previous if it is damaged. Raises InputError if neither can be used."""
     problem = None
     for name in (path, _previous(path)):
         try:

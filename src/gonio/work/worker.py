@@ -1,4 +1,4 @@
-"""What runs on a worker of a cluster: parts, the files that they read, and the check that it is the same Gonio."""
+"""Code that runs on the workers of a cluster: parts of jobs, the files that they read, and a check of versions."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ from distributed import Worker, WorkerPlugin, get_worker
 from distributed.security import Security
 
 from ..errors import MachineError
-from . import crew, facts
+from . import executor, facts
 from .kept import Arrays
 
-_one = threading.Lock()  # Dr.Jit has one owner, also where a worker was given several threads
+_one = threading.Lock()  # only one thread may use Dr.Jit, even if a worker has several
 
 
-def do(function: crew.Function, arguments: tuple[crew.Argument, ...], wanted: dict[str, str]) -> tuple[float, Arrays]:
-    """One part, and the seconds that it took."""
+def do(
+    function: executor.Function, arguments: tuple[executor.Argument, ...], wanted: dict[str, str]
+) -> tuple[float, Arrays]:
+    """Run one part; returns the seconds that it took and its result."""
     with _one:
         gc.disable()  # see `cluster.Cluster`: garbage is collected below, in this thread
         started = time.perf_counter()
@@ -35,8 +37,8 @@ def do(function: crew.Function, arguments: tuple[crew.Argument, ...], wanted: di
         with contextlib.suppress(ValueError):
             worker = get_worker()
             name = str(worker.address)
-            found = {p.content_hash: p.path for p in worker.plugins.values() if isinstance(p, File)}
-            crew._files.set(found)
+            paths = {p.content_hash: p.path for p in worker.plugins.values() if isinstance(p, File)}
+            executor._files.set(paths)
         compare(wanted, about(), name)
         try:
             return time.perf_counter() - started, function(*arguments)
@@ -45,7 +47,7 @@ def do(function: crew.Function, arguments: tuple[crew.Argument, ...], wanted: di
 
 
 def about() -> dict[str, str]:
-    """What must be the same on all workers, by what a person calls it."""
+    """The properties that must agree on all workers, by the names that errors use."""
     python = ".".join(map(str, sys.version_info[:2]))
     return {
         "version": f"{facts.versions()}, Python {python}",
@@ -55,13 +57,15 @@ def about() -> dict[str, str]:
 
 
 def about_or_why() -> dict[str, str]:
+    """As `about`; if that fails, the reason in place of the version."""
     try:
         return about()
-    except Exception as error:  # no Gonio of this kind there
+    except Exception as error:  # the Gonio there has another interface, or none is installed
         return {"version": f"none that answers ({type(error).__name__}: {error})"}
 
 
 def compare(own: Mapping[str, str], other: object, name: str) -> None:
+    """Raise MachineError, with the worker's name, if its `about` differs from ours."""
     if not isinstance(other, dict):
         raise MachineError(
             f"worker {name} has no Gonio that answers: {other}", "cluster", "there: pip install 'gonio[cluster]'"
@@ -75,7 +79,7 @@ def compare(own: Mapping[str, str], other: object, name: str) -> None:
 
 
 class File(WorkerPlugin):
-    """Dask's worker plugin that holds one file by its content."""
+    """A plugin of a Dask worker that provides one file, identified by a hash of its content."""
 
     def __init__(self, content_hash: str, content: bytes) -> None:
         self.content_hash, self.content, self.path = content_hash, content, Path()
@@ -92,14 +96,14 @@ class File(WorkerPlugin):
 
 
 def serve() -> None:
-    """A worker of `Cluster(workers=...)`, which ends with the process that started it."""
+    """Run a worker of `Cluster(workers=...)` until the process that started it ends."""
     order = json.loads(sys.stdin.buffer.readline())
 
-    def outlive() -> None:
+    def end_with_parent() -> None:
         sys.stdin.buffer.read()
         os._exit(0)
 
-    threading.Thread(target=outlive, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     import drjit as dr
 
     gc.disable()
@@ -128,8 +132,8 @@ def serve() -> None:
             await worker
             await worker.finished()
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the one who asks is told of errors
-    # nor does anybody read Dask's logs and profiles here
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported to the client
+    # Dask's logs and profiles would not be read here
     dask.config.set({"distributed.admin.low-level-log-length": 0, "distributed.worker.profile.enabled": False})
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(work())

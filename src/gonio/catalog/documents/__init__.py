@@ -148,10 +148,10 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     source  FILE or FILE:MATERIAL
     output  .json, or a document's suffix
     """
-    found = parted(source)
-    if found is None:
+    operand = parted(source)
+    if operand is None:
         raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
-    described = read(*found)
+    described = read(*operand)
     files.check_file(output)
     if output.suffix.lower() == ".json":
         text = json.dumps(for_scenes(described.notation), indent=2) + "\n"

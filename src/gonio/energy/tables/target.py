@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...ops import backend
-from ...work import crew, parts
+from ...work import executor, parts
 from .. import cache
 from ..albedo import quadrature
 from .axes import Axes, Points
@@ -92,10 +92,10 @@ def glass_power(
     return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, mu, alpha, eta, nodes=nodes), -1)}
 
 
-def together(function: crew.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
+def together(function: executor.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
     """The concatenated results of all parts."""
     keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
-    done = {index: values for index, values in crew.each(function, arguments, keys) if index >= 0}
+    done = {index: values for index, values in executor.each(function, arguments, keys) if index >= 0}
     return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
 
 

@@ -80,7 +80,7 @@ class Render:
         # A newly loaded camera and a moved one hold the same numbers in arrays of different order, which would give two
         # kernels; this call puts both into the second state.
         self.sensor.parameters_changed()
-        with dr.suspend_grad(), garbage.kept():
+        with dr.suspend_grad(), garbage.paused():
             self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
@@ -112,7 +112,7 @@ class Render:
         mi = self.mi
         # Dr.Jit would record each loop again without its invariant variables: LLVM eliminates these anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
-        with dr.suspend_grad(), garbage.kept(), interruptible(), unchanged:
+        with dr.suspend_grad(), garbage.paused(), interruptible(), unchanged:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
