@@ -111,7 +111,7 @@ def test_saturated_values_are_left_out_and_told() -> None:
     assert cells.out["saturated"] > 100 and (cells.value < 2.0 * cells.wi[:, 2:]).all()
     found = fit(cells, "lambert+ggx")
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.02)
-    assert any("saturated and left out" in note for note in found.notes)
+    assert any("saturated and excluded" in note for note in found.notes)
     assert found.as_dict()["left_out"] == cells.out
 
 
@@ -160,14 +160,14 @@ def test_what_the_data_do_not_tell_is_said() -> None:
     held = {f"{part}.{name}": tree.value_at(twice, f"{part}.{name}") for part in "ab" for name in ("eta", "k", "alpha")}
     found = fit(cells, twice, free=shares, param=held)
     assert np.isinf(found.errors).all()
-    assert any("do not tell a.albedo.r and b.albedo.r from each other" in note for note in found.notes)
+    assert any("only a combination of a.albedo.r and b.albedo.r" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(("model", "gone"), [("lambert+lambert", "b.albedo"), ("lambert+ward", "b.diffuse")])
 def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
     found = fit(table(go.Lambert((0.3, 0.2, 0.1)), shape=(12, 12, 16)), model)
     assert not any(name.startswith(gone) for name in found.names)
-    assert f"{gone} is held at 0: a.albedo does the same" in found.notes
+    assert f"{gone} is held at 0: a.albedo has the same effect" in found.notes
     np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
@@ -228,7 +228,7 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
     ("call", "words"),
     [
         (lambda t: fit(t, "lambert", loss="other"), "unknown metric"),
-        (lambda t: fit(t, "lambert+"), "no sum of materials"),
+        (lambda t: fit(t, "lambert+"), "is not a sum of materials"),
         (lambda t: fit(t, "lambert", lobes=0), "0 lobes"),
         (lambda t: fit(t, "lambert", param={"rough": 1.0}), "rough"),
         (lambda t: fit(t, "lambert", param={"albedo": 0.3}), "nothing is left"),

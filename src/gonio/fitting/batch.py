@@ -1,4 +1,4 @@
-"""Fits of several models to several files, each kept when it is done."""
+"""Fits of several models to several files; each result is stored as soon as it is ready."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import files as whole
 from ..catalog import operands
 from ..catalog.operands import Kind
 from ..errors import InputError
+from ..files import check_file, write_whole
 from ..measure import names_table, read
 from ..work import parts
 from .data import GRAZING, data_of
@@ -23,12 +23,12 @@ from .fit import Fit, fit, ranked
 
 @dataclass(frozen=True)
 class Row:
-    """One file.
+    """The fits to one file.
 
-    file    its path
-    fits    of each model, as `Fit.as_dict` has them, the best first
-    best    the best one itself, where it was fitted now
-    failed  why nothing came of it, in words
+    file    path of the file
+    fits    one entry per model, as returned by `Fit.as_dict`, best first
+    best    the best fit; None if the entries come from an earlier run
+    failed  reason for the failure; empty if the fits succeeded
     """
 
     file: str
@@ -41,25 +41,25 @@ class Row:
 
 
 def files_of(named: Sequence[str]) -> list[str]:
-    """The files that are named, those in a folder among them, by name. InputError where there is none."""
-    found: list[str] = []
+    """Paths of the named files and of all measurement files in named folders. InputError if there are none."""
+    paths: list[str] = []
     for text in named:
         folder = Path(os.path.expanduser(text))
         if operands.kind_of(str(folder), {Kind.TABLE, Kind.FOLDER}, "DATA") is Kind.FOLDER:
             inside = sorted(str(path) for path in folder.iterdir() if names_table(path.name) and path.is_file())
             if not inside:
-                raise InputError("no file of measurements in it", text, "such as .binary, .bsdf or .gonio")
-            found += inside
+                raise InputError("the folder contains no measurement file", text, "such as .binary, .bsdf or .gonio")
+            paths += inside
         else:
-            found.append(text)
-    return found
+            paths.append(text)
+    return paths
 
 
 def check_output(path: Path) -> Path:
-    """Raise InputError where the result cannot be written."""
+    """Return the path, or raise InputError if the result cannot be written there."""
     if path.suffix.lower() != ".json":
         raise InputError(f"'{path.suffix}' given, .json expected", str(path), "such as -o fit.json")
-    return whole.check_file(path)
+    return check_file(path)
 
 
 def run(
@@ -74,7 +74,7 @@ def run(
     report: Callable[[int, int, str], None] = lambda done, total, text: None,
     notice: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
-    """Each model fitted to each file. Of one file an error is raised; of several it becomes the row's `failed`."""
+    """Fit each model to each file. An error is raised for a single file; with several files it goes into `failed`."""
     given = dict(fixed or {})
     how = (tuple(models), lobes, metric, tuple(sorted(given.items())), free, grazing)
     job = parts.Parts("fit", how, tuple(files)) if len(files) > 1 else None
@@ -84,9 +84,9 @@ def run(
     for number, file in enumerate(files):
         report(number, len(files), Path(file).name)
         key = _key(how, file)
-        kept = job.get(key) if job is not None else None
-        if kept is not None:
-            rows.append(Row(file, tuple(json.loads(str(kept.facts["fits"])))))
+        stored = job.get(key) if job is not None else None
+        if stored is not None:
+            rows.append(Row(file, tuple(json.loads(str(stored.facts["fits"])))))
             continue
         try:
             cells = data_of(read(file), grazing, file)
@@ -111,7 +111,7 @@ def run(
 
 
 def _key(how: tuple[object, ...], file: str) -> str:
-    """What a fit depends on: the question and the file's state."""
+    """Cache key of a fit: its settings and the size and time stamp of the file."""
     path = Path(os.path.expanduser(file.rpartition(":")[0] if not Path(file).exists() and ":" in file else file))
     try:
         state = path.stat()
@@ -121,10 +121,10 @@ def _key(how: tuple[object, ...], file: str) -> str:
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """The rows as JSON, whole or not at all."""
-    found = [row.as_dict() for row in rows]
-    text = json.dumps(found[0] if len(found) == 1 else found, indent=1, default=_plain)
-    whole.write_whole(path, (text + "\n").encode())
+    """Write the rows as JSON, atomically."""
+    entries = [row.as_dict() for row in rows]
+    text = json.dumps(entries[0] if len(entries) == 1 else entries, indent=1, default=_plain)
+    write_whole(path, (text + "\n").encode())
 
 
 def _plain(value: object) -> object:

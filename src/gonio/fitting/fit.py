@@ -1,4 +1,4 @@
-"""A material fitted to measurements."""
+"""Fit a material to measurements."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ from .parameters import NAMES, Free, with_values
 from .solver import METRICS, Problem, Solution, solve
 from .starts import starts_of
 
-FEW = 6000  # values from which starts are judged
-SOME = 60_000  # from which the best start goes on
-SOLVED = 8  # of them that are followed by the metric itself on a few values
-ENDS = 3  # of them that are followed to their end
-SAME = 1e-4  # relative difference of two costs from which on two ends are two
+FEW = 6000  # values on which starting points are compared
+SOME = 60_000  # values on which the best solutions are refined
+SOLVED = 8  # starting points that are refined with the metric itself on few values
+ENDS = 3  # solutions that are refined to convergence
+SAME = 1e-4  # relative difference of costs from which two solutions count as distinct
 NORMAL_95 = 1.96
-TIED = 0.98  # correlation from which two numbers are called tied
+TIED = 0.98  # correlation from which two parameters are reported
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What came of a fit.
+    """Result of a fit.
 
-    material     with the fitted values
-    names        of the numbers that moved: "alpha", "eta.r", ...
-    values       theirs, (K,)
-    errors       standard errors, (K,): inf where the data do not tell
+    material     the material with the fitted values
+    names        names of the fitted numbers: "alpha", "eta.r", ...
+    values       fitted numbers, (K,)
+    errors       standard errors, (K,); inf for numbers that the data do not determine
     correlation  (K, K)
-    metric       on which differences were measured, error the root of their mean square on it (of "relative" ones of
-                 the deviance, which is the same where they are small)
+    metric       name of the loss
+    error        root mean square residual in that metric; for "relative", of the deviance
     relative     mean |difference| over mean value of f cos theta_i
-    criterion    Bayesian information criterion: lower is better; more parameters cost
-    count        values that were fitted to
-    notes        what is odd about it
-    seconds      that it took
+    criterion    Bayesian information criterion: lower is better; it penalizes additional parameters
+    count        number of fitted values
+    notes        remarks on the quality of the fit
+    seconds      duration of the fit
     """
 
     material: BSDF
@@ -75,12 +75,12 @@ class Fit:
 
     @property
     def text(self) -> str:
-        """The material as every verb takes it: "sum(a=lambert(albedo=...),b=conductor(...))"."""
+        """Notation of the material, accepted by every verb: "sum(a=lambert(albedo=...),b=conductor(...))"."""
         return notation.written(self.material)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; an error that is not known is null. `notation` is the material as scenes and other files hold it;
-        null where no file can."""
+        """Dictionary for JSON; unknown errors are null. `notation` is the material as written in scene files, else
+        null."""
         return {
             "material": self.text,
             "notation": notation.for_files(self.material),
@@ -122,21 +122,22 @@ def fit(
     grazing: float = GRAZING,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Fit:
-    """Fit a material's parameters to measured values.
+    """Fit the parameters of a material to measured values.
 
         found = go.fit("gold.binary", "lambert+ggx")
         found.material, found.values, found.errors
 
-    data     a file of measurements, a table, or `Data`
-    model    a material, or its name, or a sum of names such as "lambert+ggx"; what it is set to is where the fit starts
-    lobes    how many of the last part are added up
-    loss     "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
-    param    path -> value of parameters that are held
-    free     paths of parameters that move although they stay by themselves: factors that are 1
-    grazing  degrees: values beyond, of either direction, are left out
-    progress  called after each start and at the end, with the loss in words
-    Levenberg and Marquardt from several starts: the widths of lobes, ever more values as it goes on, at last all.
-    Raises InputError for files, models and paths that are none.
+    data      a measurement file, a table, or `Data`
+    model     a material, its name, or a sum of names such as "lambert+ggx"; the fit starts from its parameter values
+    lobes     number of copies of the last part in the sum
+    loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
+    param     path -> value of parameters that stay fixed
+    free      paths of additional parameters to fit that stay fixed by default: scale factors of 1
+    grazing   degrees; values with a direction beyond this angle from the normal are excluded
+    progress  called with a text that states the loss, after each start and at the end
+    The solver is Levenberg-Marquardt from several starts with different lobe widths, first on subsets, finally on all
+    values.
+    Raises InputError for invalid files, models and paths.
     """
     started = time.perf_counter()
     if loss not in METRICS:
@@ -147,24 +148,25 @@ def fit(
     )
     middle = Problem(material, moving, cells.some(SOME), loss)
     best = _best(middle, starts_of(material, moving), progress)
-    whole = middle
+    full = middle
     if len(cells) > SOME:
-        whole = Problem(material, moving, cells, loss, middle.floor, middle.floors)
-        best = solve(whole, best.numbers, steps=2)
+        full = Problem(material, moving, cells, loss, middle.floor, middle.floors)
+        best = solve(full, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
-    return _result(whole, best, loss, time.perf_counter() - started, notes)
+    return _result(full, best, loss, time.perf_counter() - started, notes)
 
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
-    """The least cost that starts lead to. All are followed on a few values by the logarithm, which is smooth from
-    anywhere, then the best by the metric itself, at last the best that differ on all values."""
+    """The solution with the lowest cost over all starts. All starts are refined on few values with the logarithmic
+    metric, which is smooth everywhere, the best of them with the metric itself, and the best distinct solutions on all
+    values."""
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
     rough = _with_data(problem, data, "log") if problem.name == "relative" else few
     begins: list[Floats] = []
     for start in starts:
         end = solve(rough, start, steps=12, tolerance=1e-3).numbers
-        # the logarithm is blind to what its floor hides: where it leads is no better than its start at times
+        # the logarithm ignores values below its floor, so its solution may be worse than the start
         begins.append(min((end, start), key=few.cost))
         progress(f"start {len(begins)}: {np.sqrt(few.cost(begins[-1]) / max(3 * len(data), 1)):.4g}")
     begins.sort(key=few.cost)
@@ -178,20 +180,20 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
 
 
 def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
-    """The same problem on other data, its floors as they are."""
+    """The same problem on other data, with unchanged floors."""
     return Problem(problem.material, problem.free, data, metric, problem.floor, problem.floors)
 
 
 def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes: Sequence[str]) -> Fit:
     data, numbers, cost = problem.data, best.numbers, best.cost
-    hessian, pushes = information(problem.linearized(numbers), data.row, problem.count)
+    hessian, scores = information(problem.linearized(numbers), data.row, problem.count)
     runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
-    sure = certainty(hessian, pushes * np.sqrt(runs / max(runs - problem.count, 1)))
+    sure = certainty(hessian, scores * np.sqrt(runs / max(runs - problem.count, 1)))
     names = tuple(name for one in problem.free for name in one.names)
     material = with_values(problem.material, problem.free, numbers)
     value = material.eval(data.wo, data.wi)
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
-    told = notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold)
+    told = notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.undetermined)
     mean = cost / max(3 * len(data), 1)
     return Fit(
         material,
@@ -220,46 +222,44 @@ def notes_on(
     errors: Floats,
     correlation: Floats,
     names: tuple[str, ...],
-    untold: Sequence[Sequence[int]] = (),
+    undetermined: Sequence[Sequence[int]] = (),
 ) -> list[str]:
-    """What a reader must know before the values are trusted.
+    """Remarks that a reader needs to judge the values.
 
-    untold  groups of numbers of which the data tell at most a combination
+    undetermined  groups of parameter indices of which the data determine at most a combination
     """
     notes, at = [], 0
-    for group in untold:
+    for group in undetermined:
         if len(group) > 1:
             listed = ", ".join(names[k] for k in group[:-1]) + f" and {names[group[-1]]}"
-            notes.append(f"the data do not tell {listed} from each other, only a combination of them: fix one")
-    together = {k for group in untold if len(group) > 1 for k in group}
+            notes.append(f"the data determine only a combination of {listed}: fix one of them")
+    together = {k for group in undetermined if len(group) > 1 for k in group}
     for one in free:
         for k in range(at, at + one.count):
             if not np.isfinite(errors[k]) and k not in together:
-                notes.append(f"the data do not tell {names[k]}")
+                notes.append(f"the data do not determine {names[k]}")
             elif numbers[k] <= one.low or numbers[k] >= one.high:
-                notes.append(f"{names[k]} ends at {numbers[k]:.4g}, an end of its range")
+                notes.append(f"{names[k]} ends at {numbers[k]:.4g}, a bound of its range")
         at += one.count
     size = np.abs(correlation)
     for i, j in itertools.combinations(range(len(names)), 2):
         if size[i, j] > TIED:
-            notes.append(
-                f"{names[i]} and {names[j]} are tied (correlation {correlation[i, j]:.3f}): fix one to tell the other"
-            )
+            notes.append(f"{names[i]} and {names[j]} are tied (correlation {correlation[i, j]:.3f}): fix one of them")
     return notes
 
 
 def _notes_on_data(data: Data) -> list[str]:
-    """What is odd about the values themselves."""
+    """Remarks on the measured values."""
     notes = []
     if data.negative.any():
         share = ", ".join(f"{name} {100.0 * n / len(data):.2g} %" for name, n in zip(NAMES, data.negative, strict=True))
         notes.append(f"{int(data.negative.sum())} of {3 * len(data)} values are negative ({share})")
     for why in ("saturated", "not finite"):
         if why in data.out:
-            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and left out")
+            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and excluded")
     return notes
 
 
 def ranked(fits: Sequence[Fit]) -> list[Fit]:
-    """The best first, by the criterion."""
+    """The fits sorted by the criterion, best first."""
     return sorted(fits, key=lambda one: one.criterion)

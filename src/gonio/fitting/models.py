@@ -1,4 +1,4 @@
-"""What is fitted: a model by name or a sum of such, and which of its parameters move."""
+"""Models to fit: a material by name or a sum of materials, and its free parameters."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SHORT = {
 }
 FIXED = {"ggx": ("k",), "beckmann": ("k",)}
 AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
-GENERIC = 512  # directions at which parameters are compared
+GENERIC = 512  # directions at which the effects of parameters are compared
 
 
 class Model(NamedTuple):
-    """What is fitted: a material, the paths that stay as they are, and others' least values."""
+    """A material, the paths of its fixed parameters, and lower bounds of other parameters."""
 
     material: BSDF
     fixed: tuple[str, ...] = ()
@@ -39,14 +39,15 @@ class Model(NamedTuple):
 def modelled(text: str, lobes: int = 1) -> Model:
     """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
 
-    lobes  how many of the last one are added up. "ggx" and "beckmann" are a microfacet lobe of that distribution with
-    Schlick's Fresnel term of an index without absorption, so that color is all in eta.
+    lobes  number of copies of the last part in the sum
+    "ggx" and "beckmann" are microfacet lobes of that distribution with Schlick's Fresnel term of an index without
+    absorption, so only eta determines the color.
     """
     if lobes < 1:
         raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
     parts = [part.strip() for part in text.split("+")]
     if not all(parts):
-        raise InputError(f"'{text}' is no sum of materials", "model", 'such as "lambert+ggx"')
+        raise InputError(f"'{text}' is not a sum of materials", "model", 'such as "lambert+ggx"')
     parts += parts[-1:] * (lobes - 1)
     made: list[Model] = []
     for part in parts:
@@ -58,25 +59,25 @@ def modelled(text: str, lobes: int = 1) -> Model:
         material = notation.named(spelled)[0]
         given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
         made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
-    whole = made[0]
+    combined = made[0]
     for other in made[1:]:
-        fixed = (*(f"a.{path}" for path in whole.fixed), *(f"b.{path}" for path in other.fixed))
-        least = {f"a.{p}": v for p, v in whole.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
-        whole = Model(Sum(whole.material, other.material), fixed, least)
-    return whole
+        fixed = (*(f"a.{path}" for path in combined.fixed), *(f"b.{path}" for path in other.fixed))
+        least = {f"a.{p}": v for p, v in combined.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
+        combined = Model(Sum(combined.material, other.material), fixed, least)
+    return combined
 
 
 def moving_of(
     model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
 ) -> tuple[BSDF, list[Free]]:
-    """A model with the values that `fixed` holds, and its parameters that move; as `fit` takes them."""
+    """A model with the values of `fixed` set, and its free parameters; arguments as in `fit`."""
     return moving_with_notes(model, lobes, fixed, free)[:2]
 
 
 def moving_with_notes(
     model: str | BSDF, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
 ) -> tuple[BSDF, list[Free], list[str]]:
-    """The same, and what a reader must know of it."""
+    """Like `moving_of`, with notes for the reader of the result."""
     material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
     given = dict(fixed or {})
     if given:
@@ -91,11 +92,12 @@ def moving_with_notes(
 def without_duplicates(
     material: BSDF, moving: list[Free], wanted: Sequence[str] = ()
 ) -> tuple[BSDF, list[Free], list[str]]:
-    """(material, parameters that move, notes): of parameters of several parts that do the same, such as two Lambert
-    parts' albedos, one moves, or those that are `wanted`. The others stay at 0 where the first does without them.
+    """(material, free parameters, notes) without redundant parameters.
 
-    Such are found by the null space of the derivatives at random numbers along random directions, where nothing but
-    the model's own form ties its numbers.
+    Of parameters in several parts with the same effect, such as the albedos of two Lambert parts, one stays free, or
+    those in `wanted`. The others are fixed at 0 if the first keeps its effect without them.
+    Redundancy is detected by the null space of the derivatives at random parameters and random directions, where it can
+    only come from the form of the model.
     """
     parts = {one.path.rpartition(".")[0] for one in moving}
     if len(parts) < 2:
@@ -105,25 +107,30 @@ def without_duplicates(
     notes: list[str] = []
     for group in groups_of(null_space(_generic(material, moving, numbers))):
         same = list(dict.fromkeys(owner[k].path for k in group))
-        kept = next((path for path in same if path in wanted), same[0])
+        retained = next((path for path in same if path in wanted), same[0])
         for path in same:
             one = next((one for one in moving if one.path == path), None)
-            if path == kept or path in wanted or one is None or path.rpartition(".")[0] == kept.rpartition(".")[0]:
+            if (
+                path == retained
+                or path in wanted
+                or one is None
+                or path.rpartition(".")[0] == retained.rpartition(".")[0]
+            ):
                 continue
             zero = (0.0, 0.0, 0.0) if one.count > 1 else 0.0
             without = tree.replace(material, {path: zero}) if one.low == 0.0 and one.kind != "alpha" else None
             rest = [other for other in moving if other.path != path]
-            if without is not None and _moves(without, rest, kept):
+            if without is not None and _moves(without, rest, retained):
                 material = without
-                notes.append(f"{path} is held at 0: {kept} does the same")
+                notes.append(f"{path} is held at 0: {retained} has the same effect")
             else:
-                notes.append(f"{path} is held as it is: {kept} does the same")
+                notes.append(f"{path} is held as it is: {retained} has the same effect")
             moving = rest
     return material, moving, notes
 
 
 def _moves(material: BSDF, moving: list[Free], path: str) -> bool:
-    """Whether a parameter still does something."""
+    """Whether a parameter affects the values of the material."""
     numbers = random_starts(start_of(material, moving), moving)[0]
     diagonal = np.diag(_generic(material, moving, numbers))
     own = [one.path == path for one in moving for _ in range(one.count)]
@@ -131,7 +138,7 @@ def _moves(material: BSDF, moving: list[Free], path: str) -> bool:
 
 
 def _generic(material: BSDF, moving: list[Free], numbers: Floats) -> Floats:
-    """J^T J of a material's values along directions of all kinds."""
+    """J^T J of the values of a material at random directions."""
     w = np.random.default_rng(7).normal(size=(2, GENERIC, 3))
     w[..., 2] = np.abs(w[..., 2]) + 0.1
     w /= np.linalg.norm(w, axis=-1, keepdims=True)

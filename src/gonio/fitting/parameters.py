@@ -1,4 +1,4 @@
-"""What moves in a fit: the numbers of a material, each with its bounds and a scale on which steps are even."""
+"""Free parameters of a fit: numbers of a material, each with bounds and a linear or logarithmic scale."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ..ops import backend
 
 CHANNELS = 3
 NAMES = ("r", "g", "b")
-WIDE = 30.0  # a range whose ends differ by more is stepped through in ratios
-SMALLEST = 1e-3  # of a width, and of what is stepped through in ratios, where the range begins at 0
+WIDE = 30.0  # ranges with a larger ratio of bounds use a logarithmic scale
+SMALLEST = 1e-3  # lower bound of logarithmic parameters whose range begins at 0
 M = TypeVar("M", bound=BSDF)
 
 
 @dataclass(frozen=True)
 class Free:
-    """A parameter that moves.
+    """A free parameter.
 
     path       in the tree of materials
     kind       "float", "spectrum" or "alpha"
-    low, high  its range
-    ratio      whether steps are of its logarithm
+    low, high  range
+    ratio      whether the solver steps its logarithm
     """
 
     path: str
@@ -39,38 +39,37 @@ class Free:
 
     @property
     def count(self) -> int:
-        """Numbers that it has."""
+        """Number of scalar values: 3 for a spectrum, else 1."""
         return CHANNELS if self.kind == "spectrum" else 1
 
     @property
     def names(self) -> list[str]:
-        """Of its numbers."""
+        """Names of its scalar values."""
         return [f"{self.path}.{c}" for c in NAMES] if self.count > 1 else [self.path]
 
 
 def free_of(material: BSDF, fixed: Mapping[str, object], free: tuple[str, ...] = ()) -> list[Free]:
-    """The parameters of a material that a fit may move.
+    """The parameters of a material that a fit may change.
 
-    fixed  paths that stay as they are
-    free   paths that move although they would stay: what is 1 by default and only scales (a conductor's albedo), and
-           turns
-    Raises InputError for a path that is none, and where nothing is left.
+    fixed  paths of parameters that stay fixed
+    free   paths of parameters that are fixed by default: scale factors of 1, such as the albedo of a conductor
+    Raises InputError for an unknown path, and if no parameter remains.
     """
     leaves = [leaf for leaf in tree.surface(material) if leaf.parameter.numeric]
     known = [leaf.path for leaf in leaves]
     for path in (*fixed, *free):
         if path not in [leaf.path for leaf in tree.leaves(material)]:
             raise InputError(f"no parameter '{path}'", type(material).__name__, did_you_mean(path, known))
-    found = []
+    moving = []
     for leaf in leaves:
         parameter = leaf.parameter
         stays = parameter.kind == "angle" or (parameter.high == 1.0 and parameter.default == 1.0)
         if leaf.path in fixed or (stays and leaf.path not in free) or parameter.kind == "angle":
             continue
-        found.append(_free(leaf.path, parameter))
-    if not found:
-        raise InputError("nothing is left to be fitted", type(material).__name__, "fix fewer parameters")
-    return found
+        moving.append(_free(leaf.path, parameter))
+    if not moving:
+        raise InputError("no parameter is left to fit", type(material).__name__, "fix fewer parameters")
+    return moving
 
 
 def _free(path: str, parameter: Parameter) -> Free:
@@ -81,7 +80,7 @@ def _free(path: str, parameter: Parameter) -> Free:
 
 
 def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
-    """The numbers of the free parameters as the material has them, within their ranges."""
+    """Current values of the free parameters, clamped to their ranges."""
     values: list[float] = []
     for one in free:
         value = tree.value_at(material, one.path)
@@ -93,14 +92,14 @@ def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
 
 
 def ranges(free: list[Free]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """(lowest, highest, whether by ratio) of each number."""
+    """(lower bounds, upper bounds, whether logarithmic) of all numbers, (K,) each."""
     many = [(one.low, one.high, one.ratio) for one in free for _ in range(one.count)]
     low, high, ratio = zip(*many, strict=True)
     return np.array(low), np.array(high), np.array(ratio)
 
 
 def with_values(material: M, free: list[Free], numbers: NDArray[np.float64]) -> M:
-    """The material with other numbers."""
+    """The material with new values of its free parameters."""
     values: dict[str, object] = {}
     at = 0
     for one in free:
@@ -111,7 +110,7 @@ def with_values(material: M, free: list[Free], numbers: NDArray[np.float64]) -> 
 
 
 def with_drjit(material: M, free: list[Free], numbers: list[backend.Array], types: backend.Types) -> M:
-    """The material with Dr.Jit's numbers, one entry each."""
+    """The material with Dr.Jit arrays of one entry as its free parameters."""
     values: dict[str, object] = {}
     at = 0
     for one in free:

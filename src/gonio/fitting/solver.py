@@ -1,8 +1,8 @@
-"""Nonlinear least squares by Levenberg and Marquardt, with derivatives from Dr.Jit.
+"""Nonlinear least squares by the Levenberg-Marquardt method, with derivatives from Dr.Jit.
 
-One kernel evaluates the residuals of all data and their derivatives, in forward mode; of a color whose channels do not
-mix in `eval`, one derivative serves all three. The normal equations are then sums over rows, which BLAS makes. A pass
-over 1.46 million cells and six numbers moves some 70 MB, and is bound by that and by exp, log and sqrt.
+One kernel evaluates the residuals of all data and their derivatives, in forward mode; one derivative serves all three
+channels of a color if the channels do not mix in `eval`. BLAS sums the normal equations over rows. A pass over 1.46
+million cells and six parameters moves about 70 MB and is limited by that and by exp, log and sqrt.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from .parameters import CHANNELS, Free, ranges, start_of, with_drjit
 
 Array = backend.Array
 BLOCK = 1 << 16  # rows that BLAS sums in float32 at a time
-SMALL = 1e-3  # of the largest value: where "log" and "relative" turn from relative to absolute
+SMALL = 1e-3  # of the largest value: "log" and "relative" are absolute below, relative above
 NEAR = 0.1  # relative difference under which a series is more accurate than the logarithm in float32
 
 
 # --------------------------------------------------------------------------- metrics
 
 METRICS = {
-    "relative": "difference over the model's own value, which noise of the data cannot bias; its logarithm from 2 on",
+    "relative": "difference over the value of the model, unbiased by noise in the data; logarithmic from a ratio of 2",
     "log": "log(1 + f cos / c), c a thousandth of the brightest value in the data's median channel: nearly relative",
     "log1p": "log(1 + f cos), as Low2012",
-    "cuberoot": "(f cos)^(1/3), near to what eyes see",
+    "cuberoot": "(f cos)^(1/3), close to perceived brightness",
     "linear": "f cos itself, as Ngan2005",
 }
 
 
 def metric(name: str, value: Array, floor: Array) -> Array:
-    """A value on the scale on which differences are measured, of one channel; for "relative" see `deviance`."""
+    """Transform a value of one channel to the scale of the metric; for "relative" see `deviance`."""
     dr = backend.drjit()
     if name in ("linear", "relative"):
         return value
@@ -52,16 +52,16 @@ def metric(name: str, value: Array, floor: Array) -> Array:
 def deviance(model: Array, value: Array, floor: Array) -> Array:
     """Residual r of a model f against a value v, r^2 = 2 rho, of the metric "relative".
 
-    Least squares of (v - f) / (f + c), weighed by the model where it stands, solve sum((v - f) / (f + c)^2 df) = 0.
-    These are the quasi-likelihood's equations for a standard deviation in proportion to f + c (Wedderburn1974), however
-    the noise is distributed: they have the truth for a root if v is right in the mean. But nothing is minimized by
-    them: a model of 0 has as good a root. What has that derivative is the deviance of the gamma distribution,
+    Iteratively reweighted least squares of (v - f) / (f + c) solve sum((v - f) / (f + c)^2 df) = 0. These are the
+    quasi-likelihood equations for a standard deviation proportional to f + c (Wedderburn1974), whatever the noise
+    distribution: the true model is a root if v is unbiased. But they minimize nothing, and 0 is a root too. The
+    function with that derivative is the deviance of the gamma distribution,
 
         rho = u - log(1 + u),  u = (v - f) / (f + c),
 
-    which a model of 0 makes large. From u = 1 on (data twice the model, which noise does not make) rho is log(1 + u)
-    plus a constant: its derivative stops there, as Huber's does (Huber1964), and as it stops at u = -1 by itself. So no
-    value counts more than 1 / (f + c). A value under -c / 2 has v + c, at least 0, in the derivative as it is; the
+    which is large for a model of 0. For u >= 1 (data twice the model, more than noise explains) rho is log(1 + u) plus
+    a constant: its derivative is bounded there, like Huber's (Huber1964), and it is bounded at u = -1 anyway. So no
+    value has more influence than 1 / (f + c). For values under -c / 2 the derivative uses v + c, clamped to 0; the
     constant is that of -c / 2, since no model is negative.
     """
     dr = backend.drjit()
@@ -81,12 +81,12 @@ def deviance(model: Array, value: Array, floor: Array) -> Array:
 
 # --------------------------------------------------------------------------- residuals and their derivatives
 
-# Residuals (N,), derivatives (N, K), and which numbers these are along
+# residuals (N,), derivatives (N, K), and the indices of the parameters of these
 Linearized = tuple[NDArray[np.floating], NDArray[np.floating], list[int]]
 
 
 class Residuals(Protocol):
-    """What can be solved: numbers that move, and residuals with their derivatives, in parts."""
+    """A least-squares problem: free parameters, and residuals with their derivatives, in parts."""
 
     free: list[Free]
 
@@ -99,9 +99,11 @@ class Residuals(Protocol):
 class Problem:
     """Residuals of a material against data: metric(eval) - metric(value), channel by channel.
 
-    material  what is fitted, free its parameters that move
-    name      of the metric
-    floor     value of "log" where it turns absolute; floors (3,) those of "relative", of each channel
+    material  the material to fit
+    free      its free parameters
+    name      name of the metric
+    floor     value below which "log" is absolute
+    floors    (3,), value per channel below which "relative" is absolute
     """
 
     material: BSDF
@@ -122,7 +124,7 @@ class Problem:
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
-        """The numbers that one derivative is taken along: each alone, or the three of a color together."""
+        """Groups of parameters that share one derivative: each by itself, or the three channels of a color."""
         dr, types = backend.drjit(), backend.types("float32")
         groups: list[list[int]] = []
         at = 0
@@ -134,10 +136,10 @@ class Problem:
             if len(together) > 1:
                 values = [backend.float_of(float(x), types) for x in start_of(self.material, self.free)]
                 dr.enable_grad(values[together[0]])
-                seen = with_drjit(self.material, self.free, values, types).eval(wo, wi)
+                f = with_drjit(self.material, self.free, values, types).eval(wo, wi)
                 dr.forward_from(values[together[0]])
-                others = np.abs([backend.to_numpy(dr.grad(seen[c]), len(probe)) for c in (1, 2)])
-                if others.max() > 0.0:  # a color that acts as a whole, by its mean
+                others = np.abs([backend.to_numpy(dr.grad(f[c]), len(probe)) for c in (1, 2)])
+                if others.max() > 0.0:  # the channels of this color mix
                     groups += [[column] for column in together]
                     continue
             groups.append(together)
@@ -164,28 +166,28 @@ class Problem:
     def _residual(self, values: Array, types: backend.Types) -> list[Array]:
         wanted = self._loaded(types)[2]
         if self.name == "relative":
-            assert self.floors is not None, "set when it was made"
+            assert self.floors is not None, "set by __post_init__"
             floors = [backend.float_of(float(floor), types) for floor in self.floors]
             return [deviance(values[c], wanted[c], floors[c]) for c in range(CHANNELS)]
         return [metric(self.name, values[c], self._floor(types)) - wanted[c] for c in range(CHANNELS)]
 
     def cost(self, numbers: Floats) -> float:
-        """Sum of the squared residuals; infinite where one is not finite."""
+        """Sum of the squared residuals; infinite if one is not finite."""
         total = sum(float(np.sum(r.astype(np.float64) ** 2)) for r in self.residuals(numbers))
         return total if np.isfinite(total) else np.inf
 
     def residuals(self, numbers: Floats) -> list[NDArray[np.float32]]:
-        """Of each channel, (N,)."""
+        """Residuals of each channel, (N,)."""
         types = backend.types("float32")
         wo, wi, _ = self._loaded(types)
         values = [backend.float_of(float(x), types) for x in numbers]
         model = with_drjit(self.material, self.free, values, types)
-        found = self._residual(model.eval(wo, wi), types)
-        backend.drjit().eval(found)
-        return [np.asarray(backend.to_numpy(r, len(self.data))) for r in found]
+        residuals = self._residual(model.eval(wo, wi), types)
+        backend.drjit().eval(residuals)
+        return [np.asarray(backend.to_numpy(r, len(self.data))) for r in residuals]
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
-        """Of each channel (residuals (N,), derivatives (N, K), which numbers these are along)."""
+        """Per channel: (residuals (N,), derivatives (N, K), indices of their parameters)."""
         dr = backend.drjit()
         types = backend.types("float32")
         wo, wi, _ = self._loaded(types)
@@ -193,8 +195,8 @@ class Problem:
         for value in values:
             dr.enable_grad(value)
         model = with_drjit(self.material, self.free, values, types)
-        seen = model.eval(wo, wi)
-        residual = self._residual(seen, types)
+        f = model.eval(wo, wi)
+        residual = self._residual(f, types)
         derivatives: list[list[Array]] = []
         for columns in self.columns:
             dr.clear_grad(values)
@@ -208,24 +210,24 @@ class Problem:
         residual = [dr.detach(r) for r in residual]
         dr.eval(residual, derivatives)
         rows = len(self.data)
-        found: list[Linearized] = []
+        blocks: list[Linearized] = []
         for c in range(CHANNELS):
             which = [columns[c] if len(columns) > 1 else columns[0] for columns in self.columns]
             jacobian = np.stack([np.asarray(backend.to_numpy(d[c], rows)) for d in derivatives], axis=1)
-            found.append((np.asarray(backend.to_numpy(residual[c], rows)), jacobian, which))
-        return found
+            blocks.append((np.asarray(backend.to_numpy(residual[c], rows)), jacobian, which))
+        return blocks
 
 
 def floors_of(value: Floats) -> Floats:
-    """Where "relative" turns absolute, of each channel, (3,): by the data alone, a thousandth of its brightest values.
-    Values under 0 do not count for it: in real files they lie in highlights whose color is out of gamut."""
+    """Values per channel below which "relative" is absolute, (3,): a thousandth of the brightest values in the data.
+    Negative values are ignored: in measured files they lie in highlights whose color is out of gamut."""
     brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
     return np.maximum(SMALL * brightest, 1e-6)
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
-    """Which numbers of a material one derivative is taken along: each alone, or a color's three where its channels do
-    not mix; found by asking a few directions."""
+    """Groups of parameters that share one derivative: each by itself, or the three channels of a color if they do not
+    mix, which is tested at a few directions."""
     w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
     w[..., 2] = np.abs(w[..., 2]) + 0.1
     w /= np.linalg.norm(w, axis=-1, keepdims=True)
@@ -233,7 +235,7 @@ def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
 
 
 def normal_equations(problem: Residuals, numbers: Floats) -> tuple[float, Floats, Floats]:
-    """(sum of squares, gradient J^T r, J^T J) at some numbers."""
+    """(sum of squares, gradient J^T r, J^T J) at the given parameters."""
     count = problem.count
     cost, gradient, hessian = 0.0, np.zeros(count), np.zeros((count, count))
     for residual, jacobian, which in problem.linearized(numbers):
@@ -245,16 +247,16 @@ def normal_equations(problem: Residuals, numbers: Floats) -> tuple[float, Floats
     return cost, gradient, hessian
 
 
-# --------------------------------------------------------------------------- Levenberg and Marquardt
+# --------------------------------------------------------------------------- Levenberg-Marquardt
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the sum of squares is least, as far as it was followed.
+    """Result of `solve`.
 
     numbers  values of the free parameters
     cost     sum of squares
-    steps    that were taken
+    steps    number of accepted steps
     """
 
     numbers: Floats
@@ -269,9 +271,11 @@ def solve(
     tolerance: float = 1e-6,
     progress: Callable[[float], None] = lambda cost: None,
 ) -> Solution:
-    """Follow the sum of squares down from `start`, within the ranges of the parameters.
+    """Minimize the sum of squares from `start` within the ranges of the parameters.
 
-    tolerance  relative decrease of the cost, and of all numbers, under which it ends
+    steps      maximum number of steps
+    tolerance  relative decrease of the cost below which the solver stops
+    progress   called with the cost after each accepted step
     """
     low, high, ratio = ranges(problem.free)
 
@@ -282,12 +286,12 @@ def solve(
         return np.clip(np.where(ratio, np.exp(np.minimum(y, 60.0)), y), low, high)
 
     numbers = np.clip(start, low, high)
-    damping, taken = 1e-3, 0
+    damping, accepted = 1e-3, 0
     cost, gradient, hessian = normal_equations(problem, numbers)
     for _ in range(steps):
         slope = np.where(ratio, numbers, 1.0)  # d number / d inner
         g, h = gradient * slope, hessian * np.outer(slope, slope)
-        # at an end of its range, and pushed beyond: it stays for this step
+        # parameters at a bound with a gradient that points outside stay fixed in this step
         stuck = ((numbers <= low) & (g > 0.0)) | ((numbers >= high) & (g < 0.0))
         moves = np.flatnonzero(~stuck & (np.diag(h) > 0.0))
         if not len(moves):
@@ -304,8 +308,8 @@ def solve(
                 continue
             step = np.where(ratio, np.clip(step, -1.5, 1.5), step)
             tried = outer(inner(numbers) + step)
-            found = normal_equations(problem, tried)
-            if np.isfinite(found[0]) and found[0] < cost:
+            equations = normal_equations(problem, tried)
+            if np.isfinite(equations[0]) and equations[0] < cost:
                 improved = True
                 break
             damping = (damping if damping > 1e-6 else 1e-6) * 8.0
@@ -313,11 +317,11 @@ def solve(
                 break
         if not improved:
             break
-        drop = (cost - found[0]) / max(cost, 1e-300)
+        drop = (cost - equations[0]) / max(cost, 1e-300)
         moved = np.max(np.abs(tried - numbers) / np.maximum(np.abs(numbers), 1e-3))
-        numbers, (cost, gradient, hessian) = tried, found
-        damping, taken = max(damping * 0.1, 1e-12), taken + 1
+        numbers, (cost, gradient, hessian) = tried, equations
+        damping, accepted = max(damping * 0.1, 1e-12), accepted + 1
         progress(cost)
         if drop < tolerance and moved < 1e-4:
             break
-    return Solution(numbers, cost, taken)
+    return Solution(numbers, cost, accepted)

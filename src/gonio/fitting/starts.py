@@ -1,4 +1,4 @@
-"""Where fits begin."""
+"""Starting points of fits."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from ..material import BSDF
 from ..measure.tables.base import Floats
 from .parameters import Free, ranges, start_of
 
-WIDTHS = (0.03, 0.1, 0.3, 0.7)  # of lobes, tried as starts
-INDICES = (0.5, 2.0)  # of colors without an upper end, such as indices, whose default may be a place without a slope
-STARTS = 24  # tried at most
-RANDOM = 6  # more, drawn at random
-OPEN = 4.0  # how far numbers without an upper end are drawn
+WIDTHS = (0.03, 0.1, 0.3, 0.7)  # lobe widths of the starting points
+INDICES = (0.5, 2.0)  # for unbounded colors such as indices, whose default may have zero slope
+STARTS = 24  # maximum number of systematic starting points
+RANDOM = 6  # additional random starting points
+OPEN = 4.0  # upper limit for random values of unbounded parameters
 
 
 def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
-    """Where to begin: as the material is, and at other widths of its lobes, each lobe its own, and other indices."""
+    """Starting points: the values of the material, and combinations of other lobe widths and indices."""
     first = start_of(material, free)
-    found = [first]
+    starts = [first]
     open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
     firsts = [first, *(np.where(open_ended, value, first) for value in INDICES if open_ended.any())]
     places = np.cumsum([0, *(one.count for one in free)])
@@ -32,22 +32,22 @@ def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
                 one = free[int(np.searchsorted(places, at, side="right")) - 1]
                 value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
                 other[at] = np.clip(value, one.low, one.high)
-            found.append(other)
-    return found[:STARTS] + random_starts(first, free)
+            starts.append(other)
+    return starts[:STARTS] + random_starts(first, free)
 
 
 def random_starts(first: Floats, free: list[Free]) -> list[Floats]:
-    """Where to begin beside: anywhere in the ranges of the numbers, those that are open as far as `OPEN`."""
+    """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`."""
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)
     rng = np.random.default_rng(23)
-    found = []
+    starts = []
     for _ in range(RANDOM):
         share = rng.random(len(first))
         with np.errstate(divide="ignore", invalid="ignore"):
-            found.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
-    return found
+            starts.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
+    return starts
 
 
 def _exponent(one: Free) -> bool:

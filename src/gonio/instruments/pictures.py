@@ -194,10 +194,10 @@ def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -
     for path in free:
         place, parameter = place_of(path, "free")
         chosen.setdefault(place, []).append(parameter)
-    found: list[Target] = []
+    targets: list[Target] = []
     for place, parameters in chosen.items():
         plugin = material_at(description, built, place, f"free: {place}")
-        if any(plugin is other.plugin for other in found):
+        if any(plugin is other.plugin for other in targets):
             raise InputError("two shapes share this material", f"free: {place}", "name one of them")
         material = plugin.placed.model
         if any(plugin.placed.slots[name].textures for name in plugin.placed.slots):
@@ -209,8 +209,8 @@ def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -
         moving = moving_of(material, free=tuple(filter(None, parameters)))[1]
         if "" not in parameters:
             moving = [one for one in moving if one.path in parameters]
-        found.append(Target(place, plugin, material, moving))
-    return found
+        targets.append(Target(place, plugin, material, moving))
+    return targets
 
 
 class Problem:
@@ -289,12 +289,12 @@ class Problem:
         render = Gradients(self.scene, self._settings(self.seed ^ OTHER), self.along)
         render.advance(self.spp)
         slopes = [slope.astype(np.float64) * self.weight for slope in render.slopes()]
-        found: list[Linearized] = []
+        blocks: list[Linearized] = []
         for channel in range(CHANNELS):
             which = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
             jacobian = np.stack([slope[..., channel].ravel() for slope in slopes], -1)
-            found.append((residual[..., channel].ravel(), jacobian, which))
-        return found
+            blocks.append((residual[..., channel].ravel(), jacobian, which))
+        return blocks
 
 
 def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: float) -> PictureFit:
@@ -319,6 +319,6 @@ def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: flo
         float(np.abs(shown - problem.wanted).mean() / np.abs(problem.wanted).mean()),
         problem.wanted.astype(np.float32),
         shown.astype(np.float32),
-        tuple(notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold)),
+        tuple(notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.undetermined)),
         seconds,
     )

@@ -21,9 +21,9 @@ ALIKE = 4.0  # pixels that count as one, from which on more is off than noise
 WRONG = 0.05  # relative difference of model and pictures
 
 
-def on(scene: Scene, chosen: Chosen, found: Fitted | None) -> tuple[str, ...]:
+def on(scene: Scene, chosen: Chosen, result: Fitted | None) -> tuple[str, ...]:
     """In words, the gravest first."""
-    return (*_on_pictures(scene, chosen), *(_on_fit(scene, found) if found is not None else ()))
+    return (*_on_pictures(scene, chosen), *(_on_fit(scene, result) if result is not None else ()))
 
 
 def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
@@ -51,8 +51,8 @@ def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
         yield f"{100.0 * clipped / (clipped + used):.0f} % of the lit pixels are saturated: add a shorter exposure"
 
 
-def _on_fit(scene: Scene, found: Fitted) -> Iterator[str]:
-    fit = found.fit
+def _on_fit(scene: Scene, result: Fitted) -> Iterator[str]:
+    fit = result.fit
     for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
         if np.isfinite(error) and NORMAL_95 * error > VAGUE * max(abs(value), 1e-3):
             yield f"the pictures hardly tell {name}: {value:.3g} +- {NORMAL_95 * error:.2g}"
@@ -62,10 +62,10 @@ def _on_fit(scene: Scene, found: Fitted) -> Iterator[str]:
         for name, value in zip(fit.names, fit.values, strict=True):
             if name.rpartition(".")[2] == "alpha" and value < SMALL * pixel:
                 yield f"{name} = {value:.3g} is a highlight of {value / pixel:.1f} pixels: come nearer"
-    for name, (value, _) in found.faults.items():
+    for name, (value, _) in result.faults.items():
         if abs(value) > FAR:
             yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
-    if found.problem.alike > ALIKE:
+    if result.problem.alike > ALIKE:
         yield "neighboring pixels err alike: the calibration is off by more than it states, or the model is wrong"
-    if fit.relative > max(WRONG, 3.0 * found.noise):
+    if fit.relative > max(WRONG, 3.0 * result.noise):
         yield f"the model is {100.0 * fit.relative:.0f} % off on average: intervals are those of a model that is wrong"

@@ -47,7 +47,7 @@ class Camera(Part):
         return self.focal / self.pixel
 
     @property
-    def centre(self) -> tuple[float, float]:
+    def center(self) -> tuple[float, float]:
         return self.principal or (0.5 * self.size[0], 0.5 * self.size[1])
 
 
@@ -198,5 +198,7 @@ def made(raw: Mapping[str, Json], path: Path) -> Calibration:
     try:
         return Calibration.model_validate(given)
     except ValidationError as error:
-        found = explain(error, given, path)
-        raise InputError(found.what, found.where, found.hint.replace("`gonio schema`", "docs/capture.md")) from None
+        explained = explain(error, given, path)
+        raise InputError(
+            explained.what, explained.where, explained.hint.replace("`gonio schema`", "docs/capture.md")
+        ) from None

@@ -63,7 +63,7 @@ def fitted(
 
     problem = Problem(material, moving, scene, few, faults)
     numbers = np.concatenate([start_of(material, moving), np.zeros(len(problem.open))])
-    numbers = _followed(problem, numbers)
+    numbers = _solve_reweighted(problem, numbers)
     low, high, _ = ranges(problem.free)
     ended = (numbers <= low) | (numbers >= high)
     if ended.any():  # an end may have no slope, as an index of 1 has none: once more from where the model stands
@@ -71,19 +71,19 @@ def fitted(
         problem.reweigh(numbers)
         other = solve(problem, other, steps=20).numbers
         if solve(problem, other, steps=0).cost < solve(problem, numbers, steps=0).cost:
-            numbers = _followed(problem, other)
-    whole = Problem(material, moving, scene, chosen.parts, faults, problem.noise)
-    whole.reweigh(numbers)
-    whole.alike = _alike(whole, numbers)
-    whole.reweigh(numbers)
+            numbers = _solve_reweighted(problem, other)
+    full = Problem(material, moving, scene, chosen.parts, faults, problem.noise)
+    full.reweigh(numbers)
+    full.alike = _alike(full, numbers)
+    full.reweigh(numbers)
     # a standard error changes the sum of squares by 1, of as many as there are pixels
-    numbers = solve(whole, numbers, steps=6, tolerance=1e-10).numbers
-    whole.noise = _noise(whole, numbers)
-    whole.reweigh(numbers)
-    return _result(whole, numbers, started)
+    numbers = solve(full, numbers, steps=6, tolerance=1e-10).numbers
+    full.noise = _noise(full, numbers)
+    full.reweigh(numbers)
+    return _result(full, numbers, started)
 
 
-def _followed(problem: Problem, numbers: Floats) -> Floats:
+def _solve_reweighted(problem: Problem, numbers: Floats) -> Floats:
     """Where the sum of squares is least: weights follow the prediction, and the noise the weights."""
     for _ in range(3):
         problem.reweigh(numbers)
@@ -101,15 +101,15 @@ def _some(chosen: Chosen, count: int) -> list[Pixels]:
 
 def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
     """Pixels as pairs of directions with f cos theta_i."""
-    found = [directions(scene, part.kind, part.place, part.lamp) for part in parts]
+    views = [directions(scene, part.kind, part.place, part.lamp) for part in parts]
     value = [
         part.value * square[:, None] / scene.intensities[part.lamp]
-        for part, (_, _, square) in zip(parts, found, strict=True)
+        for part, (_, _, square) in zip(parts, views, strict=True)
     ]
     tiles = np.unique(np.concatenate([part.tile for part in parts]), return_inverse=True)[1]
     return Data(
-        np.concatenate([wo for wo, _, _ in found]),
-        np.concatenate([wi for _, wi, _ in found]),
+        np.concatenate([wo for wo, _, _ in views]),
+        np.concatenate([wi for _, wi, _ in views]),
         np.concatenate(value),
         tiles,
     )
@@ -155,8 +155,8 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     covariance = inverse @ (spread + prior) @ inverse
     # where few tiles tell a number, their residuals are small for that very reason: no smaller than by the noise alone
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
-    untold = groups_of(null_space(hessian + prior))
-    variance[[number for group in untold for number in group]] = np.inf
+    undetermined = groups_of(null_space(hessian + prior))
+    variance[[number for group in undetermined for number in group]] = np.inf
     errors = np.sqrt(variance)
     own = slice(0, problem.own)
     correlation = _correlation(covariance[own, own])
@@ -167,6 +167,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     size = np.concatenate([np.abs(part.value) for part, _, _ in shown])
     mean = float(np.mean((off / np.maximum(np.concatenate([p for _, _, p in shown]), 1e-12)) ** 2))
     runs = int(np.count_nonzero(np.bincount(np.concatenate([part.tile for part, _, _ in shown]))))
+    notes = tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names, undetermined)
     fit = Fit(
         material,
         names,
@@ -178,7 +179,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
         float(np.abs(off).sum() / max(float(size.sum()), 1e-30)),
         float(3 * runs * np.log(max(mean, 1e-300)) + problem.own * np.log(3 * runs)),
         len(off),
-        tuple(tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names, untold)),
+        tuple(notes),
         time.perf_counter() - started,
         _data(problem.scene, _some(Chosen(tuple(problem.parts), {}), FEW)),
     )
@@ -189,15 +190,15 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
 
 def _correlation(covariance: Floats) -> Floats:
     size = np.sqrt(np.where(np.diag(covariance) > 0.0, np.diag(covariance), 1.0))
-    found = covariance / np.outer(size, size)
-    np.fill_diagonal(found, 1.0)
-    return np.asarray(found)
+    matrix = covariance / np.outer(size, size)
+    np.fill_diagonal(matrix, 1.0)
+    return np.asarray(matrix)
 
 
 def _apart(problem: Problem, hessian: Floats) -> Floats:
     """Correlations of the material's numbers if the intensities were exact: these tie all that is bright together,
     which is their doing and not the pictures'."""
     bright = ["intensity" in name or name == "scale" for name in problem.open]
-    kept = np.flatnonzero([True] * problem.own + [not one for one in bright])
-    inverse = inverse_of((hessian + problem.prior())[np.ix_(kept, kept)])
+    columns = np.flatnonzero([True] * problem.own + [not one for one in bright])
+    inverse = inverse_of((hessian + problem.prior())[np.ix_(columns, columns)])
     return _correlation(inverse[: problem.own, : problem.own])

@@ -31,8 +31,8 @@ SYSTEMATIC = 0.1  # pixels by which a found outline is off beside its noise: lim
 
 def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
     """Unit directions (N, 3) that pixel coordinates look along, the lens's distortion undone."""
-    across = (np.asarray(x) - camera.centre[0]) / camera.focal_pixels
-    down = (np.asarray(y) - camera.centre[1]) / camera.focal_pixels
+    across = (np.asarray(x) - camera.center[0]) / camera.focal_pixels
+    down = (np.asarray(y) - camera.center[1]) / camera.focal_pixels
     bent = np.hypot(across, down)
     radius = bent.copy()
     for _ in range(20):  # Newton; a lens that folds the picture over is refused below
@@ -45,8 +45,8 @@ def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
         what = f"k1 = {camera.k1:g} and k2 = {camera.k2:g} fold the picture over"
         raise InputError(what, "camera", "a lens bends less than that; are they those of x over z?")
     ratio = np.where(bent > 0.0, radius / np.where(bent > 0.0, bent, 1.0), 1.0)
-    found = np.stack([across * ratio, down * ratio, np.ones_like(across)], -1)
-    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+    directions = np.stack([across * ratio, down * ratio, np.ones_like(across)], -1)
+    return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
 
 def pixels_of(camera: Camera, points: Floats) -> Floats:
@@ -54,7 +54,7 @@ def pixels_of(camera: Camera, points: Floats) -> Floats:
     flat = points[:, :2] / points[:, 2:]
     square = np.sum(flat * flat, axis=1, keepdims=True)
     bent = flat * (1.0 + camera.k1 * square + camera.k2 * square**2)
-    return np.asarray(bent * camera.focal_pixels + np.array(camera.centre))
+    return np.asarray(bent * camera.focal_pixels + np.array(camera.center))
 
 
 # ---------------------------------------------------------------------- the ball
@@ -87,7 +87,7 @@ def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
         x, y, radius = ball.outline
         turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
         return _of_cone(_cone(rays(camera, x + radius * np.cos(turn), y + radius * np.sin(turn))), ball, camera)
-    return _found(ball, camera, photographs, avoid)
+    return _locate(ball, camera, photographs, avoid)
 
 
 def _cone(directions: Floats) -> Floats:
@@ -104,42 +104,42 @@ def _of_cone(m: Floats, ball: Ball, camera: Camera, off: tuple[float, float] = (
     return Placed(m * cos * distance, ball.radius, distance / camera.focal_pixels, off)
 
 
-def _found(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed]) -> Placed:
+def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed]) -> Placed:
     """The ball by its outline, over all photographs: what one lamp leaves dark another one lights."""
     from scipy import ndimage
 
     hint = 'the ground must be dark; or give "center" or "outline" of the ball'
     shots = [one for one in photographs if one.shot.sample == "ball"]
-    seen = np.zeros(shots[0].radiance.shape[:2])
+    brightness = np.zeros(shots[0].radiance.shape[:2])
     for one in shots:
-        grey = np.where(one.saturated, np.inf, one.radiance.mean(axis=-1))
-        bright = float(np.percentile(grey[np.isfinite(grey)], 99.0))
+        gray = np.where(one.saturated, np.inf, one.radiance.mean(axis=-1))
+        bright = float(np.percentile(gray[np.isfinite(gray)], 99.0))
         if not bright > 0.0:
             raise InputError("no ball in it: it is dark", one.name, "was the lamp on?")
-        if float(np.median(_rim(grey))) > BRIGHT * bright:
+        if float(np.median(_rim(gray))) > BRIGHT * bright:
             raise InputError("no ball in it: the ground is as bright as all else", one.name, hint)
-        seen = np.maximum(seen, np.minimum(grey / bright, 1.0))
+        brightness = np.maximum(brightness, np.minimum(gray / bright, 1.0))
     for other in avoid:
-        seen[covers(other, camera, margin=1.1)] = 0.0
-    rim = _rim(seen)
+        brightness[covers(other, camera, margin=1.1)] = 0.0
+    rim = _rim(brightness)
     ground, spread = float(np.median(rim)), 1.4826 * float(np.median(np.abs(rim - np.median(rim))))
     level = ground + max(8.0 * spread, 0.03)
-    parts, count = ndimage.label(ndimage.binary_opening(seen > level, iterations=2))
+    parts, count = ndimage.label(ndimage.binary_opening(brightness > level, iterations=2))
     names = shots[0].name if len(shots) == 1 else f"{shots[0].name} and {len(shots) - 1} more"
     if count == 0:
         raise InputError("no ball in it: nothing stands out from the ground", names, hint)
     largest = int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
     rows, columns = np.nonzero(parts == largest)
     x, y = float(columns.mean()) + 0.5, float(rows.mean()) + 0.5
-    edge = _edge(seen, x, y, ground, level)
+    edge = _edge(brightness, x, y, ground, level)
     if len(edge) < FOUND * ANGLES:
         raise InputError("no ball in it: no sharp outline stands out from the ground", names, hint)
     m, residual = _agreed(rays(camera, edge[:, 0], edge[:, 1]), camera)
     if m is None or len(residual) < max(FOUND * ANGLES, ROUND * len(edge)):
         raise InputError("no ball in it: what stands out is not round", names, hint)
     noise = float(np.sqrt(np.mean(residual**2) / len(residual))) + SYSTEMATIC
-    found = _of_cone(m, ball, camera)
-    return _of_cone(m, ball, camera, (noise, noise * found.pixel / found.radius))
+    estimate = _of_cone(m, ball, camera)
+    return _of_cone(m, ball, camera, (noise, noise * estimate.pixel / estimate.radius))
 
 
 def _rim(picture: Floats) -> Floats:
@@ -147,16 +147,16 @@ def _rim(picture: Floats) -> Floats:
     return np.concatenate([picture[:3].ravel(), picture[-3:].ravel(), picture[:, :3].ravel(), picture[:, -3:].ravel()])
 
 
-def _edge(seen: Floats, x: float, y: float, ground: float, level: float) -> Floats:
+def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -> Floats:
     """Pixel coordinates (N, 2) where the picture rises sharply, coming from outside, on rays about a middle."""
     from scipy import ndimage
 
-    height, width = seen.shape
+    height, width = brightness.shape
     step = 0.25
     along = np.arange(0.0, np.hypot(height, width), step)
     turn = np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False)
     px, py = x + np.cos(turn)[:, None] * along, y + np.sin(turn)[:, None] * along
-    profile = ndimage.map_coordinates(seen, [py - 0.5, px - 0.5], order=1, cval=ground)
+    profile = ndimage.map_coordinates(brightness, [py - 0.5, px - 0.5], order=1, cval=ground)
     points = []
     for line, cos, sin in zip(profile, np.cos(turn), np.sin(turn), strict=True):
         above = np.flatnonzero(line > level)
@@ -250,14 +250,14 @@ def lamp_in_mirrors(
 
 
 def _highlight(photograph: Photograph, where: NDArray[np.bool_]) -> tuple[float, float]:
-    grey = photograph.radiance.mean(axis=-1)
-    top = float(np.nanmax(np.where(where, grey, -np.inf), initial=-np.inf)) if where.any() else -np.inf
-    clipped = where & np.isnan(grey)
-    rest = grey[where & ~np.isnan(grey)]
+    gray = photograph.radiance.mean(axis=-1)
+    top = float(np.nanmax(np.where(where, gray, -np.inf), initial=-np.inf)) if where.any() else -np.inf
+    clipped = where & np.isnan(gray)
+    rest = gray[where & ~np.isnan(gray)]
     if not clipped.any() and (not len(rest) or top <= 4.0 * max(float(np.median(rest)), 0.0) or top <= 0.0):
         hint = "the mirror ball must show the lamp brighter than all else; is its outline right?"
         raise InputError("no highlight in the mirror ball", photograph.name, hint)
-    weight = np.where(clipped, 1.0, 0.0) if clipped.any() else np.where(where & (grey > 0.5 * top), grey, 0.0)
+    weight = np.where(clipped, 1.0, 0.0) if clipped.any() else np.where(where & (gray > 0.5 * top), gray, 0.0)
     rows, columns = np.nonzero(weight)
     w = weight[rows, columns]
     return float(np.average(columns, weights=w)) + 0.5, float(np.average(rows, weights=w)) + 0.5

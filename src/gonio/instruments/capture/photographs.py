@@ -66,7 +66,7 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
     except (OSError, ValueError) as error:
         what = f"cannot read this photograph: {getattr(error, 'strerror', None) or error}"
         raise InputError(what, where, "check the name in the calibration file") from None
-    whole = False
+    integers = False
     if path.suffix.lower() == ".npz":
         values = np.asarray(images.read(path).pixels, np.float64)
     else:
@@ -77,7 +77,7 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
             decoded = formats.decode(path, content, kind)
         except formats.Unreadable as error:
             raise InputError(f"this photograph is damaged: {error}", where, "copy it again") from None
-        values, whole = decoded.values.astype(np.float64), decoded.integers
+        values, integers = decoded.values.astype(np.float64), decoded.integers
     values = values[..., :1].repeat(3, axis=2) if values.shape[2] < 3 else values[..., :3]
     height, width = values.shape[:2]
     if (width, height) != tuple(calibration.camera.size):
@@ -90,7 +90,7 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
     seconds = one.seconds if one.seconds is not None else _own_seconds(content)
     if seconds is None:
         raise InputError("no exposure time", where, 'add "seconds" to it in the calibration file')
-    if not whole:
+    if not integers:
         return Exposed(where, values, np.zeros_like(values), seconds, np.inf)
     steps = 65535 if _sixteen(values) else STEPS
     clipped = values >= calibration.saturation
@@ -123,17 +123,17 @@ def _light(values: Floats, calibration: Calibration) -> Floats:
 
 def _own_seconds(content: bytes) -> float | None:
     """The exposure time in an OpenEXR file (`expTime`) or in a JPEG's EXIF; None where there is none."""
-    found: float | None = None
+    seconds: float | None = None
     try:
         if formats.kind_of(content) == "OpenEXR":
             for name, kind, value in formats.exr_attributes(content):
                 if name == "expTime" and kind == "float":
-                    found = float(struct.unpack("<f", value)[0])
+                    seconds = float(struct.unpack("<f", value)[0])
         elif content.startswith(b"\xff\xd8"):
-            found = _exif_seconds(content)
+            seconds = _exif_seconds(content)
     except (struct.error, IndexError, formats.Unreadable):
         return None
-    return found if found is not None and np.isfinite(found) and found > 0.0 else None
+    return seconds if seconds is not None and np.isfinite(seconds) and seconds > 0.0 else None
 
 
 def _exif_seconds(content: bytes) -> float | None:

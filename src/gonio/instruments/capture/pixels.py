@@ -109,7 +109,7 @@ class Pixels:
         )
 
 
-def seen(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
+def observe(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
     """What rays see of a sample under lamps.
 
     ball  its center and radius, where they are not the scene's
@@ -133,8 +133,8 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
     """(wo, wi, squared distance of the lamp) in float64 at pixel coordinates; NaN beside the ball."""
     types = backend.types("float64")
     ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
-    found = seen(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
-    wo, wi, square = (backend.to_numpy(part, len(place)) for part in found)
+    view = observe(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
+    wo, wi, square = (backend.to_numpy(part, len(place)) for part in view)
     return wo, wi, square
 
 
@@ -178,13 +178,13 @@ def choose(
         saturated = shot.saturated[row, column]
         shadowed = fine & (wi[:, 2] <= 0.0)
         steep = ~shadowed & is_steep(wo, wi, grazing, slack if kind == "ball" else (0.0, slack[1]))
-        kept = ~saturated & ~shadowed & ~steep
-        _check_sample(shot, scene, kind, own, kept | (saturated & ~shadowed & ~steep))
+        used = ~saturated & ~shadowed & ~steep
+        _check_sample(shot, scene, kind, own, used | (saturated & ~shadowed & ~steep))
         if saturated[~shadowed & ~steep].all():
             raise InputError(
                 "every pixel of the sample is saturated", shot.name, "expose it for a shorter time, or add such one"
             )
-        fate = np.select([kept, saturated, shadowed], [1, 2, 3], 4).astype(np.uint8)
+        fate = np.select([used, saturated, shadowed], [1, 2, 3], 4).astype(np.uint8)
         maps[shot.name] = np.zeros(shot.saturated.shape, np.uint8)
         maps[shot.name][own] = fate
         for number, name in enumerate(FATES, 1):
@@ -195,12 +195,12 @@ def choose(
         gathered[kind].append(
             Pixels(
                 kind,
-                place[kept],
-                np.full(int(kept.sum()), lamp),
-                tile[kept],
-                shot.radiance[row, column][kept],
-                shot.step[row, column][kept],
-                np.broadcast_to(shot.photon, shot.step.shape)[row, column][kept],
+                place[used],
+                np.full(int(used.sum()), lamp),
+                tile[used],
+                shot.radiance[row, column][used],
+                shot.step[row, column][used],
+                np.broadcast_to(shot.photon, shot.step.shape)[row, column][used],
             )
         )
     parts = tuple(_joined(group) for group in gathered.values() if group)
@@ -213,13 +213,13 @@ def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] 
     outline, lamp = slack
     theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
     moved = (1.0 + outline) * np.sin(theta_o)
-    turned = np.where(moved <= 1.0, np.arcsin(np.minimum(moved, 1.0)) - theta_o, np.inf)
-    return np.asarray(np.maximum(theta_o, theta_i + lamp) + turned > np.radians(grazing))
+    tilt = np.where(moved <= 1.0, np.arcsin(np.minimum(moved, 1.0)) - theta_o, np.inf)
+    return np.asarray(np.maximum(theta_o, theta_i + lamp) + tilt > np.radians(grazing))
 
 
 def _joined(group: list[Pixels]) -> Pixels:
     """As one, in the order of the lamps."""
-    whole = Pixels(
+    joined = Pixels(
         group[0].kind,
         np.concatenate([one.place for one in group]),
         np.concatenate([one.lamp for one in group]),
@@ -228,7 +228,7 @@ def _joined(group: list[Pixels]) -> Pixels:
         np.concatenate([one.step for one in group]),
         np.concatenate([one.photon for one in group]),
     )
-    return whole.at(np.argsort(whole.lamp, kind="stable"))
+    return joined.at(np.argsort(joined.lamp, kind="stable"))
 
 
 def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
@@ -272,11 +272,11 @@ def _check_sample(
             f"the light '{shot.shot.light}' reaches {int(lit.sum())} pixels of the {kind} at less than grazing angles"
         )
         raise InputError(what, shot.name, "are the lamp's place and the sample's right?")
-    grey = np.where(shot.saturated, np.inf, np.nan_to_num(shot.radiance).mean(axis=-1))
-    inside = np.zeros(grey.shape, bool)
+    gray = np.where(shot.saturated, np.inf, np.nan_to_num(shot.radiance).mean(axis=-1))
+    inside = np.zeros(gray.shape, bool)
     inside[own] = True
-    bright = float(np.median(grey[own][lit]))
-    ground = float(np.median(grey[~inside])) if kind == "ball" and not inside.all() else 0.0
+    bright = float(np.median(gray[own][lit]))
+    ground = float(np.median(gray[~inside])) if kind == "ball" and not inside.all() else 0.0
     if not bright > CONTRAST * max(ground, 0.0):
         what = f"no {kind} in it: where it should be lit, it is no brighter than the ground"
         raise InputError(what, shot.name, "was the lamp on, and the ground dark?")
@@ -303,10 +303,10 @@ class Gathered:
         seen and the table goes by the nearest samples."""
         theta_h, theta_d, _ = half_difference(*self.table.pairs())
         at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
-        inverse, found = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
+        inverse, spread = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
         np.add.at(inverse, at, np.where(self.error > 0.0, 1.0 / np.maximum(self.error, 1e-6) ** 2, 0.0))
-        found[inverse > 0.0] = 1.0 / np.sqrt(inverse[inverse > 0.0])
-        return found
+        spread[inverse > 0.0] = 1.0 / np.sqrt(inverse[inverse > 0.0])
+        return spread
 
 
 def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
@@ -314,8 +314,8 @@ def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
     from ...measure import angles
 
     types = backend.types("float64")
-    found = angles.half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
-    theta_h, theta_d, phi_d = (backend.to_numpy(part, len(wo)) for part in found)
+    coordinates = angles.half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
+    theta_h, theta_d, phi_d = (backend.to_numpy(part, len(wo)) for part in coordinates)
     return theta_h, theta_d, phi_d % np.pi
 
 
@@ -344,9 +344,9 @@ def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
     with np.errstate(invalid="ignore", divide="ignore"):
         error = np.sqrt(scatter.mean(axis=1) / np.maximum(count - 1, 1)) / size
     wo, wi = pair_at(middle[:, 0] ** 2 * 0.5 * np.pi, middle[:, 1] * 0.5 * np.pi, middle[:, 2] * np.pi)
-    kept = (wo[:, 2] > 0.0) & (wi[:, 2] > 0.0)
-    table = Samples(_angles(wi[kept], wo[kept]), level[kept], title=title, source={"format": "photographs"})
-    return Gathered(table, np.where(count > 1, error, np.nan)[kept], count[kept])
+    above = (wo[:, 2] > 0.0) & (wi[:, 2] > 0.0)
+    table = Samples(_angles(wi[above], wo[above]), level[above], title=title, source={"format": "photographs"})
+    return Gathered(table, np.where(count > 1, error, np.nan)[above], count[above])
 
 
 def _angles(wi: Floats, wo: Floats) -> Floats:

@@ -89,10 +89,10 @@ def places(scene: Scene, kind: Kind, distance: float, count: int = PLACES) -> Fl
     flat = np.sqrt(1.0 - z * z)
     toward = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], -1)
     angle = np.degrees(np.arccos(np.clip(-toward @ middle / np.linalg.norm(middle), -1.0, 1.0)))
-    kept = (angle > ASIDE) & (angle < BEHIND)
+    lit = (angle > ASIDE) & (angle < BEHIND)
     if kind == "flat":
-        kept &= toward @ scene.plane[1][2] > np.cos(np.radians(STEEP))
-    chosen = np.flatnonzero(kept)
+        lit &= toward @ scene.plane[1][2] > np.cos(np.radians(STEEP))
+    chosen = np.flatnonzero(lit)
     return np.asarray(middle + distance * toward[chosen[:: max(1, len(chosen) // count)]])
 
 
@@ -111,7 +111,7 @@ def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = 
     size = np.maximum(np.abs(values), LITTLE * np.minimum(high - low, 1.0))
     to_camera = -middle_of(setting.scene)
     names = tuple(name for one in setting.moving for name in one.names)
-    found: list[Proposal] = []
+    proposals: list[Proposal] = []
     left = list(range(len(lamps)))
     for _ in range(count):
         spreads = [_spread(total + added[place], size) for place in left]
@@ -121,8 +121,8 @@ def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = 
         cos = away @ to_camera / (np.linalg.norm(away) * np.linalg.norm(to_camera))
         errors = np.sqrt(np.diag(inverse_of(total))[:own])
         x, y, z = map(float, lamps[best])
-        found.append(Proposal((x, y, z), float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0)))), names, errors))
-    return found
+        proposals.append(Proposal((x, y, z), float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0)))), names, errors))
+    return proposals
 
 
 def _spread(information: Floats, size: Floats) -> float:
@@ -130,12 +130,12 @@ def _spread(information: Floats, size: Floats) -> float:
     return float(np.sum(np.diag(inverse_of(information))[: len(size)] / size**2))
 
 
-def without(information: Floats, kept: int) -> Floats:
+def without(information: Floats, count: int) -> Floats:
     """Information on the first numbers where nothing else is known of the others than it says (Schur's complement)."""
-    if kept == len(information):
+    if count == len(information):
         return information
-    aside = information[:kept, kept:]
-    return np.asarray(information[:kept, :kept] - aside @ inverse_of(information[kept:, kept:]) @ aside.T)
+    aside = information[:count, count:]
+    return np.asarray(information[:count, :count] - aside @ inverse_of(information[count:, count:]) @ aside.T)
 
 
 def _told(setting: Setting, lamps: Floats) -> tuple[list[Floats], int]:
@@ -151,12 +151,12 @@ def _told(setting: Setting, lamps: Floats) -> tuple[list[Floats], int]:
     numbers = np.concatenate([start_of(setting.material, setting.moving), np.zeros(len(problem.open))])
     each = len(setting.faults.of_lamp)
     shared = problem.count - each * len(lamps)
-    found = [np.diag(np.r_[np.zeros(shared), np.ones(each)]) for _ in lamps]
+    information = [np.diag(np.r_[np.zeros(shared), np.ones(each)]) for _ in lamps]
     for rows in problem.rows(numbers):
         # shared numbers keep their place, a lamp's own come behind them
         local = [n if n < shared else shared + (n - shared) % each for n in rows.which]
-        found[rows.lamp][np.ix_(local, local)] += counts * (rows.slope.T @ rows.slope)
-    return [without(one, shared) for one in found], problem.own
+        information[rows.lamp][np.ix_(local, local)] += counts * (rows.slope.T @ rows.slope)
+    return [without(one, shared) for one in information], problem.own
 
 
 def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
@@ -168,8 +168,8 @@ def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
     for lamp in range(len(scene.names)):
         which = np.full(len(some), lamp)
         wo, wi, _ = pixels.directions(scene, setting.kind, some, which)
-        kept = (wi[:, 2] > 0.0) & ~pixels.is_steep(wo, wi, GRAZING, slack)
-        parts.append((some[kept], which[kept]))
+        lit = (wi[:, 2] > 0.0) & ~pixels.is_steep(wo, wi, GRAZING, slack)
+        parts.append((some[lit], which[lit]))
     where, which = np.concatenate([p for p, _ in parts]), np.concatenate([w for _, w in parts])
     blank = np.zeros((len(where), 3))
     part = Pixels(setting.kind, where, which, np.zeros(len(where), np.int64), blank, blank + setting.step, blank)

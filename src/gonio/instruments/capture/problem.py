@@ -18,7 +18,7 @@ from ...ops import backend
 from . import geometry
 from .calibration import Floats, Uncertainty
 from .geometry import Array
-from .pixels import GAUSS, Pixels, Scene, constant, seen
+from .pixels import GAUSS, Pixels, Scene, constant, observe
 
 CHUNK = 1 << 17  # pixels at a time, so that memory stays flat
 FARTHEST = 8.0  # standard deviations to which a fault of the calibration may go
@@ -60,9 +60,9 @@ class Faults:
 
     def names(self, lamps: Sequence[str], ball: bool) -> list[str]:
         """Of those that are open, the shared ones first."""
-        found = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
-        found += ["scale"] if self.scale > 0.0 else []
-        return found + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
+        names = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
+        names += ["scale"] if self.scale > 0.0 else []
+        return names + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
 
     def slack(self, scene: Scene) -> tuple[float, float]:
         """By how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: three
@@ -127,9 +127,9 @@ class Problem:
         """Radiance of pixels, (N, 3), the mean over four points of each; and its derivatives (N, 3, K)."""
         values, derivatives = [], []
         for start in range(0, len(part), CHUNK):
-            found = self._predicted(part.at(np.arange(start, min(start + CHUNK, len(part)))), numbers, derive)
-            values.append(found[0])
-            derivatives.append(found[1])
+            block = self._predicted(part.at(np.arange(start, min(start + CHUNK, len(part)))), numbers, derive)
+            values.append(block[0])
+            derivatives.append(block[1])
         together = np.concatenate([d for d in derivatives if d is not None]) if derive else None
         return np.concatenate(values), together
 
@@ -155,10 +155,10 @@ class Problem:
                 dr.enable_grad(group)
         lamps = self._lamps(turns, types)
         lamp = types.vec3(*(dr.gather(types.float, component, which) for component in lamps))
-        found = seen(scene, part.kind, ray, lamp, self._ball(ball, types) if with_ball else None)
-        value = with_drjit(self.material, self.moving, own, types).eval(found.wo, found.wi)
+        view = observe(scene, part.kind, ray, lamp, self._ball(ball, types) if with_ball else None)
+        value = with_drjit(self.material, self.moving, own, types).eval(view.wo, view.wi)
         light = [dr.gather(types.float, backend.float_of(c, types), which) for c in self._brightness(at).T]
-        radiance = [light[c] * value[c] / found.square for c in range(CHANNELS)]
+        radiance = [light[c] * value[c] / view.square for c in range(CHANNELS)]
         slopes: list[list[Array]] = []
         if derive:
             everything = [one for group in groups for one in group]
@@ -261,11 +261,11 @@ class Problem:
 
     def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
         """Of each part (pixels, predicted - seen, predicted)."""
-        found = []
+        differences = []
         for part in self.parts:
             predicted, _ = self.predicted(part, numbers, False)
-            found.append((part, predicted - part.value, predicted))
-        return found
+            differences.append((part, predicted - part.value, predicted))
+        return differences
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
         """By lamp and channel, and the priors."""
@@ -282,7 +282,7 @@ class Problem:
         if self._weights is None:
             self.reweigh(numbers)
         assert self._weights is not None
-        found: list[Rows] = []
+        blocks: list[Rows] = []
         for part, weight in zip(self.parts, self._weights, strict=True):
             predicted, slope = self.predicted(part, numbers, True)
             assert slope is not None
@@ -294,8 +294,8 @@ class Problem:
                 for channel in range(CHANNELS):
                     which = self.of_row(lamp, channel)
                     rows = slice(int(start), int(end))
-                    found.append(Rows(residual[rows, channel], slope[rows, channel], which, part.tile[rows], lamp))
-        return found
+                    blocks.append(Rows(residual[rows, channel], slope[rows, channel], which, part.tile[rows], lamp))
+        return blocks
 
     # ------------------------------------------------------------------ how sure
 
@@ -303,12 +303,12 @@ class Problem:
         """(J^T J, the sum of squares of the tiles' pushes J^T r), of the pixels alone."""
         hessian = np.zeros((self.count, self.count))
         tiles = 1 + max(int(part.tile.max()) for part in self.parts)
-        whole = np.zeros((tiles, self.count))
+        gradients = np.zeros((tiles, self.count))
         for residual, slope, which, tile, _ in self.rows(numbers):
             hessian[np.ix_(which, which)] += slope.T @ slope
             for column, number in enumerate(which):
-                whole[:, number] += np.bincount(tile, weights=residual * slope[:, column], minlength=tiles)
-        return hessian, whole.T @ whole
+                gradients[:, number] += np.bincount(tile, weights=residual * slope[:, column], minlength=tiles)
+        return hessian, gradients.T @ gradients
 
     def prior(self) -> Floats:
         """What the calibration says, as information: 1 for each fault."""
@@ -337,8 +337,8 @@ def inverse_of(matrix: Floats) -> Floats:
     """The inverse of an information matrix, 0 along what nothing is known of."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     told = np.diag(matrix) > 0.0
-    found = np.zeros_like(matrix)
+    inverse = np.zeros_like(matrix)
     s = scale[told]
     even = matrix[np.ix_(told, told)] / np.outer(s, s)
-    found[np.ix_(told, told)] = np.linalg.pinv(even, rcond=1e-12) / np.outer(s, s)
-    return found
+    inverse[np.ix_(told, told)] = np.linalg.pinv(even, rcond=1e-12) / np.outer(s, s)
+    return inverse

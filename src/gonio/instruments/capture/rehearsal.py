@@ -99,7 +99,7 @@ def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF,
     if lamp.position is None or camera.k1 or camera.k2:
         raise InputError("lamps with positions and a lens without distortion expected", "calibration")
     width, height = camera.size
-    if camera.centre != (0.5 * width, 0.5 * height):
+    if camera.center != (0.5 * width, 0.5 * height):
         raise InputError("the optical axis must meet the middle of the picture", "calibration")
     shapes: list[dict[str, Any]] = []
     if sample == "ball":

@@ -100,7 +100,7 @@ class Capture:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         ball = self.scene.ball
-        found: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "pixels": dict(self.counts),
             "samples": len(self.samples.count),
             "ball": None if ball is None else {"center": [float(x) for x in ball.center], "radius": ball.radius},
@@ -113,14 +113,14 @@ class Capture:
             "warnings": list(self.warnings),
         }
         if self.fitted is not None:
-            found |= {
+            entries |= {
                 "fit": self.fitted.fit.as_dict(),
                 "noise": self.fitted.noise,
                 "faults": {
                     name: {"deviations": value, "error": error} for name, (value, error) in self.fitted.faults.items()
                 },
             }
-        return found
+        return entries
 
     def __str__(self) -> str:
         counts = self.counts
@@ -189,14 +189,14 @@ def capture(
     chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
-    found = None
+    result = None
     if model is not None:
         progress("fits")
-        found = fitting.fitted(scene, chosen, model, uncertainty, fixed=param, free=free)
-        scene = found.problem.corrected(found.numbers)
+        result = fitting.fitted(scene, chosen, model, uncertainty, fixed=param, free=free)
+        scene = result.problem.corrected(result.numbers)
     gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
-    warnings = advice.on(scene, chosen, found)
-    return Capture(scene, gathered, chosen.counts, found, warnings, tuple(shots), chosen)
+    warnings = advice.on(scene, chosen, result)
+    return Capture(scene, gathered, chosen.counts, result, warnings, tuple(shots), chosen)
 
 
 @public
@@ -220,7 +220,7 @@ def plan(
     kind: Kind = "ball" if stated.ball is not None else "flat"
     ball = None if stated.ball is None else geometry.placed(stated.ball, stated.camera, ())
     lamps = [np.array(lamp.position) for lamp in stated.lights.values() if lamp.position is not None]
-    light = next((found for name in stated.lights if (found := stated.intensity(name)) is not None), None)
+    light = next((intensity for name in stated.lights if (intensity := stated.intensity(name)) is not None), None)
     if not lamps or light is None or (ball is None and stated.flat is None):
         hint = "a plan needs a ball or a flat sample, and a lamp with its position and intensity"
         raise InputError("too little is known for a plan", str(path), hint)
@@ -234,12 +234,12 @@ def plan(
 
 def _points(places: Sequence[Sequence[float]]) -> Floats:
     try:
-        found = np.array(places, np.float64)
+        points = np.array(places, np.float64)
     except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+        points = np.zeros(0)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError("places of the lamp are no (N, 3) numbers", "places", "such as [[0, -300, 200]]")
-    return found
+    return points
 
 
 def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
@@ -265,26 +265,26 @@ def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None =
 def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration, Path]:
     """The calibration's file, what it says of those photographs that are named, and the folder that they lie in."""
     path = calibration_of(named, calibration)
-    whole = calibrations.read(path)
+    full = calibrations.read(path)
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
     first = Path(os.path.expanduser(several[0]))
     folder = first if os.path.isdir(first) else first.parent
-    kept = whole.photographs
+    selected = full.photographs
     if not (len(several) == 1 and (os.path.isdir(first) or first.suffix.lower() == ".json")):
-        known = {Path(one.file).name for shot in whole.photographs for one in shot.pictures}
+        known = {Path(one.file).name for shot in full.photographs for one in shot.pictures}
         wanted = {Path(one).name for one in several}
         for name in sorted(wanted - known):
             what = "the calibration tells neither its exposure nor its light"
             raise InputError(what, str(folder / name), f"list it under photographs in {path}")
         # a reference is always read, whatever is named: without it lamps have no intensity
-        kept = [
+        selected = [
             shot
-            for shot in whole.photographs
+            for shot in full.photographs
             if shot.sample == "reference" or any(Path(one.file).name in wanted for one in shot.pictures)
         ]
-    if all(shot.sample == "reference" for shot in kept):
+    if all(shot.sample == "reference" for shot in selected):
         raise InputError("no photograph of a sample", str(path), 'add some with "sample": "ball" or "flat"')
-    return path, whole.model_copy(update={"photographs": kept}), folder
+    return path, full.model_copy(update={"photographs": selected}), folder
 
 
 # ---------------------------------------------------------------------- what stood where
@@ -338,7 +338,7 @@ def _intensity(stated: Calibration, scene: Scene, name: str, shots: Sequence[Pho
         what = f"{int(fine.sum())} pixels of the reference are lit and not saturated, {pixels.LEAST} expected"
         raise InputError(what, shot.name, "is the target where the calibration says?")
     white = np.broadcast_to(np.asarray(target.albedo, float), 3) / np.pi * wi[fine, 2:]
-    found = np.median(values[fine] * square[fine, None] / white, axis=0)
-    if not np.all(found > 0.0):
+    intensity = np.median(values[fine] * square[fine, None] / white, axis=0)
+    if not np.all(intensity > 0.0):
         raise InputError("the reference is dark", shot.name, "was the lamp on?")
-    return np.asarray(found)
+    return np.asarray(intensity)

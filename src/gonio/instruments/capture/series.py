@@ -206,19 +206,19 @@ def _spread(
 
 def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_]) -> Noise:
     """Read noise, gain and relative noise from the differences of neighboring exposures."""
-    found = np.zeros((3, 3))
+    coefficients = np.zeros((3, 3))
     for channel in range(3):
         bins = [
             _variances(exposures[k], exposures[k + 1], times[k : k + 2], light, used[k] & used[k + 1], channel)
             for k in range(len(exposures) - 1)
         ]
-        found[channel] = _least(*(np.concatenate(parts) for parts in zip(*bins, strict=True)))
-    told = found.any(axis=1)
+        coefficients[channel] = _least(*(np.concatenate(parts) for parts in zip(*bins, strict=True)))
+    told = coefficients.any(axis=1)
     if told.any():  # a channel that is dark throughout tells nothing; the sensor is the same
-        found[~told] = np.median(found[told], axis=0)
+        coefficients[~told] = np.median(coefficients[told], axis=0)
     else:  # without noise, as renders may be: any weights will do, those of photons will
-        found[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
-    return Noise(*found.T)
+        coefficients[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
+    return Noise(*coefficients.T)
 
 
 def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
@@ -234,13 +234,13 @@ def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
         for _ in range(4):  # the error of a variance goes with it: with the fitted one, for the reason given above
             weight = 1.0 / (np.maximum(size, floor) * error)
             part, _ = nnls((columns / scale)[:, some] * weight[:, None], variance * weight)
-            found = np.zeros(3)
-            found[some] = part / scale[some]
-            size = columns @ found
+            coefficients = np.zeros(3)
+            coefficients[some] = part / scale[some]
+            size = columns @ coefficients
         # of a variance that differs from the fitted one by more than its size, the logarithm counts
         rest = float(np.sum((np.log(np.maximum(variance, floor) / np.maximum(size, floor)) / error) ** 2))
         if rest < misfit - (ASKED if len(some) > 2 else 0.0):
-            best, misfit = found, rest
+            best, misfit = coefficients, rest
     return best
 
 
@@ -258,14 +258,14 @@ def _variances(
     steps = (short.step[..., channel][fine] / a) ** 2 + (long.step[..., channel][fine] / b) ** 2
     edges = np.unique(np.quantile(level, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
     which = np.searchsorted(edges, level)
-    kept = np.ones(len(level), bool)
+    inliers = np.ones(len(level), bool)
     for _ in range(4):
-        count = np.bincount(which, kept, len(edges) + 1)
-        variance = np.bincount(which, kept * difference**2, len(edges) + 1) / np.maximum(count, 1)
-        kept = difference**2 <= CUT**2 * variance[which]
+        count = np.bincount(which, inliers, len(edges) + 1)
+        variance = np.bincount(which, inliers * difference**2, len(edges) + 1) / np.maximum(count, 1)
+        inliers = difference**2 <= CUT**2 * variance[which]
 
     def mean(x: Floats) -> Floats:
-        return np.asarray(np.bincount(which, kept * x, len(edges) + 1) / np.maximum(count, 1))
+        return np.asarray(np.bincount(which, inliers * x, len(edges) + 1) / np.maximum(count, 1))
 
     size = np.maximum(level, 0.0)
     ones = np.full(len(count), 1.0 / a**2 + 1.0 / b**2)
@@ -297,13 +297,15 @@ def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         sure = sure and abs(step) < SIGMAS / np.sqrt(told)
         unsure += 1.0 / told
         logs.append(logs[-1] + step)
-    found = np.array(logs)
-    if np.ptp(found) > np.log1p(WRONG) + SIGMAS * np.sqrt(unsure):
-        worst = int(np.argmax(np.abs(found - np.median(found))))
-        told_seconds = exposures[worst].seconds * float(np.exp(found[worst] - np.median(np.delete(found, worst))))
+    log_times = np.array(logs)
+    if np.ptp(log_times) > np.log1p(WRONG) + SIGMAS * np.sqrt(unsure):
+        worst = int(np.argmax(np.abs(log_times - np.median(log_times))))
+        told_seconds = exposures[worst].seconds * float(
+            np.exp(log_times[worst] - np.median(np.delete(log_times, worst)))
+        )
         what = (
             f"{exposures[worst].seconds:g} s are stated, its pixels and those of the others tell {told_seconds:.3g} s"
         )
         hint = 'correct "seconds" in the calibration file, or leave this exposure out; is the response right?'
         raise InputError(what, exposures[worst].file, hint)
-    return np.ones(len(found)) if sure else np.exp(found - found.mean())
+    return np.ones(len(log_times)) if sure else np.exp(log_times - log_times.mean())

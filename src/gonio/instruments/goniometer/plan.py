@@ -72,14 +72,14 @@ def axis_of(text: str | None, name: str) -> list[float] | None:
     if text is None:
         return None
     where = f"--{name.replace('_', '-')}"
-    found: list[float] = []
+    values: list[float] = []
     for part in filter(None, map(str.strip, text.split(","))):
         try:
             numbers = [float(word) for word in part.split(":")]
         except ValueError:
             numbers = []
         if len(numbers) == 1:
-            found += numbers
+            values += numbers
         elif (
             len(numbers) == 3
             and np.all(np.isfinite(numbers))
@@ -87,22 +87,22 @@ def axis_of(text: str | None, name: str) -> list[float] | None:
             and numbers[1] - numbers[0] < 1e5 * numbers[2]
         ):
             first, last, step = numbers
-            found += list(first + step * np.arange(int(np.floor((last - first) / step + 1e-9)) + 1))
+            values += list(first + step * np.arange(int(np.floor((last - first) / step + 1e-9)) + 1))
         else:
             raise InputError(f"'{part}' given, angles expected", where, "such as 0,30,60 or 0:85:5")
-    return found
+    return values
 
 
 def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: float) -> Floats:
     """Angles in degrees as an axis in radians. InputError for none, and for what is out of range."""
     if values is None:
         return default
-    found = np.unique(np.asarray(values, np.float64))
-    if found.size == 0:
+    degrees = np.unique(np.asarray(values, np.float64))
+    if degrees.size == 0:
         raise InputError("no angles, so there is nothing to measure", f"--{name}", "such as 0,30,60 or 0:85:5")
-    if not np.all(np.isfinite(found)) or found[0] < 0.0 or found[-1] > most:
-        raise InputError(f"{found[0]:g} to {found[-1]:g} degrees given, 0 to {most:g} expected", f"--{name}")
-    return np.radians(found)
+    if not np.all(np.isfinite(degrees)) or degrees[0] < 0.0 or degrees[-1] > most:
+        raise InputError(f"{degrees[0]:g} to {degrees[-1]:g} degrees given, 0 to {most:g} expected", f"--{name}")
+    return np.radians(degrees)
 
 
 def grid_of(
@@ -113,15 +113,15 @@ def grid_of(
         return None
     thetas, phis = angles.nodes()
     highest = 89.95
-    found = (
+    axes = (
         angles_of(theta_i, thetas, "theta-i", highest),
         angles_of(theta_r, thetas, "theta-r", highest),
         angles_of(phi, phis, "phi", 180.0),
     )
-    cells = int(np.prod([len(axis) for axis in found]))
+    cells = int(np.prod([len(axis) for axis in axes]))
     if cells > MOST_CELLS:
         raise InputError(f"{cells} cells, at most {MOST_CELLS} expected", "--theta-i", "give fewer angles")
-    return found
+    return axes
 
 
 def without(table: Measurement, blocked: float) -> tuple[Measurement, float, bool]:
@@ -143,12 +143,12 @@ def without(table: Measurement, blocked: float) -> tuple[Measurement, float, boo
         return made, float(hidden.mean()), True
     if isinstance(table, Samples):
         wo, wi = table.pairs()
-        kept = between(wo, wi) >= blocked
-        if int(kept.sum()) < 8:
-            raise InputError(f"{kept.sum()} directions are left", "--blocked", "block less, or measure more")
-        made_ = Samples(table.directions[kept], table.values[kept], title=table.title, source=table.source)
-        made_.beside = {name: array[kept] for name, array in table.beside.items()}
-        return made_, float(1.0 - kept.mean()), True
+        visible = between(wo, wi) >= blocked
+        if int(visible.sum()) < 8:
+            raise InputError(f"{visible.sum()} directions are left", "--blocked", "block less, or measure more")
+        made_ = Samples(table.directions[visible], table.values[visible], title=table.title, source=table.source)
+        made_.beside = {name: array[visible] for name, array in table.beside.items()}
+        return made_, float(1.0 - visible.mean()), True
     return table, 0.0, False
 
 

@@ -109,28 +109,28 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         ray = mi.Ray3f(place, along)
         ray.maxt = dr.minimum(wall, roof)
         hit = on.scene.ray_intersect_preliminary(ray, False, True)
-        met = hit.is_valid()
-        away = ~met & (roof <= wall)
-        through = ~met & ~away
+        is_hit = hit.is_valid()
+        away = ~is_hit & (roof <= wall)
+        through = ~is_hit & ~away
         # at a facet it turns
-        si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, met)
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, is_hit)
         frame = mi.Frame3f(si.n)
         back = frame.to_local(-along)
         u = mi.Point3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
         drawn = facet.sample(back, u)
         onward = mi.Vector3f(drawn.wi)
-        behind = met & (back.z <= 0.0)
-        kept = met & ~behind
-        dark = kept & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
-        weight = dr.select(kept, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
-        bounces = dr.select(kept, bounces + 1, bounces)
-        along_next = dr.select(kept, dr.normalize(frame.to_world(onward)), along)
+        behind = is_hit & (back.z <= 0.0)
+        on_front = is_hit & ~behind
+        dark = on_front & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
+        weight = dr.select(on_front, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
+        bounces = dr.select(on_front, bounces + 1, bounces)
+        along_next = dr.select(on_front, dr.normalize(frame.to_world(onward)), along)
         # through a wall it comes in again across from there
         beyond = place + along * wall
         is_x = wall_x <= wall_y
         beyond.x = dr.select(is_x, dr.select(along.x > 0.0, -half_x, half_x), beyond.x)
         beyond.y = dr.select(is_x, beyond.y, dr.select(along.y > 0.0, -half_y, half_y))
-        place = dr.select(kept, si.p + si.n * offset, dr.select(through, beyond, place))
+        place = dr.select(on_front, si.p + si.n * offset, dr.select(through, beyond, place))
         steps = steps + 1
         over = (bounces >= MOST_BOUNCES) | (steps >= MOST_STEPS)
         state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
@@ -141,8 +141,8 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     _, along, weight, bounces, _, state, _ = dr.while_loop(
         start, lambda *now: now[5] == UNDERWAY, step, labels=labels, label="goniometer"
     )
-    turned = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
-    return Left(angle, turned, weight, bounces, state == AWAY, state == LOST)
+    direction = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
+    return Left(angle, direction, weight, bounces, state == AWAY, state == LOST)
 
 
 def _every_other(bits: Kernel) -> Kernel:

@@ -91,7 +91,7 @@ class Rough(Specimen):
 
         facet = rays.bound(self.facet)
         each = max(self.rays_each // self.patches, 1)
-        channels = 1 if grey(self.facet) else 3
+        channels = 1 if is_gray(self.facet) else 3
         lights, squares = len(self.lights), 2 * self.side * self.side
         total, size = lights * each, 2 * lights * channels * squares
         if each > MOST_EACH or total >= 1 << 32:
@@ -138,8 +138,8 @@ class Rough(Specimen):
         solid = projected(self.side)
         self._seen = np.empty((groups + 1, orders, lights, solid.size, channels), np.float32)
         for group, one in enumerate(sums):
-            seen, self._solid = gathered(one, solid, self.half_angle)
-            flat = seen.reshape(orders, lights, channels, -1)
+            collected, self._solid = gathered(one, solid, self.half_angle)
+            flat = collected.reshape(orders, lights, channels, -1)
             # half of what came down to y and -y together; channels last, as they are looked up together
             self._seen[group] = np.moveaxis(flat, 2, 3) * np.float32(0.5 / sent)
         self._seen[groups] = self._seen[:groups].mean(axis=0)
@@ -191,7 +191,7 @@ def check_facet(facet: BSDF) -> None:
         raise InputError(f"this {facet.name} is anisotropic", "--facet", "a facet has no direction of its own")
 
 
-def grey(facet: BSDF) -> bool:
+def is_gray(facet: BSDF) -> bool:
     """Whether its samples weigh the same in all channels."""
     rng = np.random.default_rng(7)
     wo = rng.standard_normal((256, 3))
@@ -200,7 +200,7 @@ def grey(facet: BSDF) -> bool:
     return bool(np.all(weight == weight[:, :1]))
 
 
-def centres(side: int) -> Floats:
+def centers(side: int) -> Floats:
     """The direction of each square's center, (side, 2 side, 3); beyond the disk they lie below the horizon."""
     y, x = np.meshgrid((np.arange(side) + 0.5) / side, (np.arange(2 * side) + 0.5) / side - 1.0, indexing="ij")
     square = np.minimum(x * x + y * y, 2.0)
@@ -221,23 +221,23 @@ def gathered(maps: NDArray[np.float32], solid: Floats, half_angle: float) -> tup
     side = solid.shape[0]
     reach = int(np.ceil(half_angle * side)) + 1
     lowest = np.cos(half_angle)
-    directions = centres(side)
+    directions = centers(side)
 
     def padded(values: NDArray) -> NDArray:
         wide = np.concatenate([np.flip(values[..., :reach, :], -2), values], -2)  # y and -y are the same
         return np.pad(wide, [(0, 0)] * (values.ndim - 2) + [(0, reach), (reach, reach)])
 
     full, area = padded(maps), padded(solid)
-    beside = np.stack([padded(directions[..., axis]) for axis in range(3)], -1)
-    beside[:reach, :, 1] *= -1.0
-    total, whole = np.zeros_like(maps), np.zeros_like(solid)
+    neighbors = np.stack([padded(directions[..., axis]) for axis in range(3)], -1)
+    neighbors[:reach, :, 1] *= -1.0
+    total, total_solid = np.zeros_like(maps), np.zeros_like(solid)
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             part = (..., slice(reach + dy, reach + dy + side), slice(reach + dx, reach + dx + 2 * side))
-            near = np.einsum("yxc,yxc->yx", directions, beside[part[1:]]) >= lowest
+            near = np.einsum("yxc,yxc->yx", directions, neighbors[part[1:]]) >= lowest
             if dy == dx == 0:
                 near[:] = True
             if near.any():
                 total += np.where(near, full[part], np.float32(0.0))
-                whole += np.where(near, area[part], 0.0)
-    return total, whole.ravel()
+                total_solid += np.where(near, area[part], 0.0)
+    return total, total_solid.ravel()

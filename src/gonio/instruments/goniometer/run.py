@@ -108,9 +108,9 @@ class _Pass(Measurement):
                 self._known[self._asked] = f
         if self._noise > 0.0:
             # an adaptive table takes its coordinates from retro-reflection: one set, noise and all, serves all parts
-            whole = self._part is None or wo is wi
-            rng = np.random.default_rng([self._seed, 92, GROUPS if whole else self._part or 0, self._asked])
-            f = f * (1.0 + self._noise * (1.0 if whole else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
+            is_shared = self._part is None or wo is wi
+            rng = np.random.default_rng([self._seed, 92, GROUPS if is_shared else self._part or 0, self._asked])
+            f = f * (1.0 + self._noise * (1.0 if is_shared else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
         return f * wi[:, 2:]
 
 

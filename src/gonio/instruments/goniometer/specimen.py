@@ -61,10 +61,10 @@ class Model(Specimen):
 
     def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
         total, weight = np.zeros((len(wo), 3)), np.zeros((len(wo), 1))
-        for seen in around(wo, self._opening):
-            cos = np.maximum(seen[:, 2:], 0.0) if len(self._opening) > 1 else np.ones((len(wo), 1))
-            seen = np.where(seen[:, 2:] > 0.0, seen, wo)
-            total += cos * np.asarray(self.material.eval(seen, wi, precision="float64"), np.float64)
+        for direction in to_frame(wo, self._opening):
+            cos = np.maximum(direction[:, 2:], 0.0) if len(self._opening) > 1 else np.ones((len(wo), 1))
+            direction = np.where(direction[:, 2:] > 0.0, direction, wo)
+            total += cos * np.asarray(self.material.eval(direction, wi, precision="float64"), np.float64)
             weight += cos
         return total / (weight * wi[:, 2:])
 
@@ -78,17 +78,17 @@ def opening(solid_angle: float | None) -> Floats:
     """Directions evenly over a cone about z, (N, 3); z alone where there is no cone."""
     if solid_angle is None:
         return np.array([[0.0, 0.0, 1.0]])
-    found, count = [], sum(RINGS)
+    directions, count = [], sum(RINGS)
     for index, points in enumerate(RINGS):
         before = sum(RINGS[:index])
         cos = 1.0 - (before + 0.5 * points) / count * solid_angle / (2.0 * np.pi) if index else 1.0
         phi = (np.arange(points) + 0.5 * index) * (2.0 * np.pi / points)
         sin = np.sqrt(1.0 - cos * cos)
-        found.append(np.stack([sin * np.cos(phi), sin * np.sin(phi), np.full(points, cos)], -1))
-    return np.concatenate(found)
+        directions.append(np.stack([sin * np.cos(phi), sin * np.sin(phi), np.full(points, cos)], -1))
+    return np.concatenate(directions)
 
 
-def around(w: Floats, offsets: Floats) -> Sequence[Floats]:
+def to_frame(w: Floats, offsets: Floats) -> Sequence[Floats]:
     """Each offset from z as an offset from w, (N, 3) each."""
     if len(offsets) == 1:
         return [w]

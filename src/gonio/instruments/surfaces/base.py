@@ -83,8 +83,8 @@ Surface.family = Family(
 def parameter(default: T, doc: str, low: float, high: float, unit: str = "") -> T:
     """Declare a number of a surface, or a whole number where the default is one; None is left as it is."""
     about = {"doc": doc, "low": low, "high": high, "unit": unit, "whole": isinstance(default, int)}
-    found: T = dataclasses.field(default=default, metadata=about)
-    return found
+    declared: T = dataclasses.field(default=default, metadata=about)
+    return declared
 
 
 def _in_range(value: object, about: Mapping[str, Any], where: str) -> object:

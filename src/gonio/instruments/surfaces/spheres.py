@@ -39,10 +39,10 @@ class Spheres(Surface):
         shifts = np.array([(x, y, 0.0) for x in (-SIDE, 0.0, SIDE) for y in (-SIDE, 0.0, SIDE)])
         start = 4
         for index, place in enumerate(places):
-            turned = turns[index].apply(ball) if turns is not None else ball
-            for centre in np.append(place, 0.0) + shifts:
-                if np.abs(centre).max() < 0.5 * SIDE + 1.0:
-                    vertices.append(turned + centre)
+            rotated = turns[index].apply(ball) if turns is not None else ball
+            for center in np.append(place, 0.0) + shifts:
+                if np.abs(center).max() < 0.5 * SIDE + 1.0:
+                    vertices.append(rotated + center)
                     faces.append(triangles + start)
                     start += len(ball)
         top = 1.0 if len(places) else 0.0
@@ -51,13 +51,13 @@ class Spheres(Surface):
     def _places(self, rng: np.random.Generator) -> Floats:
         """Centres in the period, two radii or more apart."""
         wanted = round(self.coverage * SIDE * SIDE / np.pi)
-        found = np.empty((0, 2))
+        centers = np.empty((0, 2))
         for place in rng.uniform(-0.5 * SIDE, 0.5 * SIDE, (TRIES, 2)):
-            if len(found) == wanted:
-                return found
-            apart = np.abs(found - place)
-            if not len(found) or np.square(np.minimum(apart, SIDE - apart)).sum(axis=1).min() > 4.0:
-                found = np.vstack([found, place])
+            if len(centers) == wanted:
+                return centers
+            apart = np.abs(centers - place)
+            if not len(centers) or np.square(np.minimum(apart, SIDE - apart)).sum(axis=1).min() > 4.0:
+                centers = np.vstack([centers, place])
         raise InputError(f"no room for {wanted} hemispheres without touching", "spheres.coverage", "cover less")
 
 
