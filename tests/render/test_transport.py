@@ -13,7 +13,7 @@ from gonio.errors import InputError
 from gonio.transport import delta_retrace
 from gonio.transport.integrators import Render, Settings
 from gonio.transport.lights import lights
-from gonio.transport.photons import Photon, PhotonMap
+from gonio.transport.photons import Photon, PhotonMap, Search
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -462,9 +462,8 @@ def test_a_map_gives_the_particles_within_its_radius() -> None:
     place = mi.Point3f(mi.Float(places[0]), mi.Float(places[1]), 0)
     zero = dr.zeros(mi.Spectrum, 300)
     up, every = dr.zeros(mi.Vector3f, 300) + mi.Vector3f(0, 0, 1), dr.full(mi.Bool, True, 300)
-    summed, above = found.gather(
-        place, up, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every, 0.5
-    )
+    search = Search(place, up, up, dr.zeros(mi.Float, 300))
+    summed, above = found.gather(search, zero, lambda p, w, here: p.flux * w, every, 0.5)
     distance2 = ((places[:, :, None] - at[:2, None, counted]) ** 2).sum(0)
 
     def by(reach: float) -> np.ndarray:

@@ -44,13 +44,13 @@ class Ward(go.BSDF):
 '''
 
 BROKEN = {  # what is changed, and what the page says: where, what, remedy
-    "no Python": ("(wi.z > 0.0)\n", "(wi.z > 0.0\n", "ward.py:17", "was never closed", "mend"),
+    "no Python": ("(wi.z > 0.0)\n", "(wi.z > 0.0\n", "ward.py:17", "was never closed", "fix it"),
     "no such class": ("class Ward", "class Wart", "ward.py", "no class 'Ward'", "did you mean 'Wart'?"),
     "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:8", "name 'beta' is not defined", ""),
-    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:16", "TypeError: ", "mend"),
+    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:16", "TypeError: ", "correct the formula"),
     "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:18", "Python `if`", "where("),
     "wrong kind": ("return where(above, ", "return above\n        (above, ", "ward.py:15", "eval returned a bool", ""),
-    "unknown parameter": ("self.kd", "self.kdd", "ward.py:21", "no attribute 'kdd'", "mend"),
+    "unknown parameter": ("self.kd", "self.kdd", "ward.py:21", "no attribute 'kdd'", "correct the formula"),
     "out of range": ("number(0.3", "number(3.0", "ward.py", "3 given", ""),
     "not there": ("from gonio import ops", "import beta", "ward.py:2", "No module named 'beta'", ""),
 }  # fmt: skip
