@@ -360,7 +360,7 @@ def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest
         ({"surface": SMALL, "solid_angle": 1e-9}, "half angle"),
         ({"surface": SMALL, "solid_angle": 1e-4, "table": "half-difference"}, "GB"),
         ({"surface": SMALL, "facet": "mirrror"}, "unknown material"),
-        ({"surface": SMALL, "facet": "dielectric"}, "lets light through"),
+        ({"surface": SMALL, "facet": "dielectric"}, "transmits light"),
         ({"surface": SMALL, "facet": "conductor(alpha=(.1,.4))"}, "anisotropic"),
         ({"surface": SMALL, "samples": 1}, "1000 to"),
         ({"surface": SMALL, "samples": 1 << 30, "theta_i": [0.0]}, "67108864 rays on each patch"),

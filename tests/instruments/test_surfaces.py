@@ -187,7 +187,7 @@ def test_a_patch_that_is_none_is_refused() -> None:
         (good.vertices, good.faces[:0], good.size),
         (good.vertices, good.faces, (0.0, 1.0)),
     ):
-        with pytest.raises(InputError, match="are no patch"):
+        with pytest.raises(InputError, match="are not a patch"):
             Patch(vertices, faces, size, 0.0)
 
 

@@ -1,7 +1,7 @@
-"""Parameters of a scene's materials fitted to a picture of it, by Gonio's path tracer and its derivatives.
+"""Fit parameters of a scene's materials to a picture of the scene, with Gonio's path tracer and its derivatives.
 
-Each step renders the picture together with its derivative along every number (`render.gradients`), and solves for all
-of them at once, as the fit to tables does; so a fit takes some ten steps, and standard errors come with it.
+Each step renders the picture and its derivatives with respect to all parameters (`transport.gradients`) and solves for
+all of them at once, as the fit to tables does. A fit takes about ten steps and provides standard errors.
 """
 
 from __future__ import annotations
@@ -40,26 +40,27 @@ from ..work import garbage
 
 Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20
-DARK = 0.05  # of the median brightness: below it differences are differences, above it ratios
-TILE = 8  # pixels: errors within a tile are alike
-OTHER = 0x9E3779B9  # what the seed of derivatives differs by
-DEEPEST = 8  # segments of paths, where the scene says nothing
+DARK = 0.05  # of the median brightness: residuals are absolute below, relative above
+TILE = 8  # pixels: errors within a tile are correlated
+OTHER = 0x9E3779B9  # XOR mask between the seeds of picture and derivatives
+DEEPEST = 8  # segments of paths if the scene sets no depth
 
 
 @dataclass(frozen=True)
 class PictureFit:
-    """What came of a fit to a picture.
+    """Result of a fit to a picture.
 
-    materials    with the fitted values, by the place of their shape: "shapes.0.material"
-    names        of the numbers that moved: "shapes.0.material.alpha", ...
-    values       theirs, (K,)
-    errors       standard errors, (K,): inf where the picture does not tell
+    materials    materials with the fitted values, by their paths: "shapes.0.material"
+    names        names of the fitted numbers: "shapes.0.material.alpha", ...
+    values       fitted numbers, (K,)
+    errors       standard errors, (K,); inf for numbers that the picture does not determine
     correlation  (K, K)
-    losses       mean squared relative difference after each step, the first before any
+    losses       mean squared relative difference before the first step and after each step
     relative     mean |difference| over mean brightness
-    wanted       the picture that was given, fitted the one that was found, (H, W, 3)
-    notes        what is odd about it
-    seconds      that it took
+    wanted       the given picture, (H, W, 3)
+    fitted       the picture rendered with the fitted values, (H, W, 3)
+    notes        remarks on the quality of the fit
+    seconds      duration of the fit
     """
 
     materials: Mapping[str, BSDF]
@@ -80,7 +81,7 @@ class PictureFit:
         return np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; an error that is not known is null."""
+        """Dictionary for JSON; unknown errors are null."""
         return {
             "materials": {path: notation.written(one) for path, one in self.materials.items()},
             "notations": {path: notation.for_files(one) for path, one in self.materials.items()},
@@ -96,7 +97,7 @@ class PictureFit:
         }
 
     def save(self, path: str | Path) -> Path:
-        """Write it as .json, whole or not at all."""
+        """Write the result as .json, atomically, and return the path."""
         return files.write_whole(Path(path), (json.dumps(self.as_dict(), indent=1) + "\n").encode())
 
     def __str__(self) -> str:
@@ -125,25 +126,25 @@ def fit_picture(
 ) -> PictureFit:
     """Fit parameters of a scene's materials to a picture of the scene.
 
-        found = fit_picture("photo.exr", "scene.json", ["shapes.0.material"])
+        result = fit_picture("photo.exr", "scene.json", ["shapes.0.material"])
 
-    picture     .exr, .hdr, .npz or .png, linear radiance as the scene's camera would see it
-    scene       of the lab's format; what its materials are set to is where the fit starts
-    free        "shapes.0.material": all of that material's numbers that move; "shapes.0.material.alpha": that one
-    model       a material that is put in the place of the first of `free`
-    param       values by their path in the scene, as `gonio study` has them, set before
-    spp         samples a pixel, of each render
-    steps       at most
-    seed        of all random numbers, 1 if None
+    picture     .exr, .hdr, .npz or .png, linear radiance from the camera of the scene
+    scene       a scene file; the fit starts from the parameters of its materials
+    free        "shapes.0.material" for all free parameters of that material, "shapes.0.material.alpha" for one
+    model       a material that replaces the first of `free`
+    param       values by their path in the scene, as in `gonio study`, set before the fit
+    spp         samples per pixel of each render
+    steps       maximum number of steps
+    seed        seed of all random numbers, 1 if None
     progress    called after each step with its number and the loss
-    Raises InputError for files, paths and pictures that do not fit together.
+    Raises InputError for invalid files and paths, and if picture and scene do not match.
     """
     started = time.perf_counter()
     wanted = images.read(picture).pixels
     mi = engine.load(device)
     if not str(mi.variant()).endswith("ad_rgb"):
         raise InputError(
-            f"variant {mi.variant()} is set", "device", "a fit to a picture takes llvm_ad_rgb or cuda_ad_rgb"
+            f"variant {mi.variant()} is set", "device", "a fit to a picture needs llvm_ad_rgb or cuda_ad_rgb"
         )
     overrides = dict(param or {})
     if model is not None:
@@ -153,10 +154,10 @@ def fit_picture(
     )
     width, height = description.camera.film.size
     if wanted.shape[:2] != (height, width):
-        what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, as the scene's film has"
-        raise InputError(what, str(picture), "render the scene in that size, or scale neither")
+        what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, the size of the film"
+        raise InputError(what, str(picture), "set the film to the size of the picture")
     if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
-        raise InputError("the picture is dark, or not finite", str(picture))
+        raise InputError("the picture is black or not finite", str(picture))
     with garbage.paused():
         built = scenes.built(description, mi)
         problem = Problem(
@@ -181,7 +182,7 @@ def _depth(description: SceneDescription) -> int:
 
 @dataclass(frozen=True)
 class Target:
-    """A material of the scene whose numbers move."""
+    """A material of the scene with free parameters."""
 
     path: str
     plugin: BSDFPlugin
@@ -231,12 +232,12 @@ class Problem:
         self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
         self.depth = depth
         self.wanted = wanted.astype(np.float64)
-        # a mean of neighbors: a pixel's own noise must not weigh it
+        # mean over neighbors, so that the weight of a pixel does not depend on its own noise
         level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
         lit = level[level > 0.0]
         self.weight = 1.0 / (level + DARK * float(np.median(lit)))
         self.free = [replace(one, path=f"{target.path}.{one.path}") for target in targets for one in target.moving]
-        # numbers that one derivative is taken along
+        # groups of parameters that share one derivative
         self.columns: list[list[int]] = []
         self.along: list[Along] = []
         for target in targets:
@@ -255,7 +256,7 @@ class Problem:
         return np.concatenate([start_of(target.material, target.moving) for target in self.targets])
 
     def put(self, numbers: Floats) -> None:
-        """Set the numbers in the plugins."""
+        """Set the parameters of the plugins."""
         import drjit as dr
 
         at = 0
@@ -273,7 +274,7 @@ class Problem:
         return Settings("path", max_depth=self.depth, seed=seed)
 
     def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
-        """The picture with these numbers."""
+        """Render the picture with these parameters."""
         self.put(numbers)
         render = Render(self.scene, self._settings(self.seed if seed is None else seed))
         render.advance(spp or self.spp)
@@ -283,9 +284,9 @@ class Problem:
         return float(np.mean(((self.render(numbers) - self.wanted) * self.weight) ** 2))
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
-        """By channel."""
+        """Residuals and derivatives per channel."""
         residual = (self.render(numbers) - self.wanted) * self.weight
-        # by other samples: noise that derivatives and differences have in common would count as slope
+        # independent samples: noise shared by derivatives and residuals would bias the gradient
         render = Gradients(self.scene, self._settings(self.seed ^ OTHER), self.along)
         render.advance(self.spp)
         slopes = [slope.astype(np.float64) * self.weight for slope in render.slopes()]

@@ -1,1 +1,1 @@
-"""The virtual gonioreflectometer: rays through a surface (`rays`), what the detector saw (`readings`), files of it."""
+"""The virtual gonioreflectometer: rays (`rays`), detector readings (`readings`), files (`run`)."""

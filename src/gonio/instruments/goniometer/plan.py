@@ -1,4 +1,4 @@
-"""Where values are wanted: the cells of a format, or angles of one's own."""
+"""Directions to measure: the cells of a file format, or angles given by the user."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ from ...measure.tables.half_difference import HalfDifference
 from ...measure.tables.samples import Samples
 
 Floats = NDArray[np.float64]
-MOST_CELLS = 1 << 24
-MOST_ANGLES = 1 << 16
+MAX_CELLS = 1 << 24
 
 
 class Plan:
-    """A format, and the directions that it stores values of.
+    """A file format and the directions at which it stores values.
 
-    file  the format; None where the table is not written
-    kind  of table
+    file  the format; .gonio if nothing is written
+    kind  kind of the table
     """
 
     def __init__(self, output: Path | None, kind: str, grid: tuple[Floats, Floats, Floats] | None) -> None:
@@ -42,17 +41,15 @@ class Plan:
         if kind and kind not in kinds:
             raise InputError(f"unknown kind of table '{kind}'", "--table", did_you_mean(kind, kinds))
         if kind and own not in ("any", kind):
-            raise InputError(
-                f"{self.file.name} files hold tables of kind {own}", "--table", "leave it out, or use .gonio"
-            )
+            raise InputError(f"{self.file.name} files hold tables of kind {own}", "--table", "omit it, or use .gonio")
         self.kind = kind or ("angles" if own == "any" else own)
         self._grid = grid
         if grid is not None and (own not in ("any", "samples") or self.kind not in ("angles", "samples")):
-            hint = "leave out --theta-i, --theta-r and --phi, or use .gonio, .astm or .brdf"
+            hint = "omit --theta-i, --theta-r and --phi, or use .gonio, .astm or .brdf"
             raise InputError(f"a {self.kind} table has directions of its own", where, hint)
 
     def table(self, source: Measurement) -> Measurement:
-        """A table of what `source.rgb` gives at its directions."""
+        """A table of the values of `source.rgb` at the planned directions."""
         about: dict[str, Any] = {"title": source.title, "source": source.source}
         if self._grid is not None:
             wo, wi = angles.pairs(*self._grid)
@@ -68,7 +65,7 @@ class Plan:
 
 
 def axis_of(text: str | None, name: str) -> list[float] | None:
-    """Angles from "0,30,60", or "0:85:5" for every fifth degree up to 85; None where none are given."""
+    """Angles from "0,30,60", or "0:85:5" for every fifth degree up to 85; None if `text` is None."""
     if text is None:
         return None
     where = f"--{name.replace('_', '-')}"
@@ -94,7 +91,7 @@ def axis_of(text: str | None, name: str) -> list[float] | None:
 
 
 def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: float) -> Floats:
-    """Angles in degrees as an axis in radians. InputError for none, and for what is out of range."""
+    """Convert angles in degrees to a sorted axis in radians. Raises InputError if empty or out of range."""
     if values is None:
         return default
     degrees = np.unique(np.asarray(values, np.float64))
@@ -108,7 +105,7 @@ def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: 
 def grid_of(
     theta_i: Sequence[float] | None, theta_r: Sequence[float] | None, phi: Sequence[float] | None
 ) -> tuple[Floats, Floats, Floats] | None:
-    """Angles of one's own [degrees]; None where none are given, and what is left out as in tables of kind `angles`."""
+    """Axes [rad] from given angles [degrees], missing ones as in tables of kind `angles`; None if none are given."""
     if theta_i is None and theta_r is None and phi is None:
         return None
     thetas, phis = angles.nodes()
@@ -119,16 +116,16 @@ def grid_of(
         angles_of(phi, phis, "phi", 180.0),
     )
     cells = int(np.prod([len(axis) for axis in axes]))
-    if cells > MOST_CELLS:
-        raise InputError(f"{cells} cells, at most {MOST_CELLS} expected", "--theta-i", "give fewer angles")
+    if cells > MAX_CELLS:
+        raise InputError(f"{cells} cells, at most {MAX_CELLS} expected", "--theta-i", "give fewer angles")
     return axes
 
 
 def without(table: Measurement, blocked: float) -> tuple[Measurement, float, bool]:
-    """A table without the cells whose directions are nearer to each other than `blocked` [rad].
+    """Remove the cells whose two directions are closer than `blocked` [rad].
 
-    Returns it with their share, and whether they could be left out: MERL's cells can be invalid and samples missing,
-    other tables have a value everywhere.
+    Returns the table, the share of removed cells, and whether removal is possible: cells of MERL tables can be invalid
+    and samples can be missing, but other tables have a value everywhere.
     """
     if blocked <= 0.0:
         return table, 0.0, True
@@ -145,7 +142,7 @@ def without(table: Measurement, blocked: float) -> tuple[Measurement, float, boo
         wo, wi = table.pairs()
         visible = between(wo, wi) >= blocked
         if int(visible.sum()) < 8:
-            raise InputError(f"{visible.sum()} directions are left", "--blocked", "block less, or measure more")
+            raise InputError(f"{visible.sum()} directions remain, at least 8 expected", "--blocked", "block less")
         made_ = Samples(table.directions[visible], table.values[visible], title=table.title, source=table.source)
         made_.beside = {name: array[visible] for name, array in table.beside.items()}
         return made_, float(1.0 - visible.mean()), True
@@ -153,19 +150,19 @@ def without(table: Measurement, blocked: float) -> tuple[Measurement, float, boo
 
 
 def between(wo: Floats, wi: Floats) -> Floats:
-    """The angle between two directions, rad."""
+    """Angle between two directions (N, 3), rad, (N,)."""
     return 2.0 * np.arctan2(np.linalg.norm(wo - wi, axis=1), np.linalg.norm(wo + wi, axis=1))
 
 
 def beside_lamp(wo: Floats, wi: Floats, blocked: float) -> Floats:
-    """wo, moved to the rim of the blocked cone about wi where it lies inside."""
+    """wo, with directions inside the blocked cone about wi moved to its rim."""
     hidden = between(wo, wi) < blocked
     if blocked <= 0.0 or not hidden.any():
         return wo
     o, i = wo[hidden], wi[hidden]
     aside = o - np.sum(o * i, axis=1, keepdims=True) * i
     length = np.linalg.norm(aside, axis=1, keepdims=True)
-    up = np.array([0.0, 0.0, 1.0]) - i[:, 2:] * i  # toward the normal, where both are one
+    up = np.array([0.0, 0.0, 1.0]) - i[:, 2:] * i  # toward the normal if wo equals wi
     flat = np.linalg.norm(up, axis=1, keepdims=True) < 1e-6
     up = np.where(flat, [1.0, 0.0, 0.0], up)
     aside = np.where(length < 1e-9, up, aside)

@@ -1,4 +1,4 @@
-"""Rays through a patch of surface without end: Mitsuba finds the facets, Dr.Jit follows the bounces."""
+"""Ray tracing in a periodic patch of a surface: Mitsuba intersects the facets, a Dr.Jit loop follows the bounces."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..surfaces.base import Patch
 Floats = NDArray[np.float64]
 Kernel: TypeAlias = Any  # a value inside a kernel
 
-MOST_BOUNCES = 256
-MOST_STEPS = 4096  # bounces and crossings of a wall together
-OFFSET = 1e-6  # of the period's extent, by which a ray starts above its facet: some roundings of a position in float32
+MAX_BOUNCES = 256
+MAX_STEPS = 4096  # bounces plus crossings of a periodic boundary
+OFFSET = 1e-6  # of the period's extent: offset of a ray's origin from its facet, a few float32 roundings
 UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # a ray's state: DARK is absorbed, LOST below the surface by rounding
-LANES = 1 << 21  # rays at a time: memory stays flat
+LANES = 1 << 21  # rays per launch, to bound memory
 
 
 class Ground(NamedTuple):
-    """A patch in Mitsuba's hands.
+    """A patch as a Mitsuba scene.
 
-    scene   its triangles
-    size    of the period, x and y
-    top     height at which rays start, and have left
-    offset  by which a ray starts above its facet
+    scene   the triangles
+    size    extent of the period in x and y
+    top     height at which rays start and escape
+    offset  distance of a ray's origin from its facet
     """
 
     scene: Scene
@@ -54,14 +54,14 @@ def ground(patch: Patch) -> Ground:
 
 
 class Left(NamedTuple):
-    """How each ray left.
+    """Final state of each ray; rays that neither escaped nor were lost were absorbed.
 
-    angle      of incidence, by its number
-    direction  turned so that its light lay above x
-    weight     what is left of it, a color
-    bounces    facets that it met
-    escaped    whether it left at all
-    lost       whether rounding brought it below the surface; what did neither was absorbed
+    angle      index of the angle of incidence
+    direction  final direction, rotated so that the light comes from above the x axis
+    weight     remaining throughput, a color
+    bounces    number of facets hit
+    escaped    whether it left the surface
+    lost       whether rounding errors moved it below the surface
     """
 
     angle: Kernel
@@ -73,18 +73,18 @@ class Left(NamedTuple):
 
 
 def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> Left:
-    """Send rays down to the surface, and follow them until they leave.
+    """Trace rays from above the surface until they leave.
 
-    facet    bound to the variant's types
-    cosines  of the angles of incidence; azimuths are even over the turn, and places over the period
-    each     rays of one angle; all rays are numbered angle by angle
-    first    the number of the first ray that is sent now, of `count`
+    facet    material of the facets, bound to the variant's types
+    cosines  cosines of the angles of incidence; azimuths and positions are uniformly distributed
+    each     rays per angle; all rays are numbered angle by angle
+    first    number of the first of `count` rays
     """
     mi = engine.load()
     number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)
     angle = number // dr.opaque(mi.UInt32, each)
     rng = mi.PCG32(size=count, initstate=dr.opaque(mi.UInt64, seed), initseq=dr.opaque(mi.UInt64, first))
-    # over the period along a Z-shaped curve: rays that are neighbors meet the same facets, which is 3 times as fast
+    # positions along a Z-order curve: neighboring rays hit the same facets, which is 3 times as fast
     along_curve = mi.Float64(number % dr.opaque(mi.UInt32, each)) + mi.Float64(rng.next_float32())
     index = mi.UInt32(dr.minimum(along_curve * dr.opaque(mi.Float64, 2.0**32 / each), 2.0**32 - 1.0))
     u, v = (2.0**-16 * (mi.Float(_every_other(index >> bit)) + rng.next_float32()) for bit in (0, 1))
@@ -101,7 +101,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     def step(
         place: Kernel, along: Kernel, weight: Kernel, bounces: Kernel, steps: Kernel, state: Kernel, rng: Kernel
     ) -> tuple[Kernel, ...]:
-        # on its way to a facet it may come to a wall of the period, or to the roof
+        # before a facet, a ray may reach a boundary of the period or the top
         wall_x = dr.select(along.x == 0.0, dr.inf, (dr.select(along.x > 0.0, half_x, -half_x) - place.x) / along.x)
         wall_y = dr.select(along.y == 0.0, dr.inf, (dr.select(along.y > 0.0, half_y, -half_y) - place.y) / along.y)
         wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
@@ -112,7 +112,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         is_hit = hit.is_valid()
         away = ~is_hit & (roof <= wall)
         through = ~is_hit & ~away
-        # at a facet it turns
+        # scattering at the facet
         si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, is_hit)
         frame = mi.Frame3f(si.n)
         back = frame.to_local(-along)
@@ -125,14 +125,14 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         weight = dr.select(on_front, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
         bounces = dr.select(on_front, bounces + 1, bounces)
         along_next = dr.select(on_front, dr.normalize(frame.to_world(onward)), along)
-        # through a wall it comes in again across from there
+        # a ray that crosses a boundary enters on the opposite side
         beyond = place + along * wall
         is_x = wall_x <= wall_y
         beyond.x = dr.select(is_x, dr.select(along.x > 0.0, -half_x, half_x), beyond.x)
         beyond.y = dr.select(is_x, beyond.y, dr.select(along.y > 0.0, -half_y, half_y))
         place = dr.select(on_front, si.p + si.n * offset, dr.select(through, beyond, place))
         steps = steps + 1
-        over = (bounces >= MOST_BOUNCES) | (steps >= MOST_STEPS)
+        over = (bounces >= MAX_BOUNCES) | (steps >= MAX_STEPS)
         state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
         return place, along_next, weight, bounces, steps, mi.UInt32(state), rng
 
@@ -146,14 +146,14 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
 
 
 def _every_other(bits: Kernel) -> Kernel:
-    """Bits 0, 2, 4, ... as a number of 16 bits: one coordinate of a place on the Z-shaped curve."""
+    """Bits 0, 2, 4, ... as a number of 16 bits: one coordinate of a point on the Z-order curve."""
     for shift, mask in ((0, 0x55555555), (1, 0x33333333), (2, 0x0F0F0F0F), (4, 0x00FF00FF), (8, 0x0000FFFF)):
         bits = (bits | (bits >> shift)) & mask
     return bits
 
 
 def bound(facet: BSDF) -> BSDF:
-    """A facet's material for Mitsuba's types, ready for loops."""
+    """Bind the material of a facet to Mitsuba's types, ready for use in loops."""
     mi = engine.load()
     guide_search.prepare(facet)
     return facet.bind(backend.types_like(mi.Float))

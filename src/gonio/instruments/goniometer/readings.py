@@ -1,9 +1,10 @@
-"""What a rough surface sends into a detector, from rays: one map of outgoing light for each angle of incidence.
+"""Detector readings of a rough surface, from rays: one map of outgoing light per angle of incidence.
 
-A map is a grid over the disk of equal area, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), the light above x. The
-surface turns under the light, so y and -y are the same and half the disk is kept. The detector's opening is a cone; in
-the maps it is the squares whose centers lie in it, between the four centers around its axis. What it collects is
-divided by the projected solid angle of those same squares above the horizon, so that f is an average over them.
+A map is a grid over the equal-area disk, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), with the light above x. The
+surface rotates under the light, so y and -y are equivalent and only half of the disk is stored. The opening of the
+detector is a cone; in the maps it consists of the squares whose centers it contains, interpolated between the four
+centers around its axis. The collected light is divided by the projected solid angle of the same squares above the
+horizon, so f is an average over them.
 """
 
 from __future__ import annotations
@@ -22,20 +23,22 @@ from ..surfaces.base import Surface
 from . import rays
 from .specimen import GROUPS, Floats, Specimen, half_angle
 
-SQUARES = 2.5  # of the map, along the detector's half angle
-SMALLEST = 0.25  # degrees of a detector's half angle
-MOST_LIGHTS = 64  # different angles of incidence that are each measured; of more, a grid is, and is linear between
-STEEPEST = 89.0  # degrees of incidence; beyond it values are held
-PARTS = 8  # per side of a square, to find how much of it is above the horizon
-MOST_EACH = 1 << 24  # rays of one patch and angle: sums in float32 hold no more
-MOST_BYTES = 4 << 30  # of the maps
+SQUARES = 2.5  # squares of the map per half angle of the detector
+SMALLEST = 0.25  # degrees, the smallest half angle of a detector
+MAX_LIGHTS = 64  # angles of incidence measured individually; more are interpolated linearly from a grid
+STEEPEST = 89.0  # degrees of incidence; values beyond are those at this angle
+PARTS = 8  # subdivisions per side of a square to integrate its part above the horizon
+MAX_RAYS = 1 << 24  # rays per patch and angle that a float32 sum can hold
+MAX_BYTES = 4 << 30  # memory limit of the maps
 
 
 class Rough(Specimen):
-    """A surface of facets, measured with rays.
+    """A surface of facets, measured with rays. The attributes are set by `prepare`.
 
-    lights, first, later, lost  after `prepare`: angles of incidence [rad], (N,); shares of the light that leave after
-                                one facet, and after more, (N, 3); share of rays lost to rounding, (N,)
+    lights  angles of incidence [rad], (N,)
+    first   share of the light that leaves after one facet, (N, 3)
+    later   share of the light that leaves after two facets or more, (N, 3)
+    lost    share of the rays lost to rounding, (N,)
     """
 
     def __init__(
@@ -50,17 +53,17 @@ class Rough(Specimen):
         progress: Callable[[int, int], None] | None = None,
         facet_name: str = "",
     ) -> None:
-        """rays_each: of one angle of incidence, over all patches; patches: rounded up to a multiple of `GROUPS`"""
+        """rays_each: rays per angle of incidence over all patches; patches: rounded up to a multiple of `GROUPS`."""
         check_facet(facet)
         self.surface, self.facet, self.seed, self.device = surface, facet, seed, device
         self.half_angle = half_angle(solid_angle)
         if not np.radians(SMALLEST) <= self.half_angle:
             what = f"{solid_angle:.3g} sr, a half angle of {np.degrees(self.half_angle):.2g} degrees"
             least = 2.0 * np.pi * (1.0 - np.cos(np.radians(SMALLEST)))
-            raise InputError(f"the detector sees {what}", "--solid-angle", f"give {least:.2g} sr or more")
+            raise InputError(f"the detector has {what}", "--solid-angle", f"give {least:.2g} sr or more")
         self.rays_each, self.patches = rays_each, -(-patches // GROUPS) * GROUPS
         self._progress = progress or (lambda done, total: None)
-        self.side = int(np.ceil(SQUARES * np.sqrt(2.0) / self.half_angle))  # squares over the radius of the disk
+        self.side = int(np.ceil(SQUARES * np.sqrt(2.0) / self.half_angle))  # squares along the radius of the disk
         self.title = f"{surface} of {facet_name or written(facet)}"
         self.about = {
             "format": "gonio",
@@ -78,7 +81,7 @@ class Rough(Specimen):
 
     def prepare(self, theta_i: Floats) -> None:
         wanted: Floats = np.unique(np.round(np.minimum(theta_i, np.radians(STEEPEST)), 9))
-        if len(wanted) > MOST_LIGHTS:
+        if len(wanted) > MAX_LIGHTS:
             count = int(np.ceil(np.radians(STEEPEST) / self.half_angle)) + 1
             wanted = np.linspace(0.0, np.radians(STEEPEST), count)
         self.lights: Floats = wanted
@@ -94,10 +97,10 @@ class Rough(Specimen):
         channels = 1 if is_gray(self.facet) else 3
         lights, squares = len(self.lights), 2 * self.side * self.side
         total, size = lights * each, 2 * lights * channels * squares
-        if each > MOST_EACH or total >= 1 << 32:
+        if each > MAX_RAYS or total >= 1 << 32:
             what = f"{each} rays on each patch, at each of {lights} angles of incidence"
             raise InputError(what, "--samples", "give more patches, or fewer rays")
-        if 4 * size * (GROUPS + 3) > MOST_BYTES:
+        if 4 * size * (GROUPS + 3) > MAX_BYTES:
             what = f"maps of {lights} angles of incidence would take {4e-9 * size * (GROUPS + 3):.0f} GB"
             raise InputError(what, "--solid-angle", "give a larger one, or fewer angles")
         cosines = mi.Float(np.cos(self.lights).astype(np.float32))
@@ -131,23 +134,23 @@ class Rough(Specimen):
         self.lost = lost / (each * self.patches)
 
     def _look(self, sums: NDArray[np.float32], sent: int) -> None:
-        """Collect the maps by the detector's opening about each square: (group, bounces, light, square, channel)."""
+        """Integrate the maps over the opening about each square: (group, bounces, light, square, channel)."""
         of_light = sums.sum(axis=(4, 5), dtype=np.float64).mean(axis=0) / sent
         self.first, self.later = (np.repeat(one, 3, 1)[:, :3] if one.shape[1] == 1 else one for one in of_light)
         groups, orders, lights, channels = sums.shape[:4]
         solid = projected(self.side)
-        self._seen = np.empty((groups + 1, orders, lights, solid.size, channels), np.float32)
+        self._collected = np.empty((groups + 1, orders, lights, solid.size, channels), np.float32)
         for group, one in enumerate(sums):
             collected, self._solid = gathered(one, solid, self.half_angle)
             flat = collected.reshape(orders, lights, channels, -1)
-            # half of what came down to y and -y together; channels last, as they are looked up together
-            self._seen[group] = np.moveaxis(flat, 2, 3) * np.float32(0.5 / sent)
-        self._seen[groups] = self._seen[:groups].mean(axis=0)
+            # y and -y share one square, hence the factor 0.5; channels last, since lookups read them together
+            self._collected[group] = np.moveaxis(flat, 2, 3) * np.float32(0.5 / sent)
+        self._collected[groups] = self._collected[:groups].mean(axis=0)
 
     # ------------------------------------------------------------------ reading
 
     def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
-        group = self._seen[GROUPS if part is None else part]
+        group = self._collected[GROUPS if part is None else part]
         maps = {"first": group[0], "later": group[1]}.get(bounces)
         maps = group[0] + group[1] if maps is None else maps
         places, weights = self._places(wo, wi)
@@ -162,9 +165,9 @@ class Rough(Specimen):
         return total / solid[:, None]
 
     def _places(self, wo: Floats, wi: Floats) -> tuple[list[NDArray[np.int64]], list[Floats]]:
-        """The four squares whose centers are around wo, and their weights."""
+        """Indices of the four squares around wo, and their interpolation weights."""
         flat = np.hypot(wi[:, 0], wi[:, 1])
-        pole = flat < 1e-9  # of light from above every azimuth is as good; that of wo needs none
+        pole = flat < 1e-9  # at normal incidence every azimuth is equivalent
         some = np.where(pole, 1.0, flat)
         c, s = np.where(pole, 1.0, wi[:, 0] / some), np.where(pole, 0.0, wi[:, 1] / some)
         shrink = self.side / np.sqrt(1.0 + np.maximum(wo[:, 2], 0.0))
@@ -184,15 +187,15 @@ class Rough(Specimen):
 
 
 def check_facet(facet: BSDF) -> None:
-    """Raise InputError for a material that cannot be a facet's."""
+    """Raise InputError if a material cannot be used for facets."""
     if facet.transmits:
-        raise InputError(f"{facet.name} lets light through", "--facet", "facets reflect only: conductor, mirror, ...")
+        raise InputError(f"{facet.name} transmits light", "--facet", "facets reflect only: conductor, mirror, ...")
     if not facet.isotropic:
-        raise InputError(f"this {facet.name} is anisotropic", "--facet", "a facet has no direction of its own")
+        raise InputError(f"this {facet.name} is anisotropic", "--facet", "facets need an isotropic material")
 
 
 def is_gray(facet: BSDF) -> bool:
-    """Whether its samples weigh the same in all channels."""
+    """Whether sample weights of the material are equal in all channels."""
     rng = np.random.default_rng(7)
     wo = rng.standard_normal((256, 3))
     wo[:, 2] = np.abs(wo[:, 2]) + 0.01
@@ -201,7 +204,7 @@ def is_gray(facet: BSDF) -> bool:
 
 
 def centers(side: int) -> Floats:
-    """The direction of each square's center, (side, 2 side, 3); beyond the disk they lie below the horizon."""
+    """Direction of the center of each square, (side, 2 side, 3); centers outside the disk are below the horizon."""
     y, x = np.meshgrid((np.arange(side) + 0.5) / side, (np.arange(2 * side) + 0.5) / side - 1.0, indexing="ij")
     square = np.minimum(x * x + y * y, 2.0)
     scale = np.sqrt(2.0 - square)
@@ -209,7 +212,7 @@ def centers(side: int) -> Floats:
 
 
 def projected(side: int) -> Floats:
-    """The projected solid angle of each square above the horizon, (side, 2 side): its area times 2 cos theta."""
+    """Projected solid angle of each square above the horizon, (side, 2 side): its area times 2 cos theta."""
     fine = side * PARTS
     y, x = np.meshgrid((np.arange(fine) + 0.5) / fine, (np.arange(2 * fine) + 0.5) / fine - 1.0, indexing="ij")
     cos = np.maximum(1.0 - x * x - y * y, 0.0)
@@ -217,14 +220,14 @@ def projected(side: int) -> Floats:
 
 
 def gathered(maps: NDArray[np.float32], solid: Floats, half_angle: float) -> tuple[NDArray[np.float32], Floats]:
-    """Sums over the cone about each square, of maps (..., side, 2 side) and of `solid`, which comes back flat."""
+    """Sums of maps (..., side, 2 side) and of `solid` over the cone about each square; the latter flattened."""
     side = solid.shape[0]
     reach = int(np.ceil(half_angle * side)) + 1
     lowest = np.cos(half_angle)
     directions = centers(side)
 
     def padded(values: NDArray) -> NDArray:
-        wide = np.concatenate([np.flip(values[..., :reach, :], -2), values], -2)  # y and -y are the same
+        wide = np.concatenate([np.flip(values[..., :reach, :], -2), values], -2)  # y and -y are equivalent
         return np.pad(wide, [(0, 0)] * (values.ndim - 2) + [(0, reach), (reach, reach)])
 
     full, area = padded(maps), padded(solid)

@@ -1,4 +1,4 @@
-"""Measure a material, or a surface, and write what was found."""
+"""Measure a material or a surface, and write the values."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ from .readings import Rough
 from .specimen import BOUNCES, GROUPS, Model, Specimen
 
 Floats = NDArray[np.float64]
-DETECTOR = 0.006  # sr, a cone of 2.5 degrees about its axis: what sees a surface where nothing is said
-MOST_BLOCKED = 60.0  # degrees
+DETECTOR = 0.006  # sr, a cone with a half angle of 2.5 degrees: the default for surfaces
+MAX_BLOCKED = 60.0  # degrees
 
 
 @dataclass(frozen=True)
 class Readout:
-    """What was measured.
+    """Result of a measurement.
 
-    table      the values, which `table.beside` has the standard errors of ("error") and, of a surface, the part that
-               met one facet only ("first")
-    path       the file, None where none was asked for
-    format     of the file
-    cells      how many values it holds
-    blocked    share of its cells that could not be measured
-    error      median standard error as a share of the value; None where values are exact
-    incidence  angles of incidence that rays were sent at, degrees; empty of a material, as are the next three
-    first      share of that light which leaves after one facet, luminance
-    later      after two facets or more
-    lost       share of the rays that rounding lost
-    rays       sent
-    seconds    it took
-    notes      what there is to know
+    table      the values; `table.beside` holds their standard errors ("error") and, for a surface, the part reflected
+               by one facet only ("first")
+    path       the file; None if none was written
+    format     format of the file
+    cells      number of values in the table
+    blocked    share of the cells that could not be measured
+    error      median relative standard error; None if values are exact
+    incidence  angles of incidence of the rays, degrees; empty for a material, as are the next three
+    first      share of the light that leaves after one facet, luminance
+    later      share of the light that leaves after two facets or more, luminance
+    lost       share of the rays lost to rounding
+    rays       number of rays
+    seconds    duration of the measurement
+    notes      remarks
     """
 
     table: Measurement
@@ -65,14 +65,14 @@ class Readout:
     notes: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON: everything but the values."""
+        """Dictionary for JSON, without the values."""
         about = {name: value for name, value in vars(self).items() if name not in ("table", "path")}
         path = None if self.path is None else str(self.path)
         return {"output": path, "title": self.table.title, "kind": self.table.name, **about}
 
 
 class _Pass(Measurement):
-    """What a format asks for its values: each answer is a measurement."""
+    """Source of values for a table: each query is a measurement."""
 
     def __init__(
         self,
@@ -84,19 +84,19 @@ class _Pass(Measurement):
         part: int | None = None,
         known: dict[int, Floats] | None = None,
     ) -> None:
-        """known: answers by the number of the question, f without noise, that are the same in all parts"""
+        """known: noise-free f by number of the query, for queries whose results are the same in all parts."""
         super().__init__(specimen.title, specimen.about)
         self._specimen, self._bounces, self._blocked, self._noise, self._seed = specimen, bounces, blocked, noise, seed
         self._part, self._known = part, {} if known is None else known
         self._asked = 0
 
     def part(self, part: int) -> _Pass:
-        """The same questions, to a part of the measurement."""
+        """The same queries, to one part of the measurement."""
         made = self._specimen, self._bounces, self._blocked, self._noise, self._seed
         return _Pass(*made, part, self._known)
 
     def first(self) -> _Pass:
-        """The same questions about the first bounce alone, without noise."""
+        """The same queries for the first bounce only, without noise."""
         return _Pass(self._specimen, "first", self._blocked, 0.0, self._seed, None, self._known)
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
@@ -107,7 +107,7 @@ class _Pass(Measurement):
             if self._specimen.exact or wo is wi:
                 self._known[self._asked] = f
         if self._noise > 0.0:
-            # an adaptive table takes its coordinates from retro-reflection: one set, noise and all, serves all parts
+            # adaptive tables derive coordinates from retroreflection: all parts share one set, including its noise
             is_shared = self._part is None or wo is wi
             rng = np.random.default_rng([self._seed, 92, GROUPS if is_shared else self._part or 0, self._asked])
             f = f * (1.0 + self._noise * (1.0 if is_shared else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
@@ -115,7 +115,7 @@ class _Pass(Measurement):
 
 
 class _Scout(Measurement):
-    """What only notes at which angles of incidence values are asked for."""
+    """Records the angles of incidence at which a table queries values."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -150,88 +150,120 @@ def measure(
 ) -> Readout:
     """Measure a material, or a surface built of facets, as a gonioreflectometer does.
 
-        go.measure("conductor(alpha=.2)", "gold.binary")                      # any material into any format
-        go.measure(surface="gaussian:alpha=.3", facet="mirror", output="rough.gonio")
+        go.measure("conductor(alpha=0.2)", "gold.binary")                     # any material into any format
+        go.measure(surface="gaussian:alpha=0.3", facet="mirror", output="rough.gonio")
 
-    material     what is evaluated, as text or object; None where a surface is measured
-    output       the file, its suffix names the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
-    surface      gaussian, vgroove, spheres, with parameters behind a colon; a file of heights; or one of your own
-    facet        what its facets are made of, as text or object: "mirror", "lambert:albedo=.8", "conductor:Au"; as text,
-                 facets are smooth (alpha = 0) where nothing else is said
+    material     the material to evaluate, as text or object; None to measure a surface
+    output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
+    surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
+    facet        material of the facets, as text or object: "mirror", "lambert:albedo=0.8", "conductor:Au"; given as
+                 text, facets are smooth (alpha = 0) unless it sets alpha
     table        in .gonio files: angles, half-difference, adaptive, specular, samples
-    theta_i, theta_r, phi  angles of one's own, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, .006 for
+    theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
+    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, 0.006 for
                  surfaces
-    noise        standard deviation of a reading, as a share of it
-    blocked      degrees about the lamp where the detector cannot stand. MERL's cells are invalid there, samples left
-                 out; other tables hold the value at the rim
-    bounces      of a surface: "all" light, that of the "first" bounce, or what "later" ones add
-    samples      rays at each angle of incidence
-    patches      pieces of a random surface that are measured, rounded up to a multiple of 8; their spread is the
-                 standard error, together with that of the rays
-    seed         0 if None; same seed, same values
+    noise        relative standard deviation of a reading
+    blocked      degrees about the lamp where the detector cannot be placed. There, cells of MERL files are invalid and
+                 samples are omitted; other tables hold the value at the rim
+    bounces      for a surface: "all" light, that of the "first" bounce, or that of "later" bounces
+    samples      rays per angle of incidence
+    patches      number of measured patches of a random surface, rounded up to a multiple of 8; the standard error
+                 includes their spread and that of the rays
+    seed         0 if None; the same seed gives the same values
     device       "cpu", "cuda" or "auto", for surfaces
-    progress     called with rays sent and rays in all
+    progress     called with the number of rays traced and their total
 
-    Returns a `Readout`: the table with a standard error for each value, the energy, the time. Light is counted as it
-    leaves: f is what arrives in the cone, over its projected solid angle above the horizon. A surface's angles of
-    incidence are each measured where a format has few; else a grid is, as fine as the detector's half angle, up to 89
-    degrees, with values linear between. The sample turns, so what is measured is isotropic.
+    Returns a `Readout`: the table with a standard error per value, the energy and the time. f is the light that arrives
+    in the cone of the detector, over the projected solid angle of the cone above the horizon. If a format has few
+    angles of incidence, each is measured; otherwise a grid with the spacing of the detector's half angle, up to 89
+    degrees, is measured and interpolated linearly. The sample rotates, so the result is isotropic.
 
-    Raises InputError for what is unknown, out of range or cannot be written, before anything is computed.
+    Raises InputError for unknown, out-of-range or unwritable arguments, before anything is computed.
     """
     begun = time.perf_counter()
     seed = 0 if seed is None else seed
-    if bounces not in BOUNCES:
-        raise InputError(f"'{bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
-    for name, value, high in (("noise", noise, 1.0), ("blocked", blocked, MOST_BLOCKED)):
-        if not 0.0 <= value <= high:
-            raise InputError(f"{value:g} given, 0 to {high:g} expected", f"--{name}")
-    if solid_angle is not None and not 0.0 < solid_angle < np.pi:
-        raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
-    for name, count, low, most in (
-        ("samples", samples, 1000, 1 << 40),
-        ("patches", patches, 1, 4096),
-        ("seed", seed, 0, 1 << 31),
-    ):
-        if not low <= count <= most:
-            raise InputError(f"{count} given, {low} to {most} expected", f"--{name}")
+    _check_numbers(bounces, solid_angle, noise=noise, blocked=blocked, samples=samples, patches=patches, seed=seed)
     target = None if output is None else files.check_file(output)
     plan = Plan(None if output is None else Path(output), table, grid_of(theta_i, theta_r, phi))
     specimen: Specimen
     if surface is not None:
         if material is not None:
-            raise InputError("a material and a surface given", "MODEL", "name what facets are made of by --facet")
-        detector = DETECTOR if solid_angle is None else solid_angle
-        built = surface_of(surface) if isinstance(surface, str) else surface
-        if not isinstance(built, Surface):
-            raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=.3"')
+            raise InputError("a material and a surface given", "MODEL", "name the material of the facets by --facet")
         made = facet_of(facet) if isinstance(facet, str) else facet
-        specimen = rough = Rough(
-            built, made, detector, samples, patches, seed, device, progress, facet if isinstance(facet, str) else ""
+        specimen = Rough(
+            _surface(surface),
+            made,
+            DETECTOR if solid_angle is None else solid_angle,
+            samples,
+            patches,
+            seed,
+            device,
+            progress,
+            facet if isinstance(facet, str) else "",
         )
         scout = _Scout()
         plan.table(scout)
         specimen.prepare(np.unique(np.concatenate(scout.theta_i)))
     else:
-        if material is None:
-            raise InputError("nothing to measure", "MODEL", "name a material, or a surface by --surface")
-        if bounces != "all":
-            raise InputError(f"{bounces} bounces of a material asked for", "--bounces", "that is for --surface")
-        named = notation.named(material)[0] if isinstance(material, str) else material
-        specimen, rough = Model(named, solid_angle, material if isinstance(material, str) else ""), None
+        specimen = _model(material, solid_angle, bounces)
     measured, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
+    if target is not None:
+        files.write_whole(target, plan.file.write(measured))
+        if "error" in measured.beside and plan.file.writes != "any":
+            notes.append(f"{plan.file.name} files have no place for standard errors; .gonio files store them")
+    path = None if output is None else Path(output)
+    return _readout(measured, specimen, path, "" if output is None else plan.file.name, hidden, notes, begun)
+
+
+def _check_numbers(bounces: str, solid_angle: float | None, **values: float) -> None:
+    """Raise InputError if an argument of `measure` is out of range."""
+    if bounces not in BOUNCES:
+        raise InputError(f"'{bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
+    for name, high in (("noise", 1.0), ("blocked", MAX_BLOCKED)):
+        if not 0.0 <= values[name] <= high:
+            raise InputError(f"{values[name]:g} given, 0 to {high:g} expected", f"--{name}")
+    if solid_angle is not None and not 0.0 < solid_angle < np.pi:
+        raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
+    for name, low, most in (("samples", 1000, 1 << 40), ("patches", 1, 4096), ("seed", 0, 1 << 31)):
+        if not low <= values[name] <= most:
+            raise InputError(f"{values[name]} given, {low} to {most} expected", f"--{name}")
+
+
+def _surface(surface: Surface | str) -> Surface:
+    built = surface_of(surface) if isinstance(surface, str) else surface
+    if not isinstance(built, Surface):
+        raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=0.3"')
+    return built
+
+
+def _model(material: BSDF | str | None, solid_angle: float | None, bounces: str) -> Model:
+    if material is None:
+        raise InputError("nothing to measure", "MODEL", "name a material, or a surface by --surface")
+    if bounces != "all":
+        raise InputError(f"{bounces} bounces of a material requested", "--bounces", "use it with --surface only")
+    if isinstance(material, str):
+        return Model(notation.named(material)[0], solid_angle, material)
+    return Model(material, solid_angle)
+
+
+def _readout(
+    measured: Measurement,
+    specimen: Specimen,
+    path: Path | None,
+    name: str,
+    hidden: float,
+    notes: Sequence[str],
+    begun: float,
+) -> Readout:
+    """The result of `measure`, with the median relative error and the energy of a surface."""
+    rough = specimen if isinstance(specimen, Rough) else None
     error = measured.beside.get("error")
     values = vars(measured)["values"]
     typical = None if error is None or not np.any(values > 0.0) else error[values > 0.0] / values[values > 0.0]
-    if target is not None:
-        files.write_whole(target, plan.file.write(measured))
-        if error is not None and plan.file.writes != "any":
-            notes.append(f"{plan.file.name} files have no place for standard errors; .gonio files keep them")
     return Readout(
         table=measured,
-        path=None if output is None else Path(output),
-        format="" if output is None else plan.file.name,
+        path=path,
+        format=name,
         cells=int(np.prod(values.shape)) // 3,
         blocked=hidden,
         error=None if typical is None else float(np.median(typical)),
@@ -248,7 +280,7 @@ def measure(
 def _filled(
     plan: Plan, specimen: Specimen, blocked: float, noise: float, bounces: str, seed: int
 ) -> tuple[Measurement, float, list[str]]:
-    """The table with what stands beside its values, the share of blocked cells, and notes."""
+    """The table with its standard errors and first-bounce part, the share of blocked cells, and notes."""
     asked = _Pass(specimen, bounces, blocked, noise, seed)
     table = plan.table(asked)
     values = vars(table)["values"]
@@ -265,13 +297,13 @@ def _filled(
     table, hidden, left_out = without(table, blocked)
     notes = []
     if blocked > 0.0 and not left_out:
-        notes.append(f"{table.name} tables have a value everywhere: beside the lamp they hold that of the rim")
+        notes.append(f"{table.name} tables have a value everywhere: near the lamp they hold the value at the rim")
     return table, hidden, notes
 
 
 def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> Surface:
-    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)", a file of heights, or
-    FILE.py:CLASS; its parameters also as "name=value" each."""
+    """A surface from text: "gaussian", "gaussian:alpha=0.3,length=4", "gaussian(alpha=0.3)", a file of heights, or
+    FILE.py:CLASS. `assignments` holds further parameters as "name=value"."""
     if preset:
         raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
     if outside.names_code(text):
@@ -283,9 +315,9 @@ def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> 
 
 
 def facet_of(text: str) -> BSDF:
-    """A facet's material from text: as anywhere, or "conductor:Au" and "lambert:albedo=.8" for short.
+    """The material of facets from its notation, or from short forms such as "conductor:Au" and "lambert:albedo=0.8".
 
-    What may be smooth is, alpha = 0, where no alpha is given.
+    If no alpha is given, it is set to 0 if the model allows that.
     """
     head, colon, rest = text.strip().partition(":")
     if colon and is_model(head):
@@ -301,6 +333,6 @@ def facet_of(text: str) -> BSDF:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """("gaussian", "alpha=.3") of "gaussian:alpha=.3" and of "gaussian(alpha=.3)"."""
+    """("gaussian", "alpha=0.3") of "gaussian:alpha=0.3" and of "gaussian(alpha=0.3)"."""
     match = re.fullmatch(r"([\w-]+)\s*(?::(.*)|\((.*)\))?", text.strip(), re.DOTALL)
     return (text.strip(), "") if match is None else (match[1], match[2] or match[3] or "")

@@ -1,4 +1,4 @@
-"""What lies on the goniometer: it is lit from one direction, and seen by a detector in another."""
+"""Specimens of the goniometer, lit from one direction and measured by a detector in another."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ...errors import InputError
 from ...material import BSDF
 
 Floats = NDArray[np.float64]
-GROUPS = 8  # independent parts of a measurement, whose spread is its standard error
-BOUNCES = {"all": "all light", "first": "light that met one facet", "later": "light that met two facets or more"}
-RINGS = (1, 6, 12, 18)  # points over the detector's opening, of equal area each
+GROUPS = 8  # independent parts of a measurement; their spread gives the standard error
+BOUNCES = {"all": "all light", "first": "light reflected once", "later": "light reflected twice or more"}
+RINGS = (1, 6, 12, 18)  # points per ring of the detector's opening, of equal area each
 
 
 class Specimen:
-    """Something that scatters light.
+    """A scatterer on the goniometer.
 
-    title  what it is
-    about  how it was measured, for the file
-    exact  whether all parts of a measurement agree, and there are no bounces to tell apart
+    title  title for the file
+    about  settings of the measurement for the file
+    exact  whether readings have no statistical error and no separate bounces
     """
 
     title: str
@@ -31,28 +31,28 @@ class Specimen:
     exact: ClassVar[bool] = False
 
     def prepare(self, theta_i: Floats) -> None:
-        """Get ready for light at these angles [rad]: `f` is asked for no others."""
+        """Prepare for these angles of incidence [rad]; `f` is called for no others."""
 
     def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
         """f averaged over the detector's opening about wo, lit from wi, (N, 3), 1/sr.
 
-        part     one of `GROUPS` independent measurements; None is all of them together
-        bounces  of `BOUNCES`
+        part     index of one of `GROUPS` independent measurements; None for the mean of all
+        bounces  a key of `BOUNCES`
         """
         raise NotImplementedError
 
 
 class Model(Specimen):
-    """A material's formulas."""
+    """A material model, evaluated without a surface."""
 
     exact: ClassVar[bool] = True
 
     def __init__(self, material: BSDF, solid_angle: float | None, title: str = "") -> None:
         if not material.isotropic:
-            raise InputError("this material is anisotropic", material.name, "files of measurements hold isotropic ones")
+            raise InputError("this material is anisotropic", material.name, "measurement files hold isotropic ones")
         if material.delta != "never":
-            what = f"{material.name} is a mirror here: a delta lobe has no value in any direction"
-            raise InputError(what, "MODEL", "give it some roughness, such as --param alpha=.05")
+            what = f"{material.name} is a mirror: a delta lobe has no finite value"
+            raise InputError(what, "MODEL", "give it some roughness, such as --param alpha=0.05")
         self.material, self.title = material, title or written(material)
         self._opening = opening(solid_angle)
         size = "a point" if solid_angle is None else f"{solid_angle:g} sr"
@@ -70,12 +70,12 @@ class Model(Specimen):
 
 
 def half_angle(solid_angle: float) -> float:
-    """The half angle of a cone, rad."""
+    """Half angle of a cone of a solid angle [sr], rad."""
     return float(np.arccos(1.0 - solid_angle / (2.0 * np.pi)))
 
 
 def opening(solid_angle: float | None) -> Floats:
-    """Directions evenly over a cone about z, (N, 3); z alone where there is no cone."""
+    """Directions distributed evenly over a cone about z, (N, 3); only z if `solid_angle` is None."""
     if solid_angle is None:
         return np.array([[0.0, 0.0, 1.0]])
     directions, count = [], sum(RINGS)
@@ -89,7 +89,7 @@ def opening(solid_angle: float | None) -> Floats:
 
 
 def to_frame(w: Floats, offsets: Floats) -> Sequence[Floats]:
-    """Each offset from z as an offset from w, (N, 3) each."""
+    """Rotate directions given relative to z to the frames of w, (N, 3) each."""
     if len(offsets) == 1:
         return [w]
     side = np.where(np.abs(w[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""What a surface is: facets of one period, which repeats in x and y without end."""
+"""Base class of surfaces: facets of one period, which repeats infinitely in x and y."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Patch:
-    """One period of a surface, as triangles whose front is above.
+    """One period of a surface, as triangles that face upward.
 
-    vertices  (N, 3); the period spans -size / 2 to size / 2, and whatever crosses its walls is there on both sides
+    vertices  (N, 3); the period spans -size / 2 to size / 2, and geometry that crosses a boundary exists on both sides
     faces     (M, 3), counterclockwise as seen from above
     size      (x, y) of the period
-    top       a height that nothing is above of
+    top       upper bound of the heights
     """
 
     vertices: Floats
@@ -39,15 +39,15 @@ class Patch:
         fits = points.ndim == faces.ndim == 2 and points.shape[1] == faces.shape[1] == 3 and len(faces) > 0
         if not fits or faces.max() >= len(points) or not np.all(np.isfinite(points)) or not min(self.size) > 0.0:
             what = f"vertices {points.shape}, faces {faces.shape} and size {self.size}"
-            raise InputError(f"{what} are no patch", "Patch", "finite vertices (N, 3), faces (M, 3) of their numbers")
+            raise InputError(f"{what} are not a patch", "Patch", "give finite vertices (N, 3), faces (M, 3)")
 
 
 class Surface:
     """A kind of rough surface: a frozen dataclass of its parameters (`parameter`), with `patch`.
 
-    name    as texts name it
-    random  whether `patch` depends on its random numbers: then several are measured, and their spread is part of the
-            standard error
+    name    name in texts
+    random  whether `patch` depends on its random numbers; if so, several patches are measured, and their spread is part
+            of the standard error
     """
 
     family: ClassVar[Family[type[Surface]]]
@@ -61,7 +61,7 @@ class Surface:
                 object.__setattr__(self, field.name, _in_range(getattr(self, field.name), field.metadata, where))
 
     def patch(self, rng: np.random.Generator) -> Patch:
-        """One period of it."""
+        """One period of the surface."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -71,7 +71,7 @@ class Surface:
 
     @classmethod
     def reads(cls, text: str) -> bool:
-        """Whether a text names a file that is such a surface; its path is then the parameter `file`."""
+        """Whether a text names a file with such a surface; its path is then the parameter `file`."""
         return False
 
 
@@ -81,7 +81,7 @@ Surface.family = Family(
 
 
 def parameter(default: T, doc: str, low: float, high: float, unit: str = "") -> T:
-    """Declare a number of a surface, or a whole number where the default is one; None is left as it is."""
+    """Declare a numeric parameter of a surface, an integer if the default is one; the value None stays None."""
     about = {"doc": doc, "low": low, "high": high, "unit": unit, "whole": isinstance(default, int)}
     declared: T = dataclasses.field(default=default, metadata=about)
     return declared
@@ -103,9 +103,9 @@ def _in_range(value: object, about: Mapping[str, Any], where: str) -> object:
 
 
 def named(text: str, settings: dict[str, str]) -> Surface:
-    """A surface by its name or its file, and the text of its parameters.
+    """A surface from its name or file and the texts of its parameters.
 
-    Raises InputError, with the nearest known spelling, for what is unknown or out of range.
+    Raises InputError, with the nearest known spelling, for unknown names and values out of range.
     """
     reader = next((kind for kind in Surface.family.all().values() if kind.reads(text)), None)
     kind = reader or Surface.family.get(text, "--surface")
@@ -122,8 +122,8 @@ def named(text: str, settings: dict[str, str]) -> Surface:
 
 
 def of_heights(heights: Floats, spacing: float = 1.0) -> Patch:
-    """The periodic surface through heights (y, x), on a square grid: two triangles a square, their diagonals turned
-    from one square to the next, so that no direction is preferred. One square more stands on each side."""
+    """The periodic surface through heights (y, x) on a square grid, with one more square on each side. Each square has
+    two triangles; the diagonals alternate between neighboring squares, so no direction is preferred."""
     rows, columns = heights.shape
     y, x = np.arange(-1, rows + 2), np.arange(-1, columns + 2)
     z = heights[np.ix_(y % rows, x % columns)]

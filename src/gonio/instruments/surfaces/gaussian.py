@@ -14,10 +14,10 @@ from .base import Floats, Patch, Surface, of_heights, parameter
 class Gaussian(Surface):
     """Gaussian heights, correlated by exp(-(d / length)^2): Beckmann's distribution of slopes.
 
-    The slope of a triangle is a difference of heights, so it is Gaussian whatever the grid, and the heights are scaled
-    until its mean square is alpha^2 / 2 along each axis: alpha is then Beckmann's (Walter2007). What the correlation
-    changes is masking: Smith's G takes heights and slopes as independent. Heights come from filtered white noise by
-    FFT, and are periodic.
+    The slope of a triangle is a difference of heights and therefore Gaussian on any grid. The heights are scaled to a
+    mean square slope of alpha^2 / 2 along each axis, so alpha is that of Beckmann (Walter2007). The correlation only
+    affects masking: Smith's G assumes independent heights and slopes. The periodic heights are white noise filtered by
+    FFT.
     """
 
     name: ClassVar[str] = "gaussian"
@@ -34,7 +34,7 @@ class Gaussian(Surface):
 
 
 def heights_of(noise: Floats, length: float) -> Floats:
-    """White noise, filtered until it is correlated by exp(-(d / length)^2)."""
+    """Filter white noise to an autocorrelation of exp(-(d / length)^2)."""
     k = [2.0 * np.pi * np.fft.fftfreq(count) for count in noise.shape]
     square = k[0][:, None] ** 2 + k[1][: noise.shape[1] // 2 + 1] ** 2
     spectrum = np.fft.rfft2(noise) * np.exp(-0.125 * length**2 * square)

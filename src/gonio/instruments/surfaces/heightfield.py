@@ -12,15 +12,15 @@ from ...errors import InputError
 from ...pictures import images
 from .base import Floats, Patch, Surface, of_heights, parameter
 
-LEAST, MOST = 4, 1024  # pixels along a side
-SEAM = 2.0  # how many times its usual step a map may jump from its last row to its first, and count as periodic
+MIN_PIXELS, MAX_PIXELS = 4, 1024  # pixels along a side
+SEAM = 2.0  # a map counts as periodic if it jumps from its last row to its first by at most this many rms steps
 
 
 @dataclass(frozen=True)
 class Heightfield(Surface):
-    """A map of heights, one value a pixel (.exr, .hdr, .npz): a measured surface, or one of your own.
+    """A map of heights, one value per pixel (.exr, .hdr, .npz): a measured surface, or one that you made.
 
-    A map that is not periodic, whose last row or column does not join its first, is continued by its mirror image.
+    A map that is not periodic, since its last row or column does not join its first, is extended by its mirror image.
     """
 
     name: ClassVar[str] = "heightfield"
@@ -42,22 +42,22 @@ class Heightfield(Surface):
 
 
 def read(file: str) -> Floats:
-    """The heights in a file, (y, x). InputError where they are none."""
+    """The heights in a file, (y, x). Raises InputError if they are invalid."""
     pixels = images.read(file).pixels.astype(np.float64)
     rows, columns = pixels.shape[:2]
-    if min(rows, columns) < LEAST or max(rows, columns) > MOST:
-        what = f"{columns} x {rows} pixels, {LEAST} to {MOST} along each side expected"
+    if min(rows, columns) < MIN_PIXELS or max(rows, columns) > MAX_PIXELS:
+        what = f"{columns} x {rows} pixels, {MIN_PIXELS} to {MAX_PIXELS} along each side expected"
         raise InputError(what, file, "scale or cut the map")
     bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
     if bad:
         raise InputError(f"{bad} of {rows * columns} heights are not finite", file, "fill the gaps in the map")
     if not np.array_equal(pixels[..., :1].repeat(3, axis=2), pixels):
-        raise InputError("three channels that differ, one height a pixel expected", file, "keep one channel only")
+        raise InputError("three channels that differ, one height per pixel expected", file, "keep one channel only")
     return pixels[..., 0]
 
 
 def _jump(heights: Floats, axis: int) -> float:
-    """The rms step from the last row to the first, over that between other rows."""
+    """Ratio of the rms step from the last row to the first to the rms step between adjacent rows."""
     usual = float(np.sqrt(np.mean(np.square(np.diff(heights, axis=axis)))))
     seam = float(np.sqrt(np.mean(np.square(np.take(heights, 0, axis) - np.take(heights, -1, axis)))))
     return seam / usual if usual > 0.0 else float(seam > 0.0) * 2.0 * SEAM

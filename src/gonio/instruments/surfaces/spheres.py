@@ -15,7 +15,7 @@ from ...errors import InputError
 from .base import Floats, Patch, Surface, parameter
 
 SIDE = 16.0  # of the period, in radii
-SPLITS = 4  # of an icosahedron's facets, into four each
+SPLITS = 4  # subdivisions of an icosahedron, each splits a facet into four
 TRIES = 200_000
 
 
@@ -23,7 +23,7 @@ TRIES = 200_000
 class Spheres(Surface):
     """Hemispheres of one size, scattered over a plane without touching: beads half sunk into their binder.
 
-    A ball is a split icosahedron, each turned at random, so that all of them together have every normal.
+    Each ball is a subdivided icosahedron with a random rotation, so that all of them together have every normal.
     """
 
     name: ClassVar[str] = "spheres"
@@ -49,7 +49,7 @@ class Spheres(Surface):
         return Patch(np.concatenate(vertices), np.concatenate(faces).astype(np.uint32), (SIDE, SIDE), top)
 
     def _places(self, rng: np.random.Generator) -> Floats:
-        """Centres in the period, two radii or more apart."""
+        """Centers in the period, at least two radii apart."""
         wanted = round(self.coverage * SIDE * SIDE / np.pi)
         centers = np.empty((0, 2))
         for place in rng.uniform(-0.5 * SIDE, 0.5 * SIDE, (TRIES, 2)):
@@ -58,7 +58,7 @@ class Spheres(Surface):
             apart = np.abs(centers - place)
             if not len(centers) or np.square(np.minimum(apart, SIDE - apart)).sum(axis=1).min() > 4.0:
                 centers = np.vstack([centers, place])
-        raise InputError(f"no room for {wanted} hemispheres without touching", "spheres.coverage", "cover less")
+        raise InputError(f"{wanted} hemispheres do not fit without touching", "spheres.coverage", "cover less")
 
 
 _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
@@ -66,7 +66,7 @@ _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0,
 
 @functools.cache
 def _ball() -> tuple[Floats, NDArray[np.int64]]:
-    """A unit sphere's vertices and triangles; what is below the plane is never seen."""
+    """A unit sphere's vertices and triangles; the part below the plane stays hidden."""
     hull = ConvexHull(_icosahedron())
     points, faces = hull.points, hull.simplices
     for _ in range(SPLITS):

@@ -19,7 +19,7 @@ class VGroove(Surface):
 
     Both sides of a groove slope by the same angle theta_a. Grooves of every slope take up the share of the surface that
     Oren and Nayar's slope-area distribution gives them, exp(-theta_a^2 / (2 sigma^2)) sin theta_a; with `slope` all
-    have that one. The sample turns while it is measured, so grooves run in all directions.
+    have that slope. The sample rotates during the measurement, so grooves run in all directions.
     """
 
     name: ClassVar[str] = "vgroove"
@@ -29,7 +29,7 @@ class VGroove(Surface):
 
     def patch(self, rng: np.random.Generator) -> Patch:
         depth = 0.5 * np.tan(self.slopes(GROOVES) if self.slope is None else np.full(GROOVES, self.slope))
-        depth = np.concatenate([depth[-1:], depth, depth[:1]])  # one more on each side
+        depth = np.concatenate([depth[-1:], depth, depth[:1]])  # one additional groove on each side
         x = np.arange(2 * len(depth) + 1) * 0.5 - 1.0 - 0.5 * GROOVES
         z = np.zeros(len(x))
         z[1::2] = -depth
@@ -41,7 +41,7 @@ class VGroove(Surface):
         return Patch(vertices, faces, (float(GROOVES), float(GROOVES)), 0.0)
 
     def slopes(self, count: int) -> Floats:
-        """Angles that part the distribution into equal shares."""
+        """Slope angles that divide the distribution into equal shares."""
         theta = np.linspace(0.0, STEEPEST, 1 << 14)
         density = np.exp(-0.5 * np.square(theta / max(self.sigma, 1e-9))) * np.sin(theta)
         total = np.cumsum(density)
