@@ -99,7 +99,7 @@ def test_faults_that_are_not_stated_are_noticed(taken: Path, found: run.Capture,
     got = go.capture(again(taken, tmp_path, off(rig())), "lambert+ggx")
     assert np.any(np.abs(got.fit.values / TRUTH - 1.0) > 0.01)
     assert np.all(got.fit.errors > 3.0 * found.fit.errors)  # neighbours err alike, which counts
-    assert any("neighboring pixels err alike" in text for text in got.warnings)
+    assert any("errors of neighboring pixels are correlated" in text for text in got.warnings)
 
 
 @pytest.mark.slow
@@ -413,7 +413,7 @@ def test_a_calibration_is_held_to_its_keys(tmp_path: Path, change: Raw, text: st
 
 
 def test_a_photograph_that_the_calibration_does_not_list_is_refused(taken: Path) -> None:
-    with pytest.raises(InputError, match=r"other.png: the calibration tells neither its exposure nor its light"):
+    with pytest.raises(InputError, match=r"other.png: the calibration lists neither its exposure nor its light"):
         go.capture([str(taken / "p0.npz"), str(taken / "other.png")])
     with pytest.raises(InputError, match="no calibration file"):
         go.capture(taken.parent)

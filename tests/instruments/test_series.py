@@ -55,7 +55,7 @@ def test_exposure_times_that_are_slightly_off_are_found() -> None:
 
 
 def test_an_exposure_time_that_is_wrong_by_30_percent_is_an_error() -> None:
-    with pytest.raises(InputError, match=r"0.104 s are stated, its pixels and those of the others tell 0.08"):
+    with pytest.raises(InputError, match=r"0.104 s are stated, but the pixels of the series indicate 0.08"):
         series.merge([exposed(0.02), exposed(0.08, stated=0.104), exposed(0.32)])
 
 

@@ -231,7 +231,7 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
         (lambda t: fit(t, "lambert+"), "is not a sum of materials"),
         (lambda t: fit(t, "lambert", lobes=0), "0 lobes"),
         (lambda t: fit(t, "lambert", param={"rough": 1.0}), "rough"),
-        (lambda t: fit(t, "lambert", param={"albedo": 0.3}), "nothing is left"),
+        (lambda t: fit(t, "lambert", param={"albedo": 0.3}), "no parameter is left"),
         (lambda t: fit(t, "lambert", grazing=0.0), "0 degrees"),
         (lambda t: modelled("mirror+lambert"), "delta lobe"),
         (lambda t: batch.files_of([str(Path(__file__).parent / "nothing-there")]) and fit("nothing.binary"), "no file"),

@@ -1,4 +1,4 @@
-"""What is odd about photographs, and what they cannot tell."""
+"""Warnings about photographs and fits: defects, and parameters that the pictures do not determine."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from . import pixels
 from .fitting import Fitted
 from .pixels import Chosen, Scene
 
-NARROW = 5.0  # degrees: difference angles that lie closer together tell nothing of Fresnel's term
-HIGHLIGHT = 4.0  # degrees of the half vector, within which a highlight has its peak
-CLIPPED = 0.02  # of the lit pixels
-VAGUE = 0.25  # relative half width of an interval from which on the pictures are said not to tell
-SMALL = 2.0  # pixels of a lobe's width
-FAR = 3.0  # standard deviations, beyond which a fault is more than was stated
-ALIKE = 4.0  # pixels that count as one, from which on more is off than noise
+NARROW = 5.0  # degrees: a smaller range of difference angles does not determine the Fresnel term
+HIGHLIGHT = 4.0  # degrees of the half vector within which the peak of a highlight lies
+CLIPPED = 0.02  # share of the lit pixels
+VAGUE = 0.25  # relative half width of an interval from which a parameter is reported as uncertain
+SMALL = 2.0  # pixels, the smallest lobe width that is resolved
+FAR = 3.0  # standard deviations from which a calibration error exceeds its stated uncertainty
+ALIKE = 4.0  # pixels that count as one, from which noise alone does not explain the residuals
 WRONG = 0.05  # relative difference of model and pictures
 
 
 def on(scene: Scene, chosen: Chosen, result: Fitted | None) -> tuple[str, ...]:
-    """In words, the gravest first."""
+    """Warnings as texts, most severe first."""
     return (*_on_pictures(scene, chosen), *(_on_fit(scene, result) if result is not None else ()))
 
 
@@ -38,15 +38,15 @@ def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
     span = f"difference angles of {low:.0f} to {high:.0f} degrees"
     if len(scene.names) == 1:
         yield (
-            f"one light alone, {span}: one highlight tells roughness only as far as the model is right, and nothing "
-            "tells what depends on the angle (index, Fresnel)"
+            f"one light alone, {span}: one highlight determines roughness only if the model is right, and nothing "
+            "determines what depends on the angle (index, Fresnel)"
         )
     elif high - low < NARROW:
-        yield f"{span} only: they do not tell index and Fresnel"
+        yield f"{span} only: they do not determine index and Fresnel"
     clipped, used = chosen.counts["saturated"], chosen.counts["used"]
     if nearest > HIGHLIGHT:
         why = ", which is saturated" if clipped else ""
-        yield f"no pixel within {nearest:.0f} degrees of the peak of a highlight{why}: roughness is hardly told"
+        yield f"no pixel within {nearest:.0f} degrees of the peak of a highlight{why}: roughness is poorly determined"
     if clipped > CLIPPED * (clipped + used):
         yield f"{100.0 * clipped / (clipped + used):.0f} % of the lit pixels are saturated: add a shorter exposure"
 
@@ -55,17 +55,17 @@ def _on_fit(scene: Scene, result: Fitted) -> Iterator[str]:
     fit = result.fit
     for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
         if np.isfinite(error) and NORMAL_95 * error > VAGUE * max(abs(value), 1e-3):
-            yield f"the pictures hardly tell {name}: {value:.3g} +- {NORMAL_95 * error:.2g}"
+            yield f"the pictures poorly determine {name}: {value:.3g} +- {NORMAL_95 * error:.2g}"
     yield from fit.notes
     if scene.ball is not None:
         pixel = scene.ball.pixel / scene.ball.radius
         for name, value in zip(fit.names, fit.values, strict=True):
             if name.rpartition(".")[2] == "alpha" and value < SMALL * pixel:
-                yield f"{name} = {value:.3g} is a highlight of {value / pixel:.1f} pixels: come nearer"
+                yield f"{name} = {value:.3g} is a highlight of {value / pixel:.1f} pixels: move the camera closer"
     for name, (value, _) in result.faults.items():
         if abs(value) > FAR:
             yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
     if result.problem.alike > ALIKE:
-        yield "neighboring pixels err alike: the calibration is off by more than it states, or the model is wrong"
+        yield "errors of neighboring pixels are correlated: the calibration or the model is wrong"
     if fit.relative > max(WRONG, 3.0 * result.noise):
-        yield f"the model is {100.0 * fit.relative:.0f} % off on average: intervals are those of a model that is wrong"
+        yield f"the model is {100.0 * fit.relative:.0f} % off on average: its intervals are unreliable"

@@ -1,5 +1,5 @@
-"""A material fitted to pixels, with what the calibration leaves open: the ball's place, the lamps' directions and
-intensities. Each of those has the prior that the calibration states, and what the pixels say of it beyond that."""
+"""Fit a material to pixels together with the uncertain quantities of the calibration: the position of the ball and the
+directions and intensities of the lamps. The calibration states the prior of each."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from .calibration import Floats, Uncertainty
 from .pixels import Chosen, Pixels, Scene, directions
 from .problem import Faults, Problem, across, inverse_of, middle_of
 
-FEW = 12_000  # pixels on which the way is found; the last steps are taken on all
-LEAST_NOISE = 1e-4  # relative: below it pixels are as good as exact, and a number of exactly 0 could not be divided by
-CERTAIN = 20.0  # standard deviations of its own noise, from which on a pixel tells what other noise there is
-MEDIAN_CHI2 = 0.454936  # of a squared normal number
+FEW = 12_000  # pixels for the first steps; the last steps use all
+LEAST_NOISE = 1e-4  # relative: pixels below it count as exact; it avoids a division by 0
+CERTAIN = 20.0  # signal-to-noise ratio from which a pixel is used to estimate the remaining noise
+MEDIAN_CHI2 = 0.454936  # median of a squared standard normal variable
 
 __all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "middle_of"]
 
@@ -32,10 +32,11 @@ __all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "mid
 class Fitted:
     """A material fitted to photographs.
 
-    fit      its parameters, as `go.fit` gives them
-    faults   what came of each open fault of the calibration: (in its own standard deviations, how sure)
+    fit      its parameters, as returned by `go.fit`
+    faults   calibration errors by name: (estimate, standard error), in stated standard deviations
     noise    mean standard deviation of pixels about the fit, over their mean
-    problem  as it was solved, numbers what solved it
+    problem  the solved problem
+    numbers  its solution
     """
 
     fit: Fit
@@ -54,7 +55,7 @@ def fitted(
     fixed: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
 ) -> Fitted:
-    """A model fitted to the pixels that were chosen, the calibration's faults beside it."""
+    """Fit a model to the chosen pixels together with the calibration errors."""
     started = time.perf_counter()
     few = _some(chosen, FEW)
     plain, moving = tables.moving_of(model, fixed=fixed, free=free)
@@ -66,7 +67,7 @@ def fitted(
     numbers = _solve_reweighted(problem, numbers)
     low, high, _ = ranges(problem.free)
     ended = (numbers <= low) | (numbers >= high)
-    if ended.any():  # an end may have no slope, as an index of 1 has none: once more from where the model stands
+    if ended.any():  # a bound may have zero slope, such as an index of 1: retry from the values of the model
         other = np.where(ended, np.concatenate([start_of(plain, moving), np.zeros(len(problem.open))]), numbers)
         problem.reweigh(numbers)
         other = solve(problem, other, steps=20).numbers
@@ -76,7 +77,7 @@ def fitted(
     full.reweigh(numbers)
     full.alike = _alike(full, numbers)
     full.reweigh(numbers)
-    # a standard error changes the sum of squares by 1, of as many as there are pixels
+    # one standard error changes the sum of squares by 1, which is small against its total
     numbers = solve(full, numbers, steps=6, tolerance=1e-10).numbers
     full.noise = _noise(full, numbers)
     full.reweigh(numbers)
@@ -84,7 +85,7 @@ def fitted(
 
 
 def _solve_reweighted(problem: Problem, numbers: Floats) -> Floats:
-    """Where the sum of squares is least: weights follow the prediction, and the noise the weights."""
+    """Minimize the sum of squares, updating the weights from the prediction and the noise from the residuals."""
     for _ in range(3):
         problem.reweigh(numbers)
         numbers = solve(problem, numbers, steps=12).numbers
@@ -93,7 +94,7 @@ def _solve_reweighted(problem: Problem, numbers: Floats) -> Floats:
 
 
 def _some(chosen: Chosen, count: int) -> list[Pixels]:
-    """So many pixels, evenly from all, in their order."""
+    """A uniform random subset of about `count` pixels, in their order."""
     share = count / max(len(chosen), 1)
     rng = np.random.default_rng(17)
     return [part.at(np.flatnonzero(rng.random(len(part)) < share)) if share < 1.0 else part for part in chosen.parts]
@@ -116,8 +117,8 @@ def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
 
 
 def _noise(problem: Problem, numbers: Floats) -> float:
-    """Relative standard deviation of pixels about the prediction, beside that of their photons, reading and
-    quantisation: with it half of the bright ones lie within the quartiles of their spread."""
+    """Relative standard deviation of pixels about the prediction, in addition to photon, read and quantization noise:
+    with it, half of the bright pixels lie within the quartiles of their distribution."""
     squares, variances = [], []
     for part, off, predicted in problem.off(numbers):
         bright = predicted > 1e-3 * float(np.percentile(predicted, 99.0))
@@ -126,7 +127,7 @@ def _noise(problem: Problem, numbers: Floats) -> float:
     square, variance = np.concatenate(squares), np.concatenate(variances)
     if not len(square):
         return LEAST_NOISE
-    # those that are told best, as far as there are enough of them
+    # the most precise pixels, if there are enough of them
     told = variance <= max(1.0 / CERTAIN**2, float(np.quantile(variance, 0.1)))
     square, variance = square[told], variance[told]
     low, high = LEAST_NOISE**2, max(float(square.max()), LEAST_NOISE**2) * 4.0
@@ -139,7 +140,7 @@ def _noise(problem: Problem, numbers: Floats) -> float:
 
 
 def _alike(problem: Problem, numbers: Floats) -> float:
-    """By how much the pushes of tiles exceed those of pixels that err each for itself."""
+    """Ratio of the score variance of tiles to that of pixels with independent errors, at least 1."""
     hessian, spread = problem.information(numbers)
     hessian, spread = hessian[: problem.own, : problem.own], spread[: problem.own, : problem.own]
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
@@ -151,9 +152,9 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     hessian, spread = problem.information(numbers)
     prior = problem.prior()
     inverse = inverse_of(hessian + prior)
-    # the sandwich (Liang1986), in which each prior counts for what it is
+    # the sandwich estimator (Liang1986) with the priors
     covariance = inverse @ (spread + prior) @ inverse
-    # where few tiles tell a number, their residuals are small for that very reason: no smaller than by the noise alone
+    # few tiles per parameter make residuals too small, so pixel noise is the lower bound
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
     undetermined = groups_of(null_space(hessian + prior))
     variance[[number for group in undetermined for number in group]] = np.inf
@@ -196,8 +197,7 @@ def _correlation(covariance: Floats) -> Floats:
 
 
 def _apart(problem: Problem, hessian: Floats) -> Floats:
-    """Correlations of the material's numbers if the intensities were exact: these tie all that is bright together,
-    which is their doing and not the pictures'."""
+    """Correlations of the material's parameters for exact intensities, whose errors correlate all brightnesses."""
     bright = ["intensity" in name or name == "scale" for name in problem.open]
     columns = np.flatnonzero([True] * problem.own + [not one for one in bright])
     inverse = inverse_of((hessian + problem.prior())[np.ix_(columns, columns)])

@@ -1,5 +1,5 @@
-"""Where pixels look: rays of the camera, the ball's place from its outline, lamps from highlights in mirror balls, and
-the local directions of what a pixel sees. All in the camera's frame."""
+"""Geometry of photographs in the camera's frame: rays of pixels, the position of the ball from its outline, lamps from
+highlights in mirror balls, and local directions at the point of a pixel."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from .calibration import Ball, Camera, Floats
 from .photographs import Photograph
 
 Array = backend.Array
-ANGLES = 720  # at which the outline is looked for
-INSIDE = 2.0  # pixels inside of the edge, where the ball has its own brightness
+ANGLES = 720  # angles at which the outline is detected
+INSIDE = 2.0  # pixels inside the edge where the brightness of the ball is sampled
 SHARP = 2.5  # pixels within which an outline rises; a shadow's edge takes longer
-FOUND = 0.25  # of the outline that must have been seen
-ROUND = 0.6  # of what was seen of it that must lie on one circle
-BRIGHT = 0.3  # of the brightest, which the ground must stay below
-SYSTEMATIC = 0.1  # pixels by which a found outline is off beside its noise: limbs darken toward the edge
+MIN_VISIBLE = 0.25  # of the outline that must be detected
+ROUND = 0.6  # of the detected outline that must lie on one circle
+BRIGHT = 0.3  # of the brightest value, upper bound of the background
+SYSTEMATIC = 0.1  # pixels of systematic error of a detected outline: limbs darken toward the edge
 
 
 # ---------------------------------------------------------------------- camera
 
 
 def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
-    """Unit directions (N, 3) that pixel coordinates look along, the lens's distortion undone."""
+    """Unit directions (N, 3) of pixel coordinates, corrected for lens distortion."""
     across = (np.asarray(x) - camera.center[0]) / camera.focal_pixels
     down = (np.asarray(y) - camera.center[1]) / camera.focal_pixels
     bent = np.hypot(across, down)
     radius = bent.copy()
-    for _ in range(20):  # Newton; a lens that folds the picture over is refused below
+    for _ in range(20):  # Newton iteration; lenses that fold the picture are rejected below
         square = radius**2
         value = radius * (1.0 + camera.k1 * square + camera.k2 * square**2)
         slope = 1.0 + 3.0 * camera.k1 * square + 5.0 * camera.k2 * square**2
@@ -67,8 +67,8 @@ class Placed:
     center   (3,)
     radius   of the ball
     pixel    length that a pixel spans at its distance
-    off      standard deviation of its place, pixels, and of its radius, relative: what finding it has left
-    given    whether its place was given; else it follows from its outline and its radius
+    off      standard deviations of its detected position, pixels, and of its radius, relative
+    given    whether its position was given; otherwise it follows from its outline and radius
     """
 
     center: Floats
@@ -79,7 +79,7 @@ class Placed:
 
 
 def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed] = ()) -> Placed:
-    """A ball, where it is given or found in the photographs. InputError where none is to be seen."""
+    """The ball at its given position or as detected in the photographs. Raises InputError if none is visible."""
     if ball.center is not None:
         center = np.array(ball.center)
         return Placed(center, ball.radius, float(np.linalg.norm(center)) / camera.focal_pixels, given=True)
@@ -105,7 +105,7 @@ def _of_cone(m: Floats, ball: Ball, camera: Camera, off: tuple[float, float] = (
 
 
 def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed]) -> Placed:
-    """The ball by its outline, over all photographs: what one lamp leaves dark another one lights."""
+    """Detect the outline of the ball in all photographs together, since each lamp lights a different part."""
     from scipy import ndimage
 
     hint = 'the ground must be dark; or give "center" or "outline" of the ball'
@@ -132,10 +132,10 @@ def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid
     rows, columns = np.nonzero(parts == largest)
     x, y = float(columns.mean()) + 0.5, float(rows.mean()) + 0.5
     edge = _edge(brightness, x, y, ground, level)
-    if len(edge) < FOUND * ANGLES:
+    if len(edge) < MIN_VISIBLE * ANGLES:
         raise InputError("no ball in it: no sharp outline stands out from the ground", names, hint)
     m, residual = _agreed(rays(camera, edge[:, 0], edge[:, 1]), camera)
-    if m is None or len(residual) < max(FOUND * ANGLES, ROUND * len(edge)):
+    if m is None or len(residual) < max(MIN_VISIBLE * ANGLES, ROUND * len(edge)):
         raise InputError("no ball in it: what stands out is not round", names, hint)
     noise = float(np.sqrt(np.mean(residual**2) / len(residual))) + SYSTEMATIC
     estimate = _of_cone(m, ball, camera)
@@ -143,12 +143,12 @@ def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid
 
 
 def _rim(picture: Floats) -> Floats:
-    """The pixels along the edges of a picture, where the ground is."""
+    """The pixels along the edges of a picture, which show the background."""
     return np.concatenate([picture[:3].ravel(), picture[-3:].ravel(), picture[:, :3].ravel(), picture[:, -3:].ravel()])
 
 
 def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -> Floats:
-    """Pixel coordinates (N, 2) where the picture rises sharply, coming from outside, on rays about a middle."""
+    """Pixel coordinates (N, 2) of sharp outer edges along rays about a center."""
     from scipy import ndimage
 
     height, width = brightness.shape
@@ -166,7 +166,7 @@ def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -
         half = 0.5 * (ground + line[outer - round((1.0 + INSIDE) / step)])
         crossing = np.flatnonzero(line[: outer + 1] > half)
         if not len(crossing) or crossing[-1] < outer - round(SHARP / step) or half < level:
-            continue  # it rises slowly: the edge of a shadow, not of the ball
+            continue  # a slow rise is the edge of a shadow, not of the ball
         at = int(crossing[-1])
         part = (line[at] - half) / max(line[at] - line[at + 1], 1e-12) if at + 1 < len(line) else 0.0
         radius = (at + part) * step
@@ -175,7 +175,7 @@ def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -
 
 
 def _agreed(directions: Floats, camera: Camera) -> tuple[Floats | None, Floats]:
-    """The cone that most directions lie on, within a pixel, and how far these are off, in pixels (Fischler1981)."""
+    """The cone through most directions within a pixel, and their residuals, pixels (RANSAC, Fischler1981)."""
     rng = np.random.default_rng(7)
     best = np.zeros(len(directions), bool)
     for _ in range(200):
@@ -195,13 +195,13 @@ def _agreed(directions: Floats, camera: Camera) -> tuple[Floats | None, Floats]:
 
 
 def _off(directions: Floats, m: Floats) -> Floats:
-    """Angles by which directions lie outside of a cone."""
+    """Angles by which directions lie outside a cone, radians."""
     length = float(np.linalg.norm(m))
     return np.asarray(np.arccos(np.clip(directions @ m / length, -1.0, 1.0)) - np.arccos(min(1.0 / length, 1.0)))
 
 
 def covers(ball: Placed, camera: Camera, margin: float = 1.0) -> NDArray[np.bool_]:
-    """Which pixels look at a ball, its radius scaled."""
+    """Mask of the pixels that show a ball whose radius is scaled by `margin`."""
     direction = grid_rays(camera)
     distance = float(np.linalg.norm(ball.center))
     cos = np.sqrt(max(1.0 - (margin * ball.radius / distance) ** 2, 0.0))
@@ -209,7 +209,7 @@ def covers(ball: Placed, camera: Camera, margin: float = 1.0) -> NDArray[np.bool
 
 
 def grid_rays(camera: Camera) -> Floats:
-    """Of the middles of all pixels, (H W, 3)."""
+    """Rays of the centers of all pixels, (H W, 3)."""
     y, x = np.mgrid[0 : camera.size[1], 0 : camera.size[0]]
     return rays(camera, x.ravel() + 0.5, y.ravel() + 0.5)
 
@@ -263,7 +263,7 @@ def _highlight(photograph: Photograph, where: NDArray[np.bool_]) -> tuple[float,
     return float(np.average(columns, weights=w)) + 0.5, float(np.average(rows, weights=w)) + 0.5
 
 
-# ---------------------------------------------------------------------- what a pixel sees, in Dr.Jit's words
+# ---------------------------------------------------------------------- local directions at a pixel, in Dr.Jit
 
 
 class Seen(NamedTuple):

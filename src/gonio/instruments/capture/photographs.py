@@ -1,4 +1,4 @@
-"""Photographs to radiance: files decoded, made linear, divided by their exposure, and series of exposures merged."""
+"""Convert photographs to radiance: decode and linearize files, divide by exposure times, merge series of exposures."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .calibration import Calibration, Exposure, Shot
 from .series import Exposed, Noise
 
 Floats = NDArray[np.float64]
-STEPS = 255  # of a file of 8 bits, which is the least that cameras write
+STEPS = 255  # levels of an 8-bit file, the smallest depth of cameras
 
 
 @dataclass(frozen=True)
 class Photograph:
-    """What a camera saw, in its own linear unit a second.
+    """Radiance of a photograph, in the camera's linear unit per second.
 
-    name         of its file, the first of a series
-    shot         what the calibration says of it
+    name         name of the file, the first of a series
+    shot         its entry in the calibration
     radiance     (H, W, 3); nan where every exposure was saturated
-    step         (H, W, 3), its standard deviation by quantisation, and in a series by photons and reading
-    photon       (H, W, 3), derivative of the square of `step` along the radiance; 0 where the noise is not known
-    noise        of the camera, as a series of exposures tells it
-    scale_error  relative, of all radiance, by exposure times that contradict each other
+    step         (H, W, 3), standard deviation from quantization, in a series also from photon and read noise
+    photon       (H, W, 3), derivative of the square of `step` with respect to the radiance; 0 for unknown noise
+    noise        of the camera, estimated from a series of exposures
+    scale_error  relative, of all radiance, from inconsistent exposure times
     """
 
     name: str
@@ -46,7 +46,7 @@ class Photograph:
 
 
 def read(shot: Shot, calibration: Calibration, folder: Path) -> Photograph:
-    """A photograph, its exposures merged. Raises InputError, with the file's name, where it cannot be used."""
+    """Read a photograph and merge its exposures. Raises InputError, with the name of the file, if it is unusable."""
     exposures = [_exposed(one, calibration, folder) for one in shot.pictures]
     merged = series.merge(exposures)
     noise = merged.noise if len(exposures) > 1 else None
@@ -58,7 +58,7 @@ def read(shot: Shot, calibration: Calibration, folder: Path) -> Photograph:
 
 
 def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
-    """A picture's signal, linear, nan where it is saturated."""
+    """The linear signal of a picture, nan where saturated."""
     path = folder / one.file
     where = str(path)
     try:
@@ -83,13 +83,13 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
     if (width, height) != tuple(calibration.camera.size):
         expected = "x".join(map(str, calibration.camera.size))
         raise InputError(
-            f"{width}x{height} pixels, {expected} expected, as the camera has", where, "never crop or scale"
+            f"{width}x{height} pixels, {expected} expected, the size of the camera", where, "do not crop or scale"
         )
     if not np.isfinite(values).all():
-        raise InputError("some values are not finite", where, "export it again")
+        raise InputError("some values are not finite", where, "export the photograph again")
     seconds = one.seconds if one.seconds is not None else _own_seconds(content)
     if seconds is None:
-        raise InputError("no exposure time", where, 'add "seconds" to it in the calibration file')
+        raise InputError("no exposure time", where, 'add "seconds" in the calibration file')
     if not integers:
         return Exposed(where, values, np.zeros_like(values), seconds, np.inf)
     steps = 65535 if _sixteen(values) else STEPS
@@ -101,13 +101,13 @@ def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
 
 
 def _sixteen(values: Floats) -> bool:
-    """Whether values are finer than 8 bits have."""
+    """Whether the values need more than 8 bits."""
     sample = values[:: max(1, len(values) // 64)].ravel() * STEPS
     return bool(np.abs(sample - np.round(sample)).max() > 1e-3)
 
 
 def _light(values: Floats, calibration: Calibration) -> Floats:
-    """Light that values of a file stand for, by the camera's response."""
+    """Convert values of a file to light with the camera's response."""
     response = calibration.response
     if response == "linear":
         return values
@@ -118,11 +118,11 @@ def _light(values: Floats, calibration: Calibration) -> Floats:
     return np.interp(inside, curve[:, 0], curve[:, 1])
 
 
-# ---------------------------------------------------------------------- exposure times that files tell
+# ---------------------------------------------------------------------- exposure times in files
 
 
 def _own_seconds(content: bytes) -> float | None:
-    """The exposure time in an OpenEXR file (`expTime`) or in a JPEG's EXIF; None where there is none."""
+    """The exposure time in an OpenEXR file (`expTime`) or in a JPEG's EXIF; None if there is none."""
     seconds: float | None = None
     try:
         if formats.kind_of(content) == "OpenEXR":

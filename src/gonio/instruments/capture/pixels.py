@@ -1,4 +1,4 @@
-"""Which pixels of a photograph tell something of the sample, and the BRDF samples that they are."""
+"""Select the usable pixels of photographs and convert them to BRDF samples."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .calibration import Camera, Flat, Floats
 from .geometry import Array, Placed, Seen
 from .photographs import Photograph
 
-GRAZING = 80.0  # degrees: beyond, a wrong outline moves the angles too far, and papers leave them out (Ngan2005)
-EDGE = 0.02  # of a flat sample's edges, left out all round
-TILE = 8  # pixels: errors within a tile are alike
-LEAST = 50  # pixels without which a photograph shows no sample
-CONTRAST = 3.0  # by how much the lit sample outshines what is around it, at least
-GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: where two points integrate cubics exactly
-CELLS = (60, 60, 36)  # of theta_h by its root, theta_d and phi_d, in which samples are gathered
+GRAZING = 80.0  # degrees: beyond, errors of the outline shift the angles too far, and papers exclude them (Ngan2005)
+EDGE = 0.02  # share of a flat sample's edges excluded on all sides
+TILE = 8  # pixels: errors within a tile are correlated
+MIN_PIXELS = 50  # lit pixels of a sample
+CONTRAST = 3.0  # minimum brightness ratio of the lit sample to the background
+GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: two-point Gauss quadrature
+CELLS = (60, 60, 36)  # cells of sqrt(theta_h), theta_d and phi_d
 
 Kind = Literal["ball", "flat"]
 FATES = ("used", "saturated", "shadowed", "grazing")  # of the sample's pixels
@@ -33,11 +33,11 @@ FATES = ("used", "saturated", "shadowed", "grazing")  # of the sample's pixels
 
 @dataclass(frozen=True)
 class Scene:
-    """What the photographs show, as the calibration has it.
+    """Camera, sample and lamps of the photographs.
 
-    lamps        (L, 3), their places
+    lamps        positions of the lamps, (L, 3)
     intensities  (L, 3)
-    names        of the lamps
+    names        names of the lamps
     """
 
     camera: Camera
@@ -66,15 +66,15 @@ def plane_of(flat: Flat) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Pixels:
-    """Pixels that count, of samples of one kind.
+    """Usable pixels of samples of one kind.
 
     kind    "ball" or "flat"
-    place   (N, 2), pixel coordinates of their middles
-    lamp    (N,), which lamp
-    tile    (N,), which run of neighbors
+    place   (N, 2), pixel coordinates of their centers
+    lamp    (N,), index of the lamp
+    tile    (N,), index of the tile of neighbors
     value   (N, 3), radiance in the camera's unit
-    step    (N, 3), its standard deviation by quantisation, and in a series of exposures by photons and reading
-    photon  (N, 3), derivative of the square of `step` along the radiance
+    step    (N, 3), standard deviation from quantization, in a series also from photon and read noise
+    photon  (N, 3), derivative of the square of `step` with respect to the radiance
     """
 
     kind: Kind
@@ -86,10 +86,10 @@ class Pixels:
     photon: Floats
 
     def variance(self, radiance: Floats) -> Floats:
-        """Of `value` as `step` and `photon` tell it, (N, 3), if the radiance were this.
+        """Variance of `value` from `step` and `photon`, (N, 3), at a given radiance.
 
-        The variance of merged exposures is concave along the radiance (a parallel sum of straight lines), so that its
-        tangent at `value` stays above it, and above 0.
+        The variance of merged exposures is concave in the radiance (a parallel sum of linear functions), so its tangent
+        at `value` is an upper bound and positive.
         """
         return np.maximum(self.step**2 + self.photon * (np.abs(radiance) - np.maximum(self.value, 0.0)), 0.0)
 
@@ -97,7 +97,7 @@ class Pixels:
         return len(self.place)
 
     def at(self, chosen: NDArray[np.generic]) -> Pixels:
-        """Some of them."""
+        """The pixels with the given indices or mask."""
         return replace(
             self,
             place=self.place[chosen],
@@ -110,9 +110,9 @@ class Pixels:
 
 
 def observe(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
-    """What rays see of a sample under lamps.
+    """Local directions and lamp distances at the points of a sample that rays hit.
 
-    ball  its center and radius, where they are not the scene's
+    ball  center and radius of the ball if they differ from those of the scene
     """
     types = backend.types_like(type(ray))
     if kind == "ball":
@@ -130,7 +130,7 @@ def constant(vector: Floats, types: backend.Types) -> Array:
 
 
 def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """(wo, wi, squared distance of the lamp) in float64 at pixel coordinates; NaN beside the ball."""
+    """(wo, wi, squared distance of the lamp) in float64 at pixel coordinates; NaN outside the ball."""
     types = backend.types("float64")
     ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
     view = observe(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
@@ -143,8 +143,8 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
 
 @dataclass(frozen=True)
 class Chosen:
-    """The pixels of all photographs that count, how many of the sample's were left out, by why, and a map of each
-    photograph: 0 beside the sample, else 1 + the place in `FATES`."""
+    """The usable pixels of all photographs, the number of sample pixels per category of `FATES`, and a map per
+    photograph: 0 outside the sample, otherwise 1 + the index in `FATES`."""
 
     parts: tuple[Pixels, ...]
     counts: Mapping[str, int]
@@ -157,11 +157,11 @@ class Chosen:
 def choose(
     scene: Scene, photographs: Sequence[Photograph], grazing: float, slack: tuple[float, float] = (0.0, 0.0)
 ) -> Chosen:
-    """Every pixel of a sample, but the saturated, the shadowed, and those seen or lit from beyond an angle, degrees.
+    """Select the pixels of samples that are not saturated, shadowed, or viewed or lit beyond `grazing` degrees.
 
-    slack  by how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: what they
-           could move beyond that angle is left out too
-    Raises InputError, with the file's name, where a photograph shows no sample where there should be one.
+    slack  possible error of the ball's outline, relative to its radius, and of a lamp's direction, radians; pixels that
+           it could move beyond that angle are excluded too
+    Raises InputError, with the name of the file, if a photograph does not show the sample at its position.
     """
     counts, maps = dict.fromkeys(FATES, 0), {}
     gathered: dict[Kind, list[Pixels]] = {"ball": [], "flat": []}
@@ -181,9 +181,7 @@ def choose(
         used = ~saturated & ~shadowed & ~steep
         _check_sample(shot, scene, kind, own, used | (saturated & ~shadowed & ~steep))
         if saturated[~shadowed & ~steep].all():
-            raise InputError(
-                "every pixel of the sample is saturated", shot.name, "expose it for a shorter time, or add such one"
-            )
+            raise InputError("every pixel of the sample is saturated", shot.name, "use or add a shorter exposure")
         fate = np.select([used, saturated, shadowed], [1, 2, 3], 4).astype(np.uint8)
         maps[shot.name] = np.zeros(shot.saturated.shape, np.uint8)
         maps[shot.name][own] = fate
@@ -208,8 +206,8 @@ def choose(
 
 
 def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:
-    """Whether a pixel is seen or lit from beyond an angle, degrees, or might be: where the outline is off by a share s,
-    the normal turns by as much as takes sin theta_o to (1 + s) sin theta_o."""
+    """Whether a pixel is or may be viewed or lit beyond `grazing` degrees. A relative error s of the outline tilts the
+    normal such that sin theta_o becomes (1 + s) sin theta_o."""
     outline, lamp = slack
     theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
     moved = (1.0 + outline) * np.sin(theta_o)
@@ -218,7 +216,7 @@ def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] 
 
 
 def _joined(group: list[Pixels]) -> Pixels:
-    """As one, in the order of the lamps."""
+    """Concatenate groups of pixels, sorted by lamp."""
     joined = Pixels(
         group[0].kind,
         np.concatenate([one.place for one in group]),
@@ -232,7 +230,7 @@ def _joined(group: list[Pixels]) -> Pixels:
 
 
 def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Middles of the pixels that look at a sample, and (row, column) of each. InputError where none does."""
+    """Centers of the pixels that show a sample, and (row, column) of each. Raises InputError if there are none."""
     if kind == "ball":
         assert scene.ball is not None, "a photograph shows it"
         inside = geometry.covers(scene.ball, scene.camera)
@@ -241,13 +239,13 @@ def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64]
         inside = on_flat(scene.camera, scene.flat)
     row, column = np.nonzero(inside)
     if row.size == 0:
-        hint = "check its place, the camera's and the size of the pictures"
-        raise InputError(f"no pixel looks at the {kind} sample: it lies outside the picture", "calibration", hint)
+        hint = "check its position, the camera and the size of the pictures"
+        raise InputError(f"no pixel shows the {kind} sample: it lies outside the picture", "calibration", hint)
     return np.stack([column + 0.5, row + 0.5], -1), (row, column)
 
 
 def on_flat(camera: Camera, flat: Flat) -> NDArray[np.bool_]:
-    """Which pixels look at a flat sample, but at its edges."""
+    """Mask of the pixels that show a flat sample, without its edges."""
     base, frame = plane_of(flat)
     ray = geometry.grid_rays(camera)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -266,20 +264,20 @@ def _check_sample(
     own: tuple[NDArray[np.int64], NDArray[np.int64]],
     lit: NDArray[np.bool_],
 ) -> None:
-    """Raise InputError where a photograph does not show the sample in the place where it should be, and lit."""
-    if int(lit.sum()) < LEAST:
+    """Raise InputError if a photograph does not show the lit sample at its position."""
+    if int(lit.sum()) < MIN_PIXELS:
         what = (
             f"the light '{shot.shot.light}' reaches {int(lit.sum())} pixels of the {kind} at less than grazing angles"
         )
-        raise InputError(what, shot.name, "are the lamp's place and the sample's right?")
+        raise InputError(what, shot.name, "check the positions of lamp and sample")
     gray = np.where(shot.saturated, np.inf, np.nan_to_num(shot.radiance).mean(axis=-1))
     inside = np.zeros(gray.shape, bool)
     inside[own] = True
     bright = float(np.median(gray[own][lit]))
     ground = float(np.median(gray[~inside])) if kind == "ball" and not inside.all() else 0.0
     if not bright > CONTRAST * max(ground, 0.0):
-        what = f"no {kind} in it: where it should be lit, it is no brighter than the ground"
-        raise InputError(what, shot.name, "was the lamp on, and the ground dark?")
+        what = f"no {kind} in it: where it should be lit, it is not brighter than the background"
+        raise InputError(what, shot.name, "check that the lamp was on and the background dark")
 
 
 # ---------------------------------------------------------------------- samples
@@ -289,9 +287,9 @@ def _check_sample(
 class Gathered:
     """Samples, each the mean of the pixels in a cell of theta_h, theta_d and phi_d.
 
-    table  the samples, without an order
-    error  (N,), standard error of each, relative, by the scatter of its pixels; nan of one pixel
-    count  (N,), pixels of each
+    table  the samples, unordered
+    error  (N,), relative standard error from the scatter of the pixels; nan for a single pixel
+    count  (N,), pixels per sample
     """
 
     table: Samples
@@ -299,8 +297,8 @@ class Gathered:
     count: NDArray[np.int64]
 
     def confidence(self) -> Floats:
-        """(theta_h by its root, theta_d): how much is known of f there, relative standard error; nan where nothing was
-        seen and the table goes by the nearest samples."""
+        """Relative standard error of f over (sqrt(theta_h), theta_d); nan in cells without samples, where the table
+        uses the nearest ones."""
         theta_h, theta_d, _ = half_difference(*self.table.pairs())
         at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
         inverse, spread = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
@@ -310,7 +308,7 @@ class Gathered:
 
 
 def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
-    """theta_h, theta_d and phi_d, the last within half a turn: what reciprocity leaves (Rusinkiewicz1998)."""
+    """theta_h, theta_d and phi_d, the last modulo pi by reciprocity (Rusinkiewicz1998)."""
     from ...measure import angles
 
     types = backend.types("float64")
@@ -324,7 +322,7 @@ def _cell(share: Floats, count: int) -> NDArray[np.int64]:
 
 
 def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
-    """The samples that pixels are: f = radiance distance^2 / (intensity cos theta_i), mean by mean."""
+    """Convert pixels to samples f = radiance distance^2 / (intensity cos theta_i), averaged per cell."""
     angles, values = [], []
     for part in chosen.parts:
         wo, wi, square = directions(scene, part.kind, part.place, part.lamp)

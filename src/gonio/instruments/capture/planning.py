@@ -1,10 +1,10 @@
-"""Which photograph to take next: the place of the lamp that would tell most (A-optimal design, Chaloner1995).
+"""Choose the next photograph: the most informative lamp position (A-optimal design, Chaloner1995).
 
-A photograph adds J^T J to what is known of the material, J being the derivatives of its pixels by Dr.Jit, less what it
-must spend on its own lamp's faults. Chosen is the place after which the relative errors of the material's numbers,
-squared, have the smallest sum. The determinant (D-optimal) would ask for the smallest volume in which they may lie,
-and gladly tell again what is known well. By information alone, four places planned leave .77 of the error of eight
-random ones, the median of 15 materials. Places are taken one by one, each after the ones before.
+A photograph adds J^T J to the information on the material, where J holds the derivatives of its pixels from Dr.Jit,
+minus the information needed for the errors of its own lamp. The chosen position minimizes the sum of the squared
+relative errors of the material's parameters. The determinant (D-optimal design) would minimize the volume of the
+confidence region and may improve parameters that are already well known. According to this information, four planned
+positions leave 0.77 of the error of eight random ones (median of 15 materials). Positions are chosen greedily.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .calibration import Floats
 from .fitting import Faults, Problem, inverse_of, middle_of
 from .pixels import GRAZING, Kind, Pixels, Scene
 
-PLACES = 96  # candidates all round
-ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: nearer a lamp is in its way, farther it lights hardly a crescent
+PLACES = 96  # candidate positions
+ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: closer, the lamp blocks the view; farther, only a crescent is lit
 STEEP = 75.0  # degrees from a flat sample's normal
-SEEN = 1500  # pixels that stand for a photograph
-LITTLE = 0.01  # of a number's range: what is smaller is judged as if it were so large
-NOTHING = 1.0  # standard deviation of each of the material's numbers before anything is known
+SEEN = 1500  # pixels that represent a photograph
+LITTLE = 0.01  # of a parameter's range: lower bound of the size in relative errors
+NOTHING = 1.0  # prior standard deviation of each parameter of the material
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Proposal:
     position  of the lamp, in the camera's frame
     angle     between lamp and camera as seen from the sample, degrees
     names     of the material's numbers
-    errors    standard errors to be expected with this photograph and those before it, (K,)
+    errors    expected standard errors with this and all earlier photographs, (K,)
     """
 
     position: tuple[float, float, float]
@@ -58,13 +58,13 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Setting:
-    """What photographs are to be taken of, and with what.
+    """Sample, camera and lamp of the planned photographs.
 
     scene      camera and sample
     kind       of the sample
-    material   as far as it is known, or guessed
-    moving     its numbers
-    faults     what stays open of the lamps and the ball
+    material   current estimate or guess
+    moving     its free parameters
+    faults     uncertainties of lamps and ball
     intensity  (3,), of the lamp
     noise      relative, of a pixel; alike: by how many pixels one counts; step: standard deviation of quantisation
     """
@@ -81,7 +81,7 @@ class Setting:
 
 
 def places(scene: Scene, kind: Kind, distance: float, count: int = PLACES) -> Floats:
-    """Where a lamp might stand, (N, 3): evenly about the sample at a distance, where it lights what the camera sees."""
+    """Candidate lamp positions, (N, 3): evenly distributed about the sample at a distance, on its visible side."""
     middle = middle_of(scene)
     many = 4 * count
     turn = np.arange(many) * np.pi * (3.0 - np.sqrt(5.0))  # a spiral that covers the sphere evenly
@@ -97,16 +97,16 @@ def places(scene: Scene, kind: Kind, distance: float, count: int = PLACES) -> Fl
 
 
 def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = None) -> list[Proposal]:
-    """The best of some places (N, 3) of the lamp for the next photographs, in order.
+    """Choose the best `count` of the lamp positions `lamps` (N, 3) for the next photographs, in order.
 
-    known  information that there is of the material's numbers and of what all photographs share (the ball's place, the
-           scale), (K, K); None: nothing yet
+    known  information on the material's parameters and on those shared by all photographs (position of the ball,
+           scale), (K, K); None before the first photograph
     """
     if not 1 <= count <= len(lamps):
-        raise InputError(f"{count} photographs asked for, 1 to {len(lamps)} expected", "next")
+        raise InputError(f"{count} photographs requested, 1 to {len(lamps)} expected", "next")
     added, own = _told(setting, lamps)
     total = np.eye(len(added[0])) if known is None else known.copy()
-    total[:own, :own] += np.eye(own) / NOTHING**2  # what nothing is known of would not count as an error
+    total[:own, :own] += np.eye(own) / NOTHING**2  # otherwise the error of an unknown parameter would be 0
     values, (low, high, _) = start_of(setting.material, setting.moving), ranges(setting.moving)
     size = np.maximum(np.abs(values), LITTLE * np.minimum(high - low, 1.0))
     to_camera = -middle_of(setting.scene)
@@ -126,12 +126,12 @@ def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = 
 
 
 def _spread(information: Floats, size: Floats) -> float:
-    """The sum of squared errors of the first numbers, each over its size, the others being open."""
+    """Sum of the squared relative errors of the first parameters, with the others free."""
     return float(np.sum(np.diag(inverse_of(information))[: len(size)] / size**2))
 
 
 def without(information: Floats, count: int) -> Floats:
-    """Information on the first numbers where nothing else is known of the others than it says (Schur's complement)."""
+    """Information on the first `count` parameters after marginalizing the others (Schur complement)."""
     if count == len(information):
         return information
     aside = information[:count, count:]
@@ -139,7 +139,7 @@ def without(information: Floats, count: int) -> Floats:
 
 
 def _told(setting: Setting, lamps: Floats) -> tuple[list[Floats], int]:
-    """What a photograph from each place would add for the shared numbers, and how many of these are the material's."""
+    """Information gain per lamp position on the shared parameters, and the number of material parameters."""
     scene = replace(
         setting.scene,
         lamps=lamps,
@@ -153,14 +153,14 @@ def _told(setting: Setting, lamps: Floats) -> tuple[list[Floats], int]:
     shared = problem.count - each * len(lamps)
     information = [np.diag(np.r_[np.zeros(shared), np.ones(each)]) for _ in lamps]
     for rows in problem.rows(numbers):
-        # shared numbers keep their place, a lamp's own come behind them
+        # shared parameters first, then those of the lamp
         local = [n if n < shared else shared + (n - shared) % each for n in rows.which]
         information[rows.lamp][np.ix_(local, local)] += counts * (rows.slope.T @ rows.slope)
     return [without(one, shared) for one in information], problem.own
 
 
 def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
-    """Pixels that stand for a photograph from each lamp, and how many of a photograph's each is."""
+    """Representative pixels of a photograph per lamp, and the number of pixels that each represents."""
     place, _ = pixels.on_sample(scene, setting.kind)
     some = place[np.random.default_rng(29).permutation(len(place))[:SEEN]]
     parts = []

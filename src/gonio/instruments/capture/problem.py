@@ -1,4 +1,4 @@
-"""Residuals of pixels against a material under lamps, the calibration's faults as numbers beside the material's."""
+"""Residuals between pixels and a material under lamps, with the calibration errors as additional parameters."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .calibration import Floats, Uncertainty
 from .geometry import Array
 from .pixels import GAUSS, Pixels, Scene, constant, observe
 
-CHUNK = 1 << 17  # pixels at a time, so that memory stays flat
-FARTHEST = 8.0  # standard deviations to which a fault of the calibration may go
+CHUNK = 1 << 17  # pixels per launch, to bound memory
+FARTHEST = 8.0  # bound of a calibration error, in standard deviations
 BALL = ("ball.x", "ball.y", "ball.radius")
 LAMP = ("right", "down", "intensity")
 
 
 class Rows(NamedTuple):
-    """Pixels of one lamp in one channel: residuals (N,), derivatives (N, K), which numbers these are along, tiles."""
+    """Pixels of one lamp and channel: residuals (N,), derivatives (N, K), indices of their parameters, tiles."""
 
     residual: NDArray[np.floating]
     slope: NDArray[np.floating]
@@ -38,7 +38,7 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Faults:
-    """What the calibration leaves open, each as a number of its standard deviations.
+    """Uncertainties of the calibration; the corresponding parameters are in units of these standard deviations.
 
     ball       pixels to the right and down, and relative radius
     scale      relative, of all intensities
@@ -59,14 +59,14 @@ class Faults:
         return cls((center, center, radius), stated.scale, float(np.radians(stated.light)), stated.intensity)
 
     def names(self, lamps: Sequence[str], ball: bool) -> list[str]:
-        """Of those that are open, the shared ones first."""
+        """Names of the uncertain quantities, shared ones first."""
         names = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
         names += ["scale"] if self.scale > 0.0 else []
         return names + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
 
     def slack(self, scene: Scene) -> tuple[float, float]:
-        """By how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: three
-        standard deviations."""
+        """Three standard deviations of the outline of the ball, relative to its radius, and of a lamp's direction,
+        radians."""
         ball = (
             0.0
             if scene.ball is None
@@ -81,11 +81,12 @@ class Faults:
 
 @dataclass
 class Problem:
-    """Residuals of pixels: (predicted - seen) / standard deviation, and of each fault its own number.
+    """Residuals of pixels, (predicted - measured) / standard deviation, and of each calibration error, its parameter.
 
-    material  what is fitted, `moving` its parameters
+    material  the material to fit
+    moving    its free parameters
     noise     relative standard deviation of a pixel
-    alike     by how many pixels one counts, since neighbors err alike: their weight is divided by it
+    alike     divisor of the weights for correlated errors of neighboring pixels
     """
 
     material: BSDF
@@ -112,11 +113,11 @@ class Problem:
 
     @cached_property
     def columns(self) -> list[list[int]]:
-        """Of the material's numbers, those that one derivative is taken along: each alone, or a color's three."""
+        """Groups of material parameters that share one derivative: each by itself, or the three channels of a color."""
         return columns_of(self.material, self.moving)
 
     def of_row(self, lamp: int, channel: int) -> list[int]:
-        """Which numbers the derivatives of a row are along, in the order in which `_derived` gives them."""
+        """Indices of the parameters of the derivatives, in the order of `_predicted`."""
         shared = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
         names = [*BALL, "scale", *(f"{self.scene.names[lamp]}.{name}" for name in LAMP)]
         return shared + [self.own + self.open.index(name) for name in names if name in self.open]
@@ -124,7 +125,7 @@ class Problem:
     # ------------------------------------------------------------------ prediction
 
     def predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        """Radiance of pixels, (N, 3), the mean over four points of each; and its derivatives (N, 3, K)."""
+        """Radiance of pixels, (N, 3), averaged over four points per pixel, and its derivatives (N, 3, K)."""
         values, derivatives = [], []
         for start in range(0, len(part), CHUNK):
             block = self._predicted(part.at(np.arange(start, min(start + CHUNK, len(part)))), numbers, derive)
@@ -188,7 +189,7 @@ class Problem:
         return shown, np.stack(slope, -1)
 
     def _ball(self, off: list[Array], types: backend.Types) -> tuple[Array, Array]:
-        """Center and radius with their faults."""
+        """Center and radius of the ball with their errors."""
         placed = self.scene.ball
         assert placed is not None, "a photograph shows it"
         right, down = across(placed.center)
@@ -202,7 +203,7 @@ class Problem:
         return (center, radius * larger) if placed.given else (center / larger, radius)
 
     def _lamps(self, turns: list[Array], types: backend.Types) -> Array:
-        """Places of the lamps with the faults of their directions."""
+        """Positions of the lamps with the errors of their directions."""
         middle = middle_of(self.scene)
         away = self.scene.lamps - middle
         distance = np.linalg.norm(away, axis=1, keepdims=True)
@@ -215,7 +216,7 @@ class Problem:
         return constant(middle, types) + toward * (length * backend.float_of(distance[:, 0], types))
 
     def corrected(self, numbers: Floats) -> Scene:
-        """The scene with its faults put right, as far as the pixels told them."""
+        """The scene corrected by the estimated calibration errors."""
         types = backend.types("float64")
         at = dict(zip(self.open, numbers[self.own :], strict=True))
         ball = self.scene.ball
@@ -239,17 +240,17 @@ class Problem:
     # ------------------------------------------------------------------ residuals
 
     def reweigh(self, numbers: Floats) -> None:
-        """Weigh pixels by the standard deviation that the prediction tells."""
+        """Update the weights of pixels from their predicted standard deviations."""
         self._weights = [self._weight(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
 
     def _weight(self, part: Pixels, predicted: Floats) -> Floats:
         return np.asarray(1.0 / (self._spread(part, predicted) * np.sqrt(self.alike)))
 
     def _spread(self, part: Pixels, predicted: Floats) -> Floats:
-        """Standard deviation of pixels, (N, 3). It is that of the prediction: pixels that are low by chance would
-        count more by their own."""
+        """Standard deviation of pixels, (N, 3). It follows the prediction: measured values that are low by
+        chance would get more weight."""
         floor = 1e-6 * float(np.abs(part.value).max())
-        # a pixel that a fault has moved into the dark is not weighed by the dark
+        # lower bound for pixels that a calibration error moves into the dark
         size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
         return np.asarray(np.sqrt((self.noise * size) ** 2 + part.variance(size) + floor**2))
 
@@ -260,7 +261,7 @@ class Problem:
         return sum(float(self._spread(part, values).sum()) for part, values in predicted) / max(total, 1e-300)
 
     def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
-        """Of each part (pixels, predicted - seen, predicted)."""
+        """Per part: (pixels, predicted - measured, predicted)."""
         differences = []
         for part in self.parts:
             predicted, _ = self.predicted(part, numbers, False)
@@ -268,7 +269,7 @@ class Problem:
         return differences
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
-        """By lamp and channel, and the priors."""
+        """Residuals and derivatives per lamp and channel, and the priors."""
         return [(one.residual, one.slope, one.which) for one in self.rows(numbers)] + self._priors(numbers)
 
     def _priors(self, numbers: Floats) -> list[Linearized]:
@@ -278,7 +279,7 @@ class Problem:
         return [(numbers[self.own :], np.eye(len(faults)), faults)]
 
     def rows(self, numbers: Floats) -> list[Rows]:
-        """By lamp and channel."""
+        """Residuals, derivatives and tiles per lamp and channel."""
         if self._weights is None:
             self.reweigh(numbers)
         assert self._weights is not None
@@ -300,7 +301,7 @@ class Problem:
     # ------------------------------------------------------------------ how sure
 
     def information(self, numbers: Floats) -> tuple[Floats, Floats]:
-        """(J^T J, the sum of squares of the tiles' pushes J^T r), of the pixels alone."""
+        """(J^T J, sum of squares of the scores J^T r per tile) of the pixels without priors."""
         hessian = np.zeros((self.count, self.count))
         tiles = 1 + max(int(part.tile.max()) for part in self.parts)
         gradients = np.zeros((tiles, self.count))
@@ -311,21 +312,21 @@ class Problem:
         return hessian, gradients.T @ gradients
 
     def prior(self) -> Floats:
-        """What the calibration says, as information: 1 for each fault."""
+        """Information of the calibration: 1 for each of its uncertain quantities."""
         return np.diag(np.r_[np.zeros(self.own), np.ones(len(self.open))])
 
 
 def middle_of(scene: Scene) -> Floats:
-    """What lamps are turned about: the ball's middle, or the flat sample's."""
+    """Pivot of the lamp directions: the center of the ball or of the flat sample."""
     if scene.ball is not None:
         return scene.ball.center
     flat = scene.flat
-    assert flat is not None, "there is one of them"
+    assert flat is not None, "checked when it was read"
     return np.asarray(np.array(flat.base) + 0.5 * (np.array(flat.edge0) + np.array(flat.edge1)))
 
 
 def across(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to a direction, and to each other."""
+    """Two unit vectors perpendicular to a direction and to each other."""
     aside = np.array([1.0, 0.0, 0.0]) if abs(direction[0]) < 0.8 * np.linalg.norm(direction) else np.array([0, 1.0, 0])
     down = np.cross(direction, aside)
     down /= np.linalg.norm(down)
@@ -334,7 +335,7 @@ def across(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def inverse_of(matrix: Floats) -> Floats:
-    """The inverse of an information matrix, 0 along what nothing is known of."""
+    """The inverse of an information matrix, 0 for parameters without information."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     told = np.diag(matrix) > 0.0
     inverse = np.zeros_like(matrix)

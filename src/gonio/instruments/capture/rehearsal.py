@@ -1,6 +1,6 @@
-"""Photographs that Gonio renders for a calibration: to try a rig, a plan or a fit before anything is built.
+"""Render the photographs of a calibration, to test a rig, a plan or a fit before anything is built.
 
-rehearsal.take(calibration, go.Conductor(alpha=.2), "photographs", noise=.01)
+rehearsal.take(calibration, go.Conductor(alpha=0.2), "photographs", noise=0.01)
 go.capture("photographs", "conductor")
 """
 
@@ -40,15 +40,15 @@ def take(
     seed: int = 1,
     stated: Mapping[str, Json] | None = None,
 ) -> Path:
-    """Render the photographs that a calibration lists into a folder, with a calibration file: the folder.
+    """Render the photographs of a calibration into a folder, write a calibration file, and return the folder.
 
     calibration  what a calibration file holds; ball and lamps with their places, no lens distortion
     material     of the sample
     noise        relative standard deviation of each value; or a camera's read noise, photons and relative noise
     bits         8 or 16 writes .png files of whole numbers by the calibration's response (linear or srgb; of 16 bits
                  linear), and it must name them so; None keeps radiance, in .exr, .hdr or .npz
-    spp          samples a pixel
-    stated       the calibration that is written, where it is to differ: for faults
+    spp          samples per pixel
+    stated       the calibration to write if it differs, to simulate calibration errors
     """
     told = made(calibration, Path("calibration"))
     target = files.check_folder(folder)
@@ -73,11 +73,11 @@ def take(
 
 
 def _noisy(signal: Floats, noise: float | Noise, rng: np.random.Generator) -> Floats:
-    """A signal (H, W, 3) as a camera reads it."""
+    """A signal (H, W, 3) with the noise of a camera."""
     if not isinstance(noise, Noise):
         return np.asarray(signal * (1.0 + noise * rng.normal(size=signal.shape)))
     gain = np.maximum(noise.gain, 1e-12)
-    photons = np.minimum(np.maximum(signal, 0.0) / gain, 1e15)  # more than a generator counts are as good as exact
+    photons = np.minimum(np.maximum(signal, 0.0) / gain, 1e15)  # noise beyond is negligible
     read, relative = (np.sqrt(part) * rng.normal(size=signal.shape) for part in (noise.read, noise.relative))
     return np.asarray(rng.poisson(photons) * gain + read + relative * signal)
 

@@ -1,4 +1,4 @@
-"""Photographs to samples and to a fitted material."""
+"""Convert photographs to BRDF samples and a fitted material."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ PHOTOGRAPHS = frozenset({operands.Kind.CALIBRATION, operands.Kind.FOLDER, operan
 
 @dataclass(frozen=True)
 class Capture:
-    """What photographs say of a material.
+    """Result of `capture`.
 
-    scene     camera, ball and lamps, as they were given or found; after a fit with their faults put right
-    samples   BRDF samples, gathered in cells: their table, standard errors, and how many pixels each
+    scene     camera, ball and lamps as given or detected; after a fit, with corrected calibration errors
+    samples   BRDF samples averaged in cells: table, standard errors, and pixels per sample
     counts    pixels of the sample: used, saturated, shadowed, grazing
-    fitted    a material fitted to the pixels, None where no model was asked for
-    warnings  what is odd, and what the pictures cannot tell
+    fitted    the material fitted to the pixels; None without a model
+    warnings  defects of the pictures, and parameters that they do not determine
     """
 
     scene: Scene
@@ -52,7 +52,7 @@ class Capture:
 
     @property
     def fit(self) -> Fit:
-        """The material with its parameters, their errors and correlations. InputError where none was fitted."""
+        """The material with its parameters, their errors and correlations. Raises InputError without a fit."""
         if self.fitted is None:
             raise InputError("no material was fitted", "model", 'go.capture(photographs, "lambert+ggx")')
         return self.fitted.fit
@@ -63,12 +63,12 @@ class Capture:
         return self.fit.material
 
     def next(self, count: int = 1, places: Sequence[Sequence[float]] | None = None) -> list[Proposal]:
-        """Which photographs to take next, the best first: where the lamp should stand.
+        """Plan the next photographs: positions of the lamp, best first.
 
-        places  where it can stand, in the camera's frame; None: anywhere at the distance of the lamps so far
+        places  possible positions in the camera's frame; None: anywhere at the median distance of the lamps
         """
         if self.fitted is None:
-            raise InputError("no material was fitted", "model", "a plan needs to know what is to be told")
+            raise InputError("no material was fitted", "model", "a plan needs a fitted model")
         problem, scene = self.fitted.problem, self.scene
         kind = self.chosen.parts[0].kind
         away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
@@ -90,7 +90,7 @@ class Capture:
         return planning.propose(setting, lamps, count, known)
 
     def save(self, path: str | Path) -> Path:
-        """Write the samples as a table (.gonio, .binary, .astm, ...), or all that was found as .json."""
+        """Write the samples as a table (.gonio, .binary, .astm, ...), or the full result as .json."""
         if Path(path).suffix.lower() == ".json":
             text = json.dumps(self.as_dict(), indent=1)
             return files.write_whole(path, (text + "\n").encode())
@@ -98,7 +98,7 @@ class Capture:
         return files.write_whole(path, form.write(form.resampled(self.samples.table)))
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Dictionary for JSON."""
         ball = self.scene.ball
         entries: dict[str, Any] = {
             "pixels": dict(self.counts),
@@ -131,14 +131,14 @@ class Capture:
 
 
 def check_output(path: Path) -> Path:
-    """Raise InputError where the result cannot be written, before anything is computed."""
+    """Return the path, or raise InputError if the result cannot be written there."""
     if path.suffix.lower() != ".json":
         _table_format(path)
     return files.check_file(path)
 
 
 def _table_format(path: Path) -> Format:
-    """The format of tables that the suffix names. Raises InputError where it cannot be written."""
+    """The table format of the suffix. Raises InputError if it cannot be written."""
     form = format_of(path)
     if not form.writes:
         raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
@@ -159,16 +159,16 @@ def capture(
 ) -> Capture:
     """Measure a material from photographs of a ball, or of a flat sample, under a lamp in several places.
 
-        found = go.capture("photographs", "lambert+ggx")
-        found.fit.interval          # 95 % of each parameter
-        found.save("paint.gonio")
+        result = go.capture("photographs", "lambert+ggx")
+        result.fit.interval          # 95 % interval per parameter
+        result.save("paint.gonio")
 
     photographs  a folder with a calibration.json, or files that the calibration lists
-    model        what is fitted, as `go.fit` takes it; None: samples alone
-    calibration  the file that says what stood where; None: calibration.json beside the photographs
-    grazing      degrees: pixels seen or lit from beyond are left out
-    param        path -> value of parameters that are held
-    free         paths of parameters that move although they stay by themselves
+    model        model to fit, as in `go.fit`; None: samples only
+    calibration  the calibration file; None: calibration.json in the folder of the photographs
+    grazing      degrees; pixels viewed or lit beyond this angle are excluded
+    param        path -> value of parameters that stay fixed
+    free         paths of additional parameters to fit that stay fixed by default
     progress     called before each step, with its name
     Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
     throughout, or that show no sample.
@@ -182,7 +182,7 @@ def capture(
         shots.append(photographs_of.read(shot, stated, folder))
     scene = _scene(stated, shots)
     progress("chooses pixels")
-    # exposure times that contradict each other leave the level of all light open by as much
+    # inconsistent exposure times make the overall scale uncertain by the same ratio
     scale = float(np.hypot(stated.uncertainty.scale, max(shot.scale_error for shot in shots)))
     uncertainty = stated.uncertainty.model_copy(update={"scale": scale})
     slack = fitting.Faults.of(uncertainty, scene).slack(scene)
@@ -209,11 +209,12 @@ def plan(
     fixed: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
 ) -> list[Proposal]:
-    """Which photographs to take, before there are any: places of the lamp that tell most of a material like the model.
+    """Plan the first photographs: the most informative lamp positions for a material similar to the model.
 
-    calibration  a calibration file; the ball needs its place (or the flat sample), one lamp its place and intensity
-    model        what will be fitted, set to what the material may be like
-    places       where the lamp can stand; None: anywhere at the distance of the calibration's lamps
+    calibration  a calibration file with a ball and its position, or a flat sample, and a lamp with its position and
+                 intensity
+    model        the model to fit, with values close to those of the material
+    places       possible positions of the lamp; None: anywhere at the distance of the calibration's lamps
     """
     path = Path(os.path.expanduser(calibration))
     stated = calibrations.read(path)
@@ -223,7 +224,7 @@ def plan(
     light = next((intensity for name in stated.lights if (intensity := stated.intensity(name)) is not None), None)
     if not lamps or light is None or (ball is None and stated.flat is None):
         hint = "a plan needs a ball or a flat sample, and a lamp with its position and intensity"
-        raise InputError("too little is known for a plan", str(path), hint)
+        raise InputError("the calibration is incomplete for a plan", str(path), hint)
     scene = Scene(stated.camera, ball, stated.flat, np.array(lamps), np.tile(light, (len(lamps), 1)), ())
     material, moving = moving_of(model, fixed=fixed, free=free)
     away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
@@ -238,12 +239,12 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
     except (TypeError, ValueError):
         points = np.zeros(0)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InputError("places of the lamp are no (N, 3) numbers", "places", "such as [[0, -300, 200]]")
+        raise InputError("places of the lamp are not (N, 3) numbers", "places", "such as [[0, -300, 200]]")
     return points
 
 
 def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
-    """The calibration file that goes with photographs, or with their folder; or which itself is named."""
+    """The calibration file of photographs or of their folder, or the named calibration file itself."""
     if calibration is not None:
         return Path(os.path.expanduser(calibration))
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
@@ -263,7 +264,7 @@ def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None =
 
 
 def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration, Path]:
-    """The calibration's file, what it says of those photographs that are named, and the folder that they lie in."""
+    """(calibration file, calibration with the named photographs only, folder of the photographs)."""
     path = calibration_of(named, calibration)
     full = calibrations.read(path)
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
@@ -274,9 +275,9 @@ def _calibration(named: str | Path | Sequence[str], calibration: str | Path | No
         known = {Path(one.file).name for shot in full.photographs for one in shot.pictures}
         wanted = {Path(one).name for one in several}
         for name in sorted(wanted - known):
-            what = "the calibration tells neither its exposure nor its light"
-            raise InputError(what, str(folder / name), f"list it under photographs in {path}")
-        # a reference is always read, whatever is named: without it lamps have no intensity
+            what = "the calibration lists neither its exposure nor its light"
+            raise InputError(what, str(folder / name), f"add it under photographs in {path}")
+        # references are always read, since lamps may need them for their intensity
         selected = [
             shot
             for shot in full.photographs
@@ -287,7 +288,7 @@ def _calibration(named: str | Path | Sequence[str], calibration: str | Path | No
     return path, full.model_copy(update={"photographs": selected}), folder
 
 
-# ---------------------------------------------------------------------- what stood where
+# ---------------------------------------------------------------------- scene
 
 
 def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
@@ -308,7 +309,7 @@ def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
             lamps.append(np.array(lamp.position))
             continue
         if not mirrors:
-            raise InputError(f"no place of the light '{name}'", "lights", 'give its "position", or describe "mirrors"')
+            raise InputError(f"no position of the light '{name}'", "lights", 'give "position", or describe "mirrors"')
         about = ball.center if ball is not None else np.zeros(3)
         shot = next(one for one in shots if one.shot.light == name)
         lamps.append(geometry.lamp_in_mirrors(shot, mirrors, camera, about, lamp.distance))
@@ -318,7 +319,7 @@ def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
 
 
 def _intensity(stated: Calibration, scene: Scene, name: str, shots: Sequence[Photograph]) -> Floats:
-    """Of a lamp, as given, or by the white target."""
+    """Intensity of a lamp, as given or from the white target."""
     given = stated.intensity(name)
     if given is not None:
         return given
@@ -334,9 +335,9 @@ def _intensity(stated: Calibration, scene: Scene, name: str, shots: Sequence[Pho
     _, wi, square = pixels.directions(held, "flat", place, np.full(len(place), scene.names.index(name)))
     values = shot.radiance[row, column]
     fine = ~np.isnan(values).any(axis=1) & (wi[:, 2] > 0.1)
-    if fine.sum() < pixels.LEAST:
-        what = f"{int(fine.sum())} pixels of the reference are lit and not saturated, {pixels.LEAST} expected"
-        raise InputError(what, shot.name, "is the target where the calibration says?")
+    if fine.sum() < pixels.MIN_PIXELS:
+        what = f"{int(fine.sum())} pixels of the reference are lit and not saturated, {pixels.MIN_PIXELS} expected"
+        raise InputError(what, shot.name, "check the position of the target")
     white = np.broadcast_to(np.asarray(target.albedo, float), 3) / np.pi * wi[fine, 2:]
     intensity = np.median(values[fine] * square[fine, None] / white, axis=0)
     if not np.all(intensity > 0.0):

@@ -1,25 +1,25 @@
-"""Exposures of one view merged by variance, with the camera's noise found from the exposures themselves.
+"""Merge exposures of one view by variance, with the camera's noise estimated from the exposures themselves.
 
-A camera that is linear stores y_i = L t_i + noise of light L exposed for t_i seconds, with
+A linear camera stores y_i = L t_i + noise of light L exposed for t_i seconds, with
 
     Var(y_i) = read + gain L t_i + (relative L t_i)^2 + q_i^2
 
-(the EMVA standard 1288, and a relative part: what grows with the signal, such as a flickering lamp; q_i, which is
-known, is what the file's steps add). Of all unbiased means of x_i = y_i / t_i the one with the least variance weighs by
+(EMVA standard 1288, plus a relative part proportional to the signal, such as a flickering lamp; q_i is the known
+quantization error of the file). The unbiased mean of x_i = y_i / t_i with the least variance has the weights
 1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 weighs by the value alone), and its variance is
 1 / sum(1 / v_i).
 
-v_i depends on L. Taken at the exposure's own value, a value that is low by chance counts more, and the mean is biased
-by about -gain / t. Taken at the merged value it is not: at these weights the merged value is uncorrelated with
-every difference x_i - x_j (with Gaussian noise, independent of it), so that weights that follow it bias nothing to
-first order. So v_i is iterated on the merged value, from weights that go with the seconds, which are those of photons
-alone. For the same reason neither saturation nor the clipping at 0 is decided by the value that would be left out: an
-exposure counts where the shorter ones say that it stays under saturation by three standard deviations; and where it is
-three above 0, or the longest that counts.
+v_i depends on L. Evaluated at the exposure's own value, it gives more weight to values that are low by chance, which
+biases the mean by about -gain / t. Evaluated at the merged value it does not: with these weights the merged value is
+uncorrelated with every difference x_i - x_j (independent of it for Gaussian noise), so weights that depend on it are
+unbiased to first order. So v_i is iterated on the merged value, starting with weights proportional to the seconds,
+which are those of photon noise. For the same reason, the tests for saturation and clipping at 0 do not use the tested
+value: an exposure counts if the shorter ones predict that it is three standard deviations below saturation, and if it
+is three above 0 or the longest that counts.
 
-The differences of two exposures at pixels of like L have the variance v_i + v_j whatever the picture shows. That is
-linear in (read, gain, relative^2), which are fitted to it over bins of L by non-negative least squares, channel by
-channel. The mean of x_i / x_j tells by how much stated exposure times are off from each other.
+The difference of two exposures at pixels of similar L has the variance v_i + v_j, independent of the picture. It is
+linear in (read, gain, relative^2), which are fitted over bins of L by non-negative least squares, per channel. The
+mean of x_i / x_j measures the relative error of stated exposure times.
 """
 
 from __future__ import annotations
@@ -35,27 +35,27 @@ from scipy.optimize import nnls
 from ...errors import InputError
 from .calibration import Floats
 
-SIGMAS = 3.0  # from saturation, and from 0, within which an exposure does not count
-UNKNOWN = 0.8  # of saturation, up to which exposures count while their noise is not known
-ROUNDS = 4  # merged value and noise follow each other; the fourth changes either by less than a thousandth
-BINS = 48  # of light, in which variances are taken
-FEWEST = 30  # pixels of a bin
-BLACK = 0.003  # share of a bin's pixels at 0, from which on its variance is one of clipped values
-ASKED = 10.0  # of chi-square, as the Bayesian criterion has it for a number more to some hundred bins; also 3 sigma
+SIGMAS = 3.0  # standard deviations from saturation or 0 within which an exposure is ignored
+UNKNOWN = 0.8  # of saturation, up to which exposures count before their noise is known
+ROUNDS = 4  # iterations of merged value and noise; the fourth changes either by less than a thousandth
+BINS = 48  # bins of light for estimating variances
+MIN_PIXELS = 30  # per bin
+BLACK = 0.003  # share of a bin's pixels at 0 from which clipping affects its variance
+MIN_GAIN = 10.0  # gain in chi-square for an additional parameter: the BIC for some hundred bins; also 3 sigma
 NOISELESS = 1e-9  # of the brightest light
 TINY = 1e-120  # a variance of 0, whose inverse can still be squared
-CUT = 4.0  # standard deviations beyond which a difference is no noise, but something that moved
-WRONG = 0.1  # relative, from which on an exposure time is an error and no tolerance
+CUT = 4.0  # standard deviations beyond which a difference indicates motion rather than noise
+WRONG = 0.1  # relative error of an exposure time from which it is rejected
 
 
 class Exposed(NamedTuple):
     """One exposure.
 
-    file     its name
-    signal   (H, W, 3), linear, nan where it is saturated
-    step     (H, W, 3), standard deviation of its quantisation; 0 throughout: floating-point numbers, never clipped
-    seconds  as they are stated
-    ceiling  signal from which on it is saturated
+    file     name of the file
+    signal   (H, W, 3), linear; nan where saturated
+    step     (H, W, 3), standard deviation of its quantization; 0 everywhere for floating-point files, never clipped
+    seconds  stated exposure time
+    ceiling  signal at saturation
     """
 
     file: str
@@ -70,27 +70,27 @@ class Exposed(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Of a camera, (3,) each: variance of reading, variance per signal of photons, relative variance of the rest."""
+    """Noise of a camera, (3,) each: read variance, photon variance per signal, relative variance of the rest."""
 
     read: Floats
     gain: Floats
     relative: Floats
 
     def variance(self, light: Floats, seconds: float, step: Floats) -> Floats:
-        """Of signal / seconds, (H, W, 3), at some light."""
+        """Variance of signal / seconds, (H, W, 3), at a given light."""
         size = np.maximum(light, 0.0)
         return (self.read + step**2) / seconds**2 + self.gain * size / seconds + self.relative * size**2
 
 
 @dataclass(frozen=True)
 class Merged:
-    """Light of a series.
+    """Merged light of a series.
 
     light     (H, W, 3), signal per second; nan where every exposure is saturated
-    spread    (H, W, 3), its standard deviation by reading, photons and quantisation
-    photon    (H, W, 3), derivative of that variance along the light
-    noise     of the camera; zeros where there is one exposure alone
-    times     exposure times as the pixels tell them, over the stated ones, shortest first; their product is 1
+    spread    (H, W, 3), standard deviation from read noise, photons and quantization
+    photon    (H, W, 3), derivative of that variance with respect to the light
+    noise     of the camera; zeros for a single exposure
+    times     estimated over stated exposure times, shortest first; their product is 1
     """
 
     light: Floats
@@ -101,13 +101,13 @@ class Merged:
 
     @property
     def scale_error(self) -> float:
-        """Relative standard error of all light, if exposure times are off by as much as they are from each other."""
+        """Relative standard error of all light, estimated from the scatter of the exposure times."""
         count = len(self.times)
         return float(np.std(np.log(self.times), ddof=1) / np.sqrt(count)) if count > 1 else 0.0
 
 
 def merge(exposures: Sequence[Exposed]) -> Merged:
-    """Exposures of one view merged. Raises InputError where their times contradict their pixels by a tenth."""
+    """Merge exposures of one view. Raises InputError if stated times contradict the pixels by more than a tenth."""
     ordered = sorted(exposures, key=lambda one: one.seconds)
     times = np.ones(len(ordered))
     noise = Noise(np.zeros(3), np.zeros(3), np.zeros(3))
@@ -120,13 +120,13 @@ def merge(exposures: Sequence[Exposed]) -> Merged:
             used = _above(ordered, times, light, below, noise)
             light = _mean(ordered, times, light, used, noise)
             times = _times(ordered, times, light, used, noise)
-    # what goes with the signal itself is found again in a fit, beside other faults of that kind
+    # a fit estimates the relative noise again, together with other errors proportional to the signal
     spread, photon = _spread(ordered, times, light, used, noise._replace(relative=np.zeros(3)))
     return Merged(np.where(used.any(axis=0), light, np.nan), spread, photon, noise, times)
 
 
 def _start(exposures: Sequence[Exposed]) -> tuple[Floats, NDArray[np.bool_]]:
-    """(light, which exposures count (K, H, W, 3)) with weights of photons, from the shortest exposure on."""
+    """(light, which exposures count (K, H, W, 3)) with photon-noise weights, from the shortest exposure."""
     total, seconds = np.zeros_like(exposures[0].signal), np.zeros_like(exposures[0].signal)
     used = []
     for one in exposures:
@@ -141,7 +141,7 @@ def _start(exposures: Sequence[Exposed]) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _below(exposures: Sequence[Exposed], times: Floats, light: Floats, noise: Noise) -> NDArray[np.bool_]:
-    """Which exposures stay under saturation, (K, H, W, 3), as the shorter ones tell."""
+    """Mask of exposures below saturation, (K, H, W, 3), as predicted by the shorter ones."""
     total, weights = np.zeros_like(light), np.zeros_like(light)
     used = []
     for one, factor in zip(exposures, times, strict=True):
@@ -162,7 +162,7 @@ def _below(exposures: Sequence[Exposed], times: Floats, light: Floats, noise: No
 def _above(
     exposures: Sequence[Exposed], times: Floats, light: Floats, below: NDArray[np.bool_], noise: Noise
 ) -> NDArray[np.bool_]:
-    """Which of these count, (K, H, W, 3): those that stay clear of 0, and the longest."""
+    """Mask of usable exposures, (K, H, W, 3): those well above 0, and the longest."""
     longer = np.zeros(light.shape, bool)
     used = []
     for one, factor, fine in reversed(list(zip(exposures, times, below, strict=True))):
@@ -176,7 +176,7 @@ def _above(
 
 
 def _mean(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise) -> Floats:
-    """The mean of the least variance, that variance taken at the mean itself."""
+    """The minimum-variance mean, with variances evaluated at the mean itself."""
     for _ in range(3):
         total, weights = np.zeros_like(light), np.zeros_like(light)
         for one, factor, fine in zip(exposures, times, used, strict=True):
@@ -214,16 +214,16 @@ def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         ]
         coefficients[channel] = _least(*(np.concatenate(parts) for parts in zip(*bins, strict=True)))
     told = coefficients.any(axis=1)
-    if told.any():  # a channel that is dark throughout tells nothing; the sensor is the same
+    if told.any():  # dark channels get the median noise of the others: the sensor is the same
         coefficients[~told] = np.median(coefficients[told], axis=0)
-    else:  # without noise, as renders may be: any weights will do, those of photons will
+    else:  # noise-free, such as renders: any weights are valid, photon-noise weights are used
         coefficients[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
     return Noise(*coefficients.T)
 
 
 def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
-    """(read, gain, relative^2), not negative, that explain variances (B,) with their relative errors (B,) best. The
-    last, which is hard to tell from photons, is 0 unless the variances ask for it by `ASKED` of chi-square."""
+    """(read, gain, relative^2), not negative, that fit variances (B,) with relative errors (B,) best. The last is
+    hard to separate from photon noise, so it is 0 unless it reduces chi-square by `MIN_GAIN`."""
     if not variance.any():
         return np.zeros(3)
     scale = np.maximum(columns.max(axis=0), 1e-300)
@@ -231,15 +231,15 @@ def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
     best, misfit = np.zeros(3), np.inf
     for some in ([0, 1], [0, 1, 2]):
         size = np.maximum(variance, floor)
-        for _ in range(4):  # the error of a variance goes with it: with the fitted one, for the reason given above
+        for _ in range(4):  # the error of a variance is proportional to the fitted variance, for the reason given above
             weight = 1.0 / (np.maximum(size, floor) * error)
             part, _ = nnls((columns / scale)[:, some] * weight[:, None], variance * weight)
             coefficients = np.zeros(3)
             coefficients[some] = part / scale[some]
             size = columns @ coefficients
-        # of a variance that differs from the fitted one by more than its size, the logarithm counts
+        # logarithms bound the residual of variances far from the fitted ones
         rest = float(np.sum((np.log(np.maximum(variance, floor) / np.maximum(size, floor)) / error) ** 2))
-        if rest < misfit - (ASKED if len(some) > 2 else 0.0):
+        if rest < misfit - (MIN_GAIN if len(some) > 2 else 0.0):
             best, misfit = coefficients, rest
     return best
 
@@ -248,10 +248,10 @@ def _variances(
     short: Exposed, long: Exposed, factors: Floats, light: Floats, both: NDArray[np.bool_], channel: int
 ) -> tuple[Floats, Floats, Floats]:
     """(derivatives (B, 3) along read noise, gain and relative variance; variance (B,) of the difference of two
-    exposures; relative error of each (B,)), over bins of light; what quantisation does is taken off."""
+    exposures; relative error of each (B,)), over bins of light, without quantization noise."""
     fine = both[..., channel] & (light[..., channel] > 0.0) if short.clips else both[..., channel]
     level = light[..., channel][fine]
-    if len(level) < FEWEST:
+    if len(level) < MIN_PIXELS:
         return np.zeros((0, 3)), np.zeros(0), np.zeros(0)
     a, b = short.seconds * factors[0], long.seconds * factors[1]
     difference = short.signal[..., channel][fine] / a - long.signal[..., channel][fine] / b
@@ -270,7 +270,7 @@ def _variances(
     size = np.maximum(level, 0.0)
     ones = np.full(len(count), 1.0 / a**2 + 1.0 / b**2)
     columns = np.stack([ones, mean(size) * (1.0 / a + 1.0 / b), 2.0 * mean(size**2)], -1)
-    enough = count >= FEWEST
+    enough = count >= MIN_PIXELS
     if short.clips:
         black = (short.signal[..., channel][fine] <= 0.0) | (long.signal[..., channel][fine] <= 0.0)
         enough &= np.bincount(which, black, len(edges) + 1) <= BLACK * count + 1.0
@@ -279,7 +279,7 @@ def _variances(
 
 
 def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise) -> Floats:
-    """Exposure times over the stated ones, as far as the pixels contradict these; their product is 1."""
+    """Estimated over stated exposure times; 1 unless the pixels contradict them; their product is 1."""
     logs, sure, unsure = [0.0], True, 0.0
     for k in range(len(exposures) - 1):
         a, b = exposures[k], exposures[k + 1]
@@ -291,7 +291,7 @@ def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         weight = np.where(both, light / np.maximum(variances[0] + variances[1], 1e-300), 0.0)
         x, y = (float(np.sum(weight * np.nan_to_num(one.signal)) / s) for s, one in zip(seconds, (a, b), strict=True))
         told = float(np.sum(weight * light))
-        if not (both.sum() >= FEWEST and x > 0.0 and y > 0.0 and told > 0.0):
+        if not (both.sum() >= MIN_PIXELS and x > 0.0 and y > 0.0 and told > 0.0):
             return times
         step = np.log(y / x) + np.log(times[k + 1] / times[k])
         sure = sure and abs(step) < SIGMAS / np.sqrt(told)
@@ -303,9 +303,7 @@ def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         told_seconds = exposures[worst].seconds * float(
             np.exp(log_times[worst] - np.median(np.delete(log_times, worst)))
         )
-        what = (
-            f"{exposures[worst].seconds:g} s are stated, its pixels and those of the others tell {told_seconds:.3g} s"
-        )
-        hint = 'correct "seconds" in the calibration file, or leave this exposure out; is the response right?'
+        what = f"{exposures[worst].seconds:g} s are stated, but the pixels of the series indicate {told_seconds:.3g} s"
+        hint = 'correct "seconds" in the calibration file, or omit this exposure; also check the response'
         raise InputError(what, exposures[worst].file, hint)
     return np.ones(len(log_times)) if sure else np.exp(log_times - log_times.mean())
