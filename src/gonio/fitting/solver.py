@@ -271,9 +271,8 @@ def solve(
     tolerance: float = 1e-6,
     progress: Callable[[float], None] = lambda cost: None,
 ) -> Solution:
-    """Minimize the sum of squares from `start` within the ranges of the parameters.
+    """Minimize the sum of squares from `start` within the ranges of the parameters, in at most `steps` steps.
 
-    steps      maximum number of steps
     tolerance  relative decrease of the cost below which the solver stops
     progress   called with the cost after each accepted step
     """

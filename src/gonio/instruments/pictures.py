@@ -152,12 +152,7 @@ def fit_picture(
     description = scenes.read(
         scene, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides, names_output=False
     )
-    width, height = description.camera.film.size
-    if wanted.shape[:2] != (height, width):
-        what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, the size of the film"
-        raise InputError(what, str(picture), "set the film to the size of the picture")
-    if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
-        raise InputError("the picture is black or not finite", str(picture))
+    _check_picture(wanted, description, str(picture))
     with garbage.paused():
         built = scenes.built(description, mi)
         problem = Problem(
@@ -173,6 +168,15 @@ def fit_picture(
 
         numbers = solve(problem, start, steps=steps, tolerance=1e-5, progress=step).numbers
         return _result(problem, numbers, losses, time.perf_counter() - started)
+
+
+def _check_picture(wanted: NDArray[np.float32], description: SceneDescription, location: str) -> None:
+    width, height = description.camera.film.size
+    if wanted.shape[:2] != (height, width):
+        what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, the size of the film"
+        raise InputError(what, location, "set the film to the size of the picture")
+    if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
+        raise InputError("the picture is black or not finite", location)
 
 
 def _depth(description: SceneDescription) -> int:
