@@ -156,7 +156,7 @@ def fit_picture(
         raise InputError(what, str(picture), "render the scene in that size, or scale neither")
     if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
         raise InputError("the picture is dark, or not finite", str(picture))
-    with garbage.kept():
+    with garbage.paused():
         built = scenes.built(description, mi)
         problem = Problem(
             mi, built, _targets(description, built, free), _depth(description), wanted, spp, 1 if seed is None else seed

@@ -82,7 +82,7 @@ class Rough(Specimen):
             count = int(np.ceil(np.radians(STEEPEST) / self.half_angle)) + 1
             wanted = np.linspace(0.0, np.radians(STEEPEST), count)
         self.lights: Floats = wanted
-        with garbage.kept():
+        with garbage.paused():
             self._shoot()
 
     def _shoot(self) -> None:
