@@ -75,7 +75,7 @@ def test_the_verb_says_where_and_by_how_much(
     assert cli.run(["compare", "lambert", "map.png"]) == 2
     assert "a picture and a material" in capsys.readouterr().err
     assert cli.run(["compare", "lambert", "lambert", "--metric", "flip"]) == 2
-    assert "unknown metric 'flip' of materials" in capsys.readouterr().err
+    assert "unknown metric 'flip' for materials" in capsys.readouterr().err
 
 
 def test_python_compares_objects_and_texts() -> None:

@@ -183,7 +183,7 @@ def test_a_scene_means_what_mitsuba_makes_of_it(tmp_path: Path, version: str) ->
         ('<float name="x" value="$here"/>', r"the parameter \$here has no value", "a.xml:1"),
         ('<shape type="cube"><path value="."/></shape>', "inside another element", "a.xml:1"),
         ('<default name="x"/>', "<default> has no value", "a.xml:1"),
-        ('<default name="x" value="1"><float/></default>', "an element that holds none", "a.xml:1"),
+        ('<default name="x" value="1"><float/></default>', "an element that cannot contain any", "a.xml:1"),
         ('<include filename="c.xml"/>', "begins with <float>", "c.xml:1"),
         ('<include filename="d.xml"/>', "of version 0.6.0 is included in a scene of version 3.0.0", "d.xml:1"),
         ('<include filename="a.xml"/>', "more than 15 includes inside each other", "a.xml:1"),
@@ -203,7 +203,7 @@ def test_an_error_names_the_users_line(tmp_path: Path, content: str, message: st
 
 def test_what_a_scene_grows_to_is_bounded(tmp_path: Path) -> None:
     chain = "".join(f'<default name="a{n}" value="{f"$a{n - 1}" * 16 if n else "x" * 16}"/>' for n in range(11))
-    with pytest.raises(InputError, match="make too long a text"):
+    with pytest.raises(InputError, match="make the text too long"):
         mitsuba_xml.read(scene(tmp_path / "scene", chain), {})
     with pytest.raises(InputError, match="more than 64 elements inside each other"):
         mitsuba_xml.read(scene(tmp_path / "scene", '<shape type="cube">' * 10_000 + "</shape>" * 10_000), {})
@@ -234,7 +234,7 @@ def test_the_longest_name_of_a_parameter_counts_and_its_value_is_no_name(tmp_pat
     ("count", "last", "message"),
     [
         (60, '<bsdf type="diffuse" id="a60"/>', ""),
-        (20_000, '<bsdf type="diffuse" id="a20000"/>', "references lead on from one object to the next 20000 times"),
+        (20_000, '<bsdf type="diffuse" id="a20000"/>', "references are chained 20000 times"),
         (1, '<bsdf type="twosided" id="a1"><ref id="a1"/></bsdf>', "is part of itself"),
         (20_000, '<alias id="a0" as="a20000"/>', "is part of itself"),
     ],

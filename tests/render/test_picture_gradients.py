@@ -128,7 +128,7 @@ def test_derivatives_go_on_from_a_checkpoint_to_the_same_bits(
         ("ball.alpha", {}, "names no material of a shape"),
         ("shapes.7.material.alpha", {}, "no shape 7"),
         ("shapes.0.material.alfa", {}, "no parameter 'alfa'"),
-        ("shapes.0.material.alpha.r", {}, "'alpha' is no colour"),
+        ("shapes.0.material.alpha.r", {}, "'alpha' is not a color"),
         ("shapes.0.material.rotation", {}, "has no derivative here"),
         ("shapes.0.material.alpha", {"overrides": {"shapes.0.material.alpha": 0.0}}, "mirrors and smooth glass"),
         ("shapes.0.material.alpha", {"integrator": "light"}, "light has no derivatives"),

@@ -193,7 +193,7 @@ XYZ = "property float x\nproperty float y\nproperty float z\n"
     ("vertex", "body", "reason"),
     [
         (XYZ + "property float x\n", "0 0 0 0\n1 0 0 0\n0 1 0 0\n3 0 1 2\n", "'x' is given twice"),
-        (XYZ, f"0 0 0\n1 0 0\n0 1 0\n3 0 1 {10**30}\n", "a number that no file has"),
+        (XYZ, f"0 0 0\n1 0 0\n0 1 0\n3 0 1 {10**30}\n", "a vertex index that is out of range"),
         (XYZ.replace("float x", "list uchar int x"), "1 0 0 0\n2 0 1 0 0\n1 1 0 0\n3 0 1 2\n", "no vertices with x"),
     ],
 )

@@ -85,5 +85,5 @@ def test_a_law_can_be_registered_in_a_program(tmp_path: Path, monkeypatch: pytes
 
 
 def test_what_is_no_law_is_refused() -> None:
-    with pytest.raises(go.InputError, match="is no law"):
+    with pytest.raises(go.InputError, match="is not a law"):
         laws.Law.family.add(go.Lambert)

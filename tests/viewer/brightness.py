@@ -68,7 +68,7 @@ def shows(what: stage.Stage) -> Iterator[Show]:
         presets.setdefault(tuple(chosen.items()), []).append(numbers)
     for choices, balls in presets.items():
         for at in range(0, len(balls), MOST):
-            yield Show(f"presets from {at} {dict(choices)}", dict(choices), balls[at : at + MOST], (SUN,))
+            yield Show(f"presets from {at} {dict(choices)}", dict(choices), balls[at : at + MOST], (FURNACE,))
 
 
 def rows_of(show: Show) -> list[tuple[str, Values, list[Values]]]:

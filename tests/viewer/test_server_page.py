@@ -114,6 +114,7 @@ def test_the_picture_is_the_path_traced_one(live: Live) -> None:
 
 
 def test_the_reference_follows_the_sliders(live: Live) -> None:
+    live.wait("gonio.live.status.samples > 0")
     before = live.tab.evaluate("gonio.live.status.samples")
     assert before > 0
     for i in range(10):

@@ -1,7 +1,8 @@
-"""Scenes: the lab's JSON and Gonio's additions to it, validated, and built for Mitsuba.
+"""Scenes in the lab's JSON format with Gonio's additions: reading, validation, and construction of the Mitsuba scene.
 
 from gonio import scene
 from gonio.bridge import engine
+
 description = scene.read("examples/phong")
 mitsuba_scene = scene.build(description, engine.load())
 """

@@ -1,4 +1,4 @@
-"""A scene for a material alone: a ball on a chequered floor, a lamp beside it and a second behind, a dim sky."""
+"""The scene that shows a single material: a ball on a checkered floor, with two lamps and a dim sky."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TILE = 0.6
 
 
 def of_material(material: BSDF, overrides: Mapping[str, object] | None = None) -> SceneDescription:
-    """The scene of a ball of that material; `overrides` as `reader.read` takes them."""
+    """The scene of a ball of that material, with `overrides` as in `reader.read`."""
     raw = _raw(material.name or type(material).__name__, described(material))
     if overrides:
         override.apply(raw, overrides)

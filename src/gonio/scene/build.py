@@ -1,4 +1,4 @@
-"""From a validated description to a Mitsuba scene."""
+"""Construction of a Mitsuba scene from a validated description."""
 
 from __future__ import annotations
 
@@ -28,33 +28,33 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-MERGE_FROM = 64  # from so many materials of one structure on one stands for them
+MERGE_FROM = 64  # number of materials of equal structure from which on they are merged into one BSDF
 
-# Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
-# format's +y, +z, +x: u about y from z toward x, v from +y.
+# Maps local +z, +x, +y of Mitsuba's sphere, where u runs about z from x toward y and v from +z, to the format's
+# +y, +z, +x, where u runs about y from z toward x and v from +y.
 _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
     """The `mi.Scene`: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
 
-    Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
+    Shapes whose materials are equal share one BSDF. Raises InputError for an unusable image or mesh.
     """
     return built(description, mi, merge_materials=True).scene
 
 
 @dataclass(frozen=True)
 class Built:
-    """A scene, and the BSDF that each material of its description has become."""
+    """A scene, and the BSDF of each material of its description."""
 
     scene: Scene
     bsdfs: Mapping[MaterialPart, BSDFPlugin]
 
 
 def built(description: schema.SceneDescription, mi: ModuleType, merge_materials: bool = False) -> Built:
-    """As `build`, with the materials, for who changes them.
+    """As `build`, together with the BSDFs, for callers that change them.
 
-    merge_materials  let one BSDF, which is in no list, stand for very many materials that differ in numbers alone
+    merge_materials  represent many materials that differ only in numbers by one BSDF, which is not listed in `bsdfs`
     """
     builder = _Builder(description, mi, merge_materials)
     return Built(builder.scene(), builder.bsdfs)
@@ -63,7 +63,7 @@ def built(description: schema.SceneDescription, mi: ModuleType, merge_materials:
 class _Builder:
     def __init__(self, description: schema.SceneDescription, mi: ModuleType, merge_materials: bool) -> None:
         from ..bridge import adapter
-        from ..transport.lights import lights  # here, since they start Dr.Jit
+        from ..transport.lights import lights  # imported here, since they start Dr.Jit
 
         adapter.register(mi)
         self.adapter = adapter
@@ -87,8 +87,8 @@ class _Builder:
             part = self.light(light, pointer("scene", "lights", index), f"light{index}")
             plain = isinstance(light, schema.AreaLight) and isinstance(part, dict)
             (shapes if plain else scene)[f"light{index}"] = part
-        # Mitsuba merges the meshes of a scene by itself, and hands them on in an order of chance: with it would go the
-        # order of the lights, and every picture. So they are merged here, and sorted.
+        # Mitsuba would merge the meshes of a scene itself, but in random order, which would change the order of the
+        # lights and thus the picture. Therefore they are merged and sorted here.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         merged = merged if isinstance(merged, list) else [merged]
         compute_boxes(merged)
@@ -102,11 +102,11 @@ class _Builder:
         return loaded
 
     def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
-        """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
+        """A Mitsuba object. If Mitsuba rejects it, raise InputError at `where`."""
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", GonioWarning)  # the reader has said it, with the place
-                # one after the other: in parallel their numbers, and with them the kernels, are left to chance
+                warnings.simplefilter("ignore", GonioWarning)  # the reader has already warned, with the location
+                # sequentially: in parallel, the order of the objects, and with it the kernels, would be random
                 return self.mi.load_dict(plugin, parallel=False, optimize=optimize)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
@@ -122,8 +122,8 @@ class _Builder:
         placed = camera.transform
         width, height = camera.film.size
         if camera.polarizer is not None and not self.mi.is_polarized:
-            what = f"a polarizer, in the variant {self.mi.variant()} that knows no polarization"
-            hint = "`gonio render` and go.render choose one that does; here set llvm_ad_spectral_polarized before"
+            what = f"a polarizer needs a polarized variant, {self.mi.variant()} is not"
+            hint = "`gonio render` and go.render choose one; otherwise set the variant llvm_ad_spectral_polarized first"
             raise InputError(what, self.description.where("/camera/polarizer"), hint)
         return {
             "type": "perspective",
@@ -138,7 +138,7 @@ class _Builder:
                 "type": "hdrfilm",
                 "width": width,
                 "height": height,
-                "rfilter": {"type": "box"},  # the lab's pixel is the mean of its samples
+                "rfilter": {"type": "box"},  # in the lab, a pixel is the mean of its samples
                 "pixel_format": "rgb",
                 "component_format": "float32",
             },
@@ -149,7 +149,7 @@ class _Builder:
 
     def light(self, light: schema.LightSource, where: str, name: str) -> Plugin | PluginDict:
         if isinstance(light, schema.AreaLight):
-            # Mitsuba merges Python plugins whose properties are equal: the tag keeps two like lamps apart
+            # Mitsuba merges Python plugins whose properties are equal: the tag keeps two equal lamps distinct
             emitter = {"type": "gonio_area", "radiance": spectra.emitted(light.energy), "tag": name}
             return self.shape(light.shape, f"{where}/shape", name, emitter)
         if isinstance(light, schema.SpotLight):
@@ -159,7 +159,7 @@ class _Builder:
             irradiance = spectra.emitted(light.energy)
             return {"type": "directional", "direction": light.unit().tolist(), "irradiance": irradiance}
         source = light.texture if light.texture is not None else light.radiance
-        assert source is not None, "one of the two is given"
+        assert source is not None, "exactly one of the two is given"
         if isinstance(source, ImageTexture):
             return textures.environment(self.mi, self.values(source, f"{where}/texture"))
         return {"type": "constant", "radiance": spectra.emitted(source)}
@@ -187,7 +187,7 @@ class _Builder:
         return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
     def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
-        """Mitsuba's own exact shape, where it has one."""
+        """Mitsuba's own exact shape, None if it has none."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
             rotation = shape.transform.rotate
@@ -226,9 +226,9 @@ class _Builder:
         return self.bsdfs[material]
 
     def gather(self) -> None:
-        """Put one BSDF in the place of those of spheres and parallelograms that differ in numbers alone.
+        """Merge the materials of spheres and parallelograms that differ only in numbers into one BSDF.
 
-        Not of meshes: Mitsuba makes one shape of those that share a BSDF.
+        Meshes are excluded, since Mitsuba merges meshes that share a BSDF into one shape.
         """
         places: dict[MaterialPart, str] = {}
         for index, shape in enumerate(self.description.shapes):
@@ -252,15 +252,15 @@ class _Builder:
             try:
                 bsdf = self.load(group.plugin(self.mi), places[members[0]])
             except InputError:
-                continue  # it takes no textures, or one of them is wrong: said where it stands alone
+                continue  # it accepts no textures, or one of them is invalid, which is reported when it is built alone
             if bsdf.placed.model.transmits and bsdf.placed.model.interior is not None:
-                continue  # light asks for its index and absorption elsewhere than on its shape
+                continue  # its index and absorption are also needed away from its shape
             self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
 
     def plugin(self, material: MaterialPart, where: str) -> PluginDict:
         """The material as a Mitsuba dict."""
         plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
-        # Seen from behind nothing is black, as in the lab; a material that transmits has two sides of its own.
+        # As in the lab, back sides are not black; the flag has no effect on a material that transmits.
         plugin["two_sided"] = material.two_sided is not False
         if material.preset is not None:
             plugin["preset"] = material.preset
@@ -311,22 +311,22 @@ class _Builder:
         pixels = self.image(texture, where)
         if pixels.shape[2] != 3:
             raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
-        return self.leaning("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
+        return self.perturbing_normal("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
 
     def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:
-        """The slopes of the heights, by differences over two texels; the image repeats."""
+        """A plugin whose normals follow the slopes of the heights, by central differences; the image repeats."""
         heights = texture.scale * self.image(texture, where).mean(axis=2)
         across, down = ((np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) / 2.0 for axis in (1, 0))
-        return self.leaning("bump", plugin, np.dstack([across * heights.shape[1], down * heights.shape[0]]))
+        return self.perturbing_normal("bump", plugin, np.dstack([across * heights.shape[1], down * heights.shape[0]]))
 
-    def leaning(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
-        """A plugin inside one of those that lean its normal."""
+    def perturbing_normal(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
+        """A plugin nested in one that perturbs its normal."""
         maps = (textures.bitmap(self.mi, values[..., [axis]], "bilinear", "repeat") for axis in (0, 1))
         perturbed = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
         return {**perturbed, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
 
     def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
-        """The image's own values."""
+        """The values of an image, before the factor."""
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
         channel = texture.channel if isinstance(texture, ImageTexture) else None
         path, inside = self.description.locate(texture.file, f"{where}/file"), documents.inside(texture.file)[1]
@@ -337,7 +337,7 @@ class _Builder:
         return self.images[key]
 
     def values(self, texture: ImageTexture, where: str) -> RGB:
-        """Those times the factor."""
+        """The values of an image times its factor."""
         pixels = self.image(texture, where)
         return pixels if texture.factor == 1.0 else pixels * np.asarray(texture.factor, np.float32)
 
@@ -353,5 +353,5 @@ class _Builder:
         if high > parameter.high:
             self.description._warnings.append(
                 f"{self.description.where(where)}: '{texture.file}' holds {high:g}, over {parameter.high:g}: "
-                "the material gives back more light than it receives"
+                "the material reflects more light than it receives"
             )

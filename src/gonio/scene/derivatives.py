@@ -47,11 +47,11 @@ def along(description: SceneDescription, built: Built, path: str) -> Along:
         raise InputError(f"no parameter '{parameter}'", where, did_you_mean(parameter, [*known]))
     target = Along(plugin, name, channel)
     if channel is not None and known[name].kind != "spectrum":
-        raise InputError(f"'{name}' is no colour", where, "leave the channel out")
+        raise InputError(f"'{name}' is not a color", where, "leave the channel out")
     if target.slot.textures:
         raise InputError("a texture gives this value", where, "give the material a plain number")
     if known[name].kind == "angle" or name.rpartition(".")[2] in ("absorption", "priority"):
-        raise InputError(f"'{name}' has no derivative here", where, "name a width, a colour or an index")
+        raise InputError(f"'{name}' has no derivative here", where, "name a width, a color or an index")
     if model.delta != "never" or model.stochastic:
         what = "mirrors and smooth glass turn light by an index" if not model.stochastic else "its values are random"
         raise InputError(f"{what}: no derivative", where, "name a material that is rough")

@@ -1,4 +1,4 @@
-"""Files that a scene names."""
+"""Locating the files that a scene names."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from ..errors import InputError, did_you_mean
 
 
 def located(file: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
-    """The path of a file that something in a folder names. InputError where it is missing or outside the folder."""
+    """The path of a file named by a file in `folder`. Raises InputError if it is missing or outside that folder."""
     file = documents.inside(file)[0]
     return checked(Path(folder, file), file, folder, where, allow_outside)
 
 
 def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
-    """The path of a file without links. InputError where it is missing or empty, or lies outside the folder.
+    """The path of a file with links resolved. Raises InputError if it is missing, empty or outside the folder.
 
-    name  as errors call it
+    name  the file's name in errors
     """
     try:
         folder = folder.resolve()
@@ -43,5 +43,5 @@ def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool
 
 
 def _siblings(path: Path, most: int = 200) -> list[Path]:
-    """What else lies in a file's folder, for a hint."""
+    """Other files in the same folder, for a hint."""
     return [p for p in islice(path.parent.iterdir(), most) if p.is_file()] if path.parent.is_dir() else []

@@ -1,4 +1,4 @@
-"""The size of a film: what this machine can hold."""
+"""Checking the size of a film against the memory of this machine."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import os
 
 from ..errors import InputError
 
-# Per pixel: 9 sums in float64, twice (before and after a pass), lane order, picture as float64 and float32, the
-# file's bytes. It is the estimate by which a film is refused as too large.
+# An estimate per pixel: 9 sums in float64, twice (before and after a pass), the lane order, the picture as float64 and
+# float32, and the bytes of the file.
 BYTES_PER_PIXEL = 250
 MAX_SIDE = 1 << 16  # pixels
 
 
 def check_film(size: tuple[int, int], where: str) -> None:
-    """Raise InputError for a film without pixels, or one that one sample per pixel would not fit the memory."""
+    """Raise InputError for a film without pixels, or one too large for memory at one sample per pixel."""
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
@@ -28,7 +28,7 @@ def check_film(size: tuple[int, int], where: str) -> None:
 
 
 def memory() -> int:
-    """Bytes of memory in this machine; a guess of 8 GiB where the system does not tell."""
+    """Bytes of memory in this machine; 8 GiB if the system does not report it."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):

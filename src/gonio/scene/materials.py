@@ -1,9 +1,9 @@
-"""The materials of a scene file, made from what the models declare about themselves.
+"""The materials of scene files, derived from the parameters that each model declares.
 
-Two families share the `type` key. The lab's six types keep the lab's keys, meaning and defaults (`LAB`); every model
-of `gonio.models` can be named too, with its own parameters and defaults: as `gonio-conductor`, and without the
-prefix where the lab does not use the name. A new model file needs no change here, and neither does a material that is
-registered later, or a class in a file beside the scene ("ward.py:Ward"), which runs where code is allowed.
+Two families share the `type` key. The lab's six types have the lab's keys, meaning and defaults (`LAB`); every model of
+Gonio is available with its own parameters and defaults, as `gonio-conductor`, and without the prefix unless the lab
+uses that name. New models need no change here, nor do materials that are registered later, or classes in a Python file
+in the scene's folder ("ward.py:Ward"), which are executed only if code is allowed.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[flo
 
 @dataclass(frozen=True)
 class LabType:
-    """How a type of the lab's format maps onto a model.
+    """The mapping of a type of the lab's format to a model.
 
     renamed   the lab's key -> the parameter it sets, value unchanged
     defaults  parameters whose default in the lab differs from the model's
-    required  keys that the lab insists on
-    ignored   keys that are accepted without effect
+    required  keys that the lab requires
+    ignored   keys that are accepted but have no effect
     """
 
     model: str
@@ -85,10 +85,10 @@ class LabType:
 _LAB_MICROFACETS = {"ndf": "beckmann", "masking": "smith-separable", "fresnel": "schlick"}
 LAB = {
     "matte": LabType("lambert", "Ideal diffuse reflection.", defaults={"albedo": 0.5}),
-    "mirror": LabType("mirror", "Ideal mirror; it reflects 1 whatever `albedo` says.", ignored=("albedo",)),
+    "mirror": LabType("mirror", "Ideal mirror; its reflectance is 1, regardless of `albedo`.", ignored=("albedo",)),
     "phong": LabType("phong", "kd cos_i + ks (v.r)^p, as the lab sheet's eq. 1.", required=("p",)),
     "oren-nayar": LabType(
-        "oren-nayar", "Oren-Nayar; `roughness` is sigma as it stands.", {"roughness": "sigma"}, required=("roughness",)
+        "oren-nayar", "Oren-Nayar; `roughness` is sigma itself.", {"roughness": "sigma"}, required=("roughness",)
     ),
     "conductor": LabType(
         "conductor",
@@ -116,7 +116,7 @@ class Argument(NamedTuple):
 
 
 class MaterialPart(Part):
-    """What all materials share; the subclasses are made by `_declare`."""
+    """The base of all materials; `_declare` creates the subclasses."""
 
     type: str
     normalmap: NormalMap | None = None
@@ -124,25 +124,25 @@ class MaterialPart(Part):
     bump: BumpMap | None = None
     """Heights from an image."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """Whether both sides reflect alike; by default all materials do that let no light through."""
+    """Whether both sides reflect alike; by default, true for all materials that transmit no light."""
 
-    _given: bool = PrivateAttr(False)  # by a program: its files lie where it says
-    _source: str = PrivateAttr("")  # the document that it is a material of
-    _notices: tuple[str, ...] = PrivateAttr(())  # what that has and it does not
+    _given: bool = PrivateAttr(False)  # made by a program: paths of files are used unchanged
+    _source: str = PrivateAttr("")  # the document that contains the material
+    _notices: tuple[str, ...] = PrivateAttr(())  # what could not be converted from that document
     model: ClassVar[Model]
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
-    dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
+    dials: ClassVar[dict[str, str]]  # artist's key -> the parameter alpha whose square root it is
     lab: ClassVar[LabType | None]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its type's name: the classes are made, and no module holds them."""
+        """Pickle by the type's name, since the classes are created at run time and belong to no module."""
         return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
 
     def get(self, key: str) -> Value | None:
         return getattr(self, _attribute(key))
 
     def arguments(self) -> dict[str, Argument]:
-        """Parameter name -> value, for all that the file gives and all that the lab fixes."""
+        """Parameter name -> value, for all values that the file gives or the lab fixes."""
         arguments: dict[str, Argument] = {}
         if self.lab:
             arguments.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
@@ -160,8 +160,8 @@ class MaterialPart(Part):
         return preset
 
     def code(self) -> list[Path]:
-        """The Python files of the user's that it runs: its own, those of a distribution, a masking term, ..., and what
-        these import from their folders."""
+        """The user's Python files that it runs: its own, those of a distribution, a masking term, ..., and the modules
+        that these import from their folders."""
         texts = [inspect.getsourcefile(self.model) or ""] if outside.is_outside(self.model) else []
         for name, (value, _, _) in self.arguments().items():
             parameter = self.model.parameters()[name]
@@ -171,17 +171,18 @@ class MaterialPart(Part):
         return [file for text in texts for file in outside.with_imports(Path(text))]
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
-        """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
+        """The path of a file parameter. A scene's files must lie in its folder, unless files outside are allowed."""
         path, item = parted(file)
         if not self._given and locate is not None and path != SAMPLE:
             path = str(locate(path, pointer))
         return f"{path}:{item}" if item else path
 
     def instance(self, locate: Locate | None = None, where: str = "") -> BSDF:
-        """The model with this material's values; a textured parameter keeps its default.
+        """The model with this material's values; a textured parameter has its default.
 
-        locate, where  what finds a file of the scene, by its name and a JSON pointer; that of this material
-        Raises InputError where the model refuses a combination (a two-sided glass).
+        locate  function that returns the path of a file, given its name in the scene and a JSON pointer
+        where   JSON pointer of this material
+        Raises InputError for a combination that the model rejects (a two-sided glass).
         """
         parameters = self.model.parameters()
         values: dict[str, Any] = {}
@@ -199,7 +200,7 @@ class MaterialPart(Part):
             if parameter.required and name not in values:
                 values[name] = min(max(0.5, parameter.low), parameter.high)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", GonioWarning)  # `reader` has its own, with their place in the file
+            warnings.simplefilter("ignore", GonioWarning)  # `reader` warns itself, with the location in the file
             return self.model(**values)
 
     @classmethod
@@ -225,7 +226,7 @@ class MaterialPart(Part):
             if needed and not given:
                 raise invalid(f"key '{needed[0]}' is missing", f"give one of {', '.join(keys)}")
         if self.normalmap is not None and self.bump is not None:
-            raise invalid("both 'normalmap' and 'bump' are given", "both say where the normal leans; keep one", "bump")
+            raise invalid("both 'normalmap' and 'bump' are given", "both perturb the normal; keep one", "bump")
         self._check_preset()
         return self
 
@@ -244,7 +245,7 @@ class MaterialPart(Part):
 
 
 def _attribute(key: str) -> str:
-    # A prefix keeps a model's parameter from hiding a method of pydantic's (`copy`, `json`) or of ours.
+    # The prefix prevents a parameter from hiding a method of pydantic (`copy`, `json`) or of this class.
     return f"value_{key}"
 
 
@@ -260,7 +261,7 @@ _KINDS: dict[str, Any] = {
 
 
 def numbers_in(value: object) -> tuple[float, ...]:
-    """The plain numbers of a value: itself, a colour's channels, a pair's widths."""
+    """The plain numbers of a value: the value itself, the channels of a color, or the items of a pair."""
     if isinstance(value, (list, tuple)):
         return tuple(number for item in value for number in numbers_in(item))
     if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -288,7 +289,7 @@ def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
 
 
 def _chosen(parameter: ChoiceParameter, key: str) -> Callable[[object, ValidationInfo], str]:
-    """What takes a name, also of a member that was registered since, or FILE.py:CLASS, where code is allowed."""
+    """A validator of names, including members that were registered later, and FILE.py:CLASS if code is allowed."""
 
     def check(value: object, info: ValidationInfo) -> str:
         if isinstance(value, str) and parameter.family is not None and outside.names_code(value):
@@ -334,7 +335,7 @@ def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tup
         of_kind = Index if isinstance(parameter, IndexParameter) else _KINDS[parameter.kind]
         kind = Annotated[of_kind, AfterValidator(_in_range(parameter, key))]
     doc = doc or f"{parameter.doc} ({parameter.range})"
-    # JSON Schema's minimum and maximum hold for numbers only, so they do no harm beside lists and textures.
+    # JSON Schema applies minimum and maximum to numbers only, so they do not affect lists and textures.
     limits = {"minimum": parameter.low, "maximum": math.inf if parameter.soft_high else parameter.high}
     extra: dict[str, Any] = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
     if required:
@@ -358,10 +359,10 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
             dial = name.replace("alpha", "roughness")
             if parameter.kind == "alpha" and dial not in parameters:
                 dials[dial] = name
-                docs[dial] = f"The artist's dial in place of {name}: {name} = {dial}^2. Giving both is an error."
+                docs[dial] = f"The artist's parameter in place of {name}: {name} = {dial}^2. Giving both is an error."
     fields: dict[str, Any] = {"type": (Literal[names], Field(description=lab.doc if lab else _summary(model)))}
     for key, parameter in declared.items():
-        # A lab key that has a second spelling is checked by `_one_spelling`, which knows both.
+        # `_one_spelling` checks the keys of the lab that have a second spelling.
         required = key in lab.required and key not in lab.renamed if lab else parameter.required
         fields[_attribute(key)] = _field(parameter, key, required, docs.get(key, ""))
     for dial, name in dials.items():
@@ -373,7 +374,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     doc = lab.doc if lab else _summary(model)
-    # pydantic would look for the source of a class that has none, in every module that is loaded
+    # otherwise pydantic would search all loaded modules for the source of this class, which has none
     made = {"use_attribute_docstrings": False}
     cls = create_model(title, __base__=MaterialPart, __doc__=doc, __cls_kwargs__=made, **fields)
     cls.model, cls.declared, cls.dials, cls.lab = model, declared, dials, lab
@@ -391,7 +392,7 @@ def _spellings(name: str) -> tuple[str, ...]:
 
 
 class _Declared(Mapping[str, type[MaterialPart]]):
-    """The class of each type, by its names in a scene. One is made when it is asked for: making all takes a second."""
+    """The class of each type by its names in a scene, created on first access: creating all of them takes a second."""
 
     def __init__(self) -> None:
         known = models()
@@ -418,7 +419,7 @@ class _Declared(Mapping[str, type[MaterialPart]]):
 
 
 BY_TYPE = _Declared()
-OWN = "FILE.py:CLASS"  # tag of materials; those of another program's files have their format's
+OWN = "FILE.py:CLASS"  # tag of Gonio's materials; those in other programs' files have the name of the format
 
 
 @functools.cache
@@ -429,7 +430,7 @@ def _own_part(name: str, model: Model) -> type[MaterialPart]:
 
 
 def part_of(name: str) -> type[MaterialPart] | None:
-    """The part that describes materials of a type, also of one that was registered since; None where there is none."""
+    """The class for materials of a type, including types that were registered later; None for an unknown type."""
     if name in BY_TYPE:
         return BY_TYPE[name]
     if library.knows(name):
@@ -439,7 +440,7 @@ def part_of(name: str) -> type[MaterialPart] | None:
 
 
 def described(material: BSDF) -> MaterialPart:
-    """A material that a program holds, as a scene has it."""
+    """The scene's representation of a material object."""
     cls: Any = type(material)
     name = f"gonio-{material.name}"
     part = BY_TYPE[name] if name in BY_TYPE and BY_TYPE[name].model is cls else _own_part(material.name, cls)
@@ -458,27 +459,27 @@ def described(material: BSDF) -> MaterialPart:
 
 
 def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -> MaterialPart:
-    """What `MaterialPart.__reduce__` has taken apart."""
+    """Restore a pickled `MaterialPart`."""
     known, own = BY_TYPE.get(name), cast(Any, model)
     cls: Any = known if known is not None and known.model is model else _own_part(name, own)
     return cls.model_construct(given, **values)
 
 
 class DocumentPart(Part):
-    """A material of another program's file, as Gonio's own materials with its numbers and pictures."""
+    """A material in another program's file, converted to Gonio's own materials with its numbers and textures."""
 
     type: Literal[tuple(Document.family.all())]  # type: ignore[valid-type]
     """The file's format."""
     file: str = Field(min_length=1)
-    """The file, beside the scene; its own pictures lie in its folder."""
+    """The file, in the scene's folder; its textures must lie in its own folder."""
     material: Annotated[str, Strict()] | None = None
-    """Which of its materials, by name, or by number where it has no name of its own; not needed for the only one."""
+    """The material in the file, by name, or by number if it has no name; not needed if there is only one."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """As of any material."""
+    """As for any material."""
 
 
 def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> MaterialPart:
-    """The material that it names."""
+    """The material that a `DocumentPart` refers to."""
     if isinstance(part, MaterialPart):
         return part
     context = info.context or {}
@@ -501,7 +502,7 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
 
 
 def _relative_to_scene(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
-    """The notation with files that start from the scene's folder."""
+    """The notation with paths of files relative to the scene's folder."""
     relative: dict[str, object] = {}
     for key, value in notation.items():
         if key == "file":
@@ -519,7 +520,7 @@ def _tag(value: object) -> str | None:
 
 
 def _own(value: object, info: ValidationInfo) -> MaterialPart:
-    """A material by its type: Gonio's, named, registered, or of a file, which runs where the user allowed it."""
+    """A material by its type: Gonio's, named, registered, or from a Python file, where code is allowed."""
     if isinstance(value, MaterialPart):
         return value
     if not isinstance(value, dict):
@@ -553,7 +554,7 @@ def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> 
     return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
 
 
-# What stands for any of Gonio's materials in a generated schema: those are many, and each may hold others.
+# Placeholder for any of Gonio's materials in a generated schema, since there are many, and they can be nested.
 PLACEHOLDER = {"$comment": "any material"}
 
 if TYPE_CHECKING:
@@ -567,7 +568,7 @@ else:
 
 
 def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
-    """The schema of any material, from references to those of Gonio's."""
+    """The schema of any material, given references to those of Gonio's."""
     pattern = {"type": {"type": "string", "pattern": _CODE}}
     own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
     return {"oneOf": [*references, own]}

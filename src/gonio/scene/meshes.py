@@ -1,4 +1,4 @@
-"""Triangles: the shapes that Mitsuba lacks, and files of them.
+"""Triangle meshes: shapes that Mitsuba lacks, and mesh files.
 
 Disk, cone and cylinder are tessellated with exact normals and texture coordinates at the vertices. A full turn has
 `SEGMENTS` = 1024 segments: points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface, and
@@ -30,7 +30,7 @@ MAX_BYTES = 2**30  # of a mesh file
 
 @dataclass(frozen=True)
 class Triangles:
-    """A mesh: vertices (N, 3), faces (M, 3) of vertex numbers, and per vertex normals (N, 3) and uv (N, 2) or None."""
+    """A mesh: vertices (N, 3), faces (M, 3) of vertex indices; normals (N, 3) and uv (N, 2) per vertex, or None."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -38,7 +38,7 @@ class Triangles:
     uv: np.ndarray | None = None
 
     def transformed(self, matrix: np.ndarray) -> Triangles:
-        """Placed by a 4x4 matrix. A mirroring one reverses the faces, so that normals stay outward."""
+        """The mesh transformed by a 4x4 matrix. A reflection reverses the faces, so that normals stay outward."""
         linear = matrix[:3, :3]
         normals = None
         if self.normals is not None:
@@ -51,7 +51,7 @@ class Triangles:
         )
 
     def to_mitsuba(self, mi: ModuleType, name: str, bsdf: BSDFPlugin, emitter: Emitter | None = None) -> Shape:
-        """A `mi.Mesh` with that BSDF and, where given, that emitter."""
+        """A `mi.Mesh` with that BSDF and, if given, that emitter."""
         properties = mi.Properties()
         properties["bsdf"] = bsdf
         if emitter is not None:
@@ -104,8 +104,8 @@ def cone(radius: float, height: float, phi_max: float) -> Triangles:
 def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tuple[float, float]) -> Triangles:
     """The band between two rings (radius, z, v) about z. `slope` is the normal's part along the radius and along z.
 
-    A ring of radius 0 gets one vertex a segment, at the segment's middle angle: there alone u is undefined, and so
-    each triangle's dp/du stays the direction of its chord.
+    A ring of radius 0, where u is undefined, gets one vertex per segment, at the middle angle of the segment, so that
+    dp/du of each triangle has the direction of its chord.
     """
     count = max(3, math.ceil(SEGMENTS * phi_max / (2 * math.pi)))
     edges = np.linspace(0.0, 1.0, count + 1)
@@ -160,15 +160,15 @@ def cube() -> Triangles:
 
 
 def is_ply(path: Path) -> bool:
-    """Whether a file begins as a .ply does, whatever its name."""
+    """Whether a file begins like a .ply, regardless of its name."""
     with open(path, "rb") as file:
         return re.fullmatch(rb"ply[\r\n]", file.read(4)) is not None
 
 
 def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
-    """The triangles of an .obj or .ply file. Raises InputError, with the line of the file where that helps.
+    """The triangles of an .obj or .ply file. Raises InputError, with the line of the file if it has lines.
 
-    kind  its suffix, where the name has another
+    kind  suffix to use instead of the name's
     """
     readers = {".obj": read_obj, ".ply": read_ply}
     kind = kind or path.suffix.lower()
@@ -188,7 +188,7 @@ def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
 
 
 def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
-    """The mesh, once every number in it is usable."""
+    """The mesh without degenerate faces, its normals normalized. Raises InputError for unusable numbers or indices."""
     if len(mesh.faces) == 0:
         raise InputError(f"'{path.name}' has no faces", where, "export it with triangles or polygons")
     for name, values in (("vertex", mesh.vertices), ("normal", mesh.normals), ("texture coordinate", mesh.uv)):
@@ -223,7 +223,7 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """Wavefront OBJ: v, vt, vn, f; polygons become fans, negative numbers count from the end, the rest is skipped."""
+    """Wavefront OBJ: v, vt, vn, f. Polygons become fans, negative indices count from the end; ignores other lines."""
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}
@@ -270,7 +270,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
                 corners += [polygon[0], second, third]
     if not corners:
         raise InputError(f"'{path.name}' has no faces", where, "is it an OBJ file? expected lines like: f 1 2 3")
-    # A vertex of ours is one combination of position, uv and normal.
+    # Each distinct combination of position, uv and normal is one vertex.
     combined, faces = np.unique(np.array(corners), axis=0, return_inverse=True)
     arrays = {key: np.array(rows, dtype=float).reshape(-1, needed[key]) for key, rows in columns.items()}
     has_uv, has_normals = (combined[:, 1] >= 0).all(), (combined[:, 2] >= 0).all()
@@ -316,7 +316,7 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
             else:
                 tables[name], body = _ply_binary(body, count, properties, order)
         except (ValueError, IndexError, OverflowError):
-            refuse(f"the file ends within, or garbles, its {count} '{name}' entries")
+            refuse(f"the file is truncated or damaged within its {count} '{name}' entries")
         if "vertex" in tables and "face" in tables:
             break
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if isinstance(column, np.ndarray)}
@@ -338,7 +338,7 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
     try:
         triangles = np.array(faces, dtype=np.int64).reshape(-1, 3)
     except OverflowError:
-        refuse("a face names a vertex of a number that no file has")
+        refuse("a face has a vertex index that is out of range")
     return Triangles(
         positions,
         triangles,
@@ -432,7 +432,7 @@ def _ply_binary(body: memoryview, count: int, properties: PlyProperties, order: 
 def _ply_triangles(
     body: memoryview, count: int, properties: PlyProperties, order: str
 ) -> tuple[PlyTable, memoryview] | None:
-    """The usual case, one list and all of it triangles, without a loop; None where it is not that."""
+    """The usual case, a single list with only triangles, without a loop; None in other cases."""
     if len(properties) != 1:
         return None
     _, counter, item, name = properties[0]

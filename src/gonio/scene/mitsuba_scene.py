@@ -1,4 +1,4 @@
-"""A Mitsuba scene's file, read with the same care as the lab's, and the BSDFs that such files hold."""
+"""Loading Mitsuba XML files, scenes and single BSDFs, with the same checks as for the lab's scenes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read(
 ) -> SceneText:
     """The text of a Mitsuba XML file; see `mitsuba_xml.read`.
 
-    parameters  values of its `$parameters`: texts, numbers or lists of numbers
+    parameters  values of its `$parameters`: strings, numbers or lists of numbers
     """
     values = {key: _as_xml(value) for key, value in parameters.items()}
     return mitsuba_xml.read(file, values, allow_outside, allow_code)
@@ -38,7 +38,7 @@ def load(
 ) -> Scene:
     """The scene of a Mitsuba XML file that was `read`.
 
-    size            of the film in pixels; None: the scene's own
+    size            size of the film in pixels; None keeps that of the scene
     own_integrator  whether the scene must name an integrator
     Raises InputError.
     """
@@ -65,10 +65,10 @@ def load(
 
 @contextlib.contextmanager
 def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
-    """Inside, errors that a scene's file causes while it is rendered are InputErrors with Mitsuba's text.
+    """Turn errors that a scene causes during rendering into InputErrors with Mitsuba's text.
 
     own_integrator  the scene is rendered by its own integrator, so that all errors but those of Gonio's materials are
-                    Mitsuba's; else only what plugins say of themselves is, "[Texture] eval_1_grad(): not implemented!"
+                    Mitsuba's; otherwise only those of plugins are, "[Texture] eval_1_grad(): not implemented!"
     """
     try:
         yield
@@ -86,7 +86,7 @@ def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
 
 
 def load_bsdf(path: Path) -> MitsubaBSDF:
-    """The BSDF of a Mitsuba XML file: its root, or the first in a scene. It may read what lies in the file's folder.
+    """The BSDF of a Mitsuba XML file: its root, or the first one in a scene. It may read files in the same folder.
 
     Raises InputError where there is none.
     """
@@ -107,7 +107,7 @@ def load_bsdf(path: Path) -> MitsubaBSDF:
 
 
 def within(description: PluginDict, file: Path) -> PluginDict:
-    """The description that a file holds, with absolute paths of the files that it names, which lie in its folder."""
+    """The description in a file, with absolute paths of the files that it names; these must lie in its folder."""
 
     def locate(name: str) -> str:
         return mitsuba_xml.readable(name, file.parent / name, file.parent, str(file))
@@ -125,7 +125,7 @@ def within(description: PluginDict, file: Path) -> PluginDict:
 
 @contextlib.contextmanager
 def _without_options() -> Iterator[None]:
-    """In here an error does not point to an option that only scenes have."""
+    """Remove the hint at an option of scenes from errors inside the `with` block."""
     try:
         yield
     except InputError as error:
@@ -133,10 +133,10 @@ def _without_options() -> Iterator[None]:
 
 
 def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
-    """What Mitsuba makes of a scene's text; its errors are raised as they come."""
+    """The Mitsuba object that a scene's text describes. Raises Mitsuba's own errors."""
     allowed = [folder.resolve()] if text.runs_code else []
-    # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance;
-    # and in parallel a file that cannot be read ends the process: the error has a thread of its own
+    # Sequentially and without merging: otherwise the order of shapes, and with it the last bit, would be random.
+    # In parallel, an unreadable file would abort the process, since the error is raised in another thread.
     with file_threads(), plugin_search.searching(mi, *allowed):
         return mi.load_string(text.text, parallel=False, optimize=False)
 
@@ -146,7 +146,7 @@ def _as_xml(value: object) -> str:
 
 
 def _mitsuba_text(error: Exception, scene: SceneText) -> str:
-    """Mitsuba's message without places in its C++ source and without a Python traceback of ours."""
+    """Mitsuba's message without locations in its C++ source and without a traceback of Gonio."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
     text = lines[0] if lines else type(error).__name__
@@ -159,6 +159,6 @@ def _mitsuba_text(error: Exception, scene: SceneText) -> str:
 
 
 def sources(text: SceneText, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
-    """What tells the text of a scene and all that it includes; and the files that it names, by their names in it."""
+    """A function that returns the text of a scene with all includes, and its files by their names in the scene."""
     given = repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))
     return lambda: "\n".join([given, *text.sources]), text.files

@@ -1,13 +1,13 @@
-"""A Mitsuba scene's XML, written anew as one text in which no name is left that Mitsuba would have to look up.
+"""Rewriting the XML of a Mitsuba scene as one text without names that Mitsuba would have to look up.
 
-Includes, search paths and parameters are Mitsuba's own language, and mean here what they mean there:
+Includes, search paths and parameters have the same meaning as in Mitsuba:
 
-    <default name="spp" value="16"/>       a parameter's value where none is given; "$spp" stands for it
-    <include filename="materials.xml"/>    another file, in this place
-    <path value="textures"/>               a folder in which the files of plugins are searched for first
+    <default name="spp" value="16"/>       default of a parameter, which "$spp" refers to
+    <include filename="materials.xml"/>    inserts another file here
+    <path value="textures"/>               a folder in which files of plugins are searched first
 
-They are carried out here, because Mitsuba would search the current folder as well. In the text that it is given, each
-file is an absolute path to a file that may be read, and each plugin one that may be loaded.
+They are resolved here, because Mitsuba would also search the current folder. In the rewritten text, each file is an
+absolute path to a file that may be read, and each plugin is one that may be loaded.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from ..measure import SAMPLE, parted
 from ..pictures import formats, scene_files
 from . import files, meshes
 
-MAX_BYTES = 64 << 20  # of all files together, and of what parameters add to them
+MAX_BYTES = 64 << 20  # of all files together, and of the text that parameters add
 MAX_ELEMENTS = 1_000_000
 MAX_DEPTH = 64
-MAX_INCLUDES = 15  # inside each other, as Mitsuba has it
-MAX_PARAMETER = 100  # characters of a parameter's name: as many are compared behind each $
+MAX_INCLUDES = 15  # nested, as in Mitsuba
+MAX_PARAMETER = 100  # characters of a parameter's name; as many are compared after each $
 MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
 
-# elements that stand for an object, which a plugin makes
+# elements that describe an object, which a plugin creates
 OBJECTS = {"scene", "sensor", "film", "emitter", "sampler", "shape", "texture", "volume", "medium", "bsdf"}
 OBJECTS |= {"integrator", "phase", "rfilter"}
 
-# What an attribute may not hold as it is. Mitsuba takes "$" for a parameter where no backslash stands before it.
+# Characters to escape in attributes. Mitsuba reads "$" as a parameter unless a backslash precedes it.
 _ESCAPES = str.maketrans({"$": "\\$"} | {character: f"&#{ord(character)};" for character in '&<>"\t\n\r'})
 
 
 class SceneText(NamedTuple):
-    """A scene as Mitsuba is given it.
+    """A scene in the form that is passed to Mitsuba.
 
-    text     XML of one element a line
-    origins  file and line from which each line of it came
-    files    the files that are read, by their names in the scene; included ones too
-    sources  the texts of its XML files
-    runs_code  whether it loads native plugins of its folder
+    text       XML with one element per line
+    origins    file and line that each line of `text` comes from
+    files      the files that are read, by their names in the scene, including included ones
+    sources    the texts of its XML files
+    runs_code  whether it loads native plugins from its folder
     """
 
     text: str
@@ -60,7 +60,7 @@ class SceneText(NamedTuple):
     runs_code: bool
 
     def located(self, message: str) -> str:
-        """An error's message of Mitsuba's, with the user's files and lines in place of those of the text."""
+        """A message of Mitsuba, with the user's files and lines in place of those of `text`."""
 
         def origin(match: re.Match[str]) -> str:
             file, line = self.origins[min(int(match[1]), len(self.origins)) - 1]
@@ -70,11 +70,11 @@ class SceneText(NamedTuple):
 
 
 def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False, allow_code: bool = False) -> SceneText:
-    """The text of a scene, or of an object alone.
+    """The text of a scene or of a single object.
 
     parameters     values of its `$parameters`
-    allow_outside  let it name files outside its folder
-    allow_code     let it load native plugins from the folder `plugins` beside it
+    allow_outside  allow it to name files outside its folder
+    allow_code     allow it to load native plugins from the folder `plugins` beside it
     Raises InputError, with file and line, for XML that is not well-formed, for a file that must not be read or is
     missing, for a plugin that must not be loaded, and for parameters that the scene does not have.
     """
@@ -85,22 +85,22 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
     unused = [name for name in parameters if name not in reader.used]
     if unused:
         known = [name for name in reader.values if name not in unused]
-        hint = did_you_mean(unused[0], known[:200]) if known else "parameters stand as $name in its values"
+        hint = did_you_mean(unused[0], known[:200]) if known else "parameters appear as $name in its values"
         raise InputError(f"the scene has no parameter '{unused[0]}'", str(file), hint)
     return SceneText("\n".join(reader.lines) + "\n", reader.origins, reader.files, reader.sources, reader.runs_code)
 
 
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
-    """The path of a file of a scene, as Mitsuba takes it.
+    """The absolute path of a file of a scene, for Mitsuba.
 
-    name  as errors call it
-    Raises InputError for a file that must not be opened: one outside the scene's folder, or one that contradicts
-    itself, by which a library in C++ could be corrupted.
+    name  the file's name in errors
+    Raises InputError for a file that must not be opened: one outside the scene's folder, or an inconsistent one that
+    could corrupt the memory of a C++ library.
     """
     files.checked(path, name, folder, location, allow_outside)
     try:
         scene_files.check_file(path)
-        if path.suffix.lower() == ".ply" or meshes.is_ply(path):  # Mitsuba's reader believes counts and indices
+        if path.suffix.lower() == ".ply" or meshes.is_ply(path):  # Mitsuba's reader does not check counts and indices
             meshes.read_mesh(path, location, ".ply")
     except formats.Unreadable as error:
         raise InputError(f"'{name}' cannot be used: {error}", location, "save it again") from None
@@ -112,11 +112,11 @@ def readable(name: str, path: Path, folder: Path, location: str, allow_outside: 
 def property_value(
     kind: str, name: str, value: str, location: str, locate: Callable[[str], str], allow_code: bool = False
 ) -> str:
-    """A plugin's property that is a text; of one that names a file, with the file's path.
+    """The value of a string property of a plugin; if it names a file, with the path of that file.
 
     kind    type of the plugin
-    locate  the path of a file that may be read, by its name
-    Raises InputError for code, and where Mitsuba would look for a file of that name in other folders.
+    locate  returns the path of a file that may be read, given its name
+    Raises InputError for code, and if Mitsuba would search other folders for a file of that name.
     """
     if outside.names_code(value) and not allow_code:
         what = f"'{value}' is code, which a scene alone does not run"
@@ -135,10 +135,11 @@ def property_value(
 
 
 class _Reader:
-    """What is common to all files of a scene.
+    """The state that all files of a scene share.
 
-    values   of parameters, by name
-    folders  in which plugins' files are searched for: those of the scene's own <path>, then its folder, then Mitsuba's
+    values   values of parameters, by name
+    folders  folders in which files of plugins are searched: those of <path> in the scene's own file, then the scene's
+             folder, then Mitsuba's
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
@@ -160,7 +161,7 @@ class _Reader:
     # ------------------------------------------------------------------ files
 
     def parse(self, file: Path, folders: list[Path], included: Mapping[str, str] | None = None, level: int = 0) -> None:
-        """Write down what a file holds. `folders` are those in which it searches; `included` is the element that
+        """Append the content of a file. `folders` are those in which it searches; `included` is the element that
         includes it."""
         try:
             data = file.read_bytes()
@@ -176,12 +177,12 @@ class _Reader:
         except (expat.ExpatError, ValueError, LookupError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"not well-formed XML: {error}", str(file), "mend it there") from None
+            raise InputError(f"not well-formed XML: {error}", str(file), "correct it there") from None
         if included is None:
             self.folders = folders
 
     def place_files(self) -> None:
-        """Put the paths of plugins' files into their lines: which folders are searched is known at the end only."""
+        """Insert the paths of plugins' files into their lines; the folders to search are known only at the end."""
         for line, kind, attributes, location in self.texts:
             locate = functools.partial(self.located, folders=self.folders, location=location)
             name, value = attributes.get("name", ""), attributes["value"]
@@ -189,12 +190,11 @@ class _Reader:
             self.lines[line] = _tag("string", {**attributes, "value": value})
 
     def check_references(self) -> None:
-        """Raise InputError where references go round in a circle, or lead on from one object to the next too often:
-        Mitsuba follows them by recursion."""
+        """Raise InputError for circular or too long chains of references, since Mitsuba follows them by recursion."""
         depths = dict.fromkeys({*self.references, *(n for names in self.references.values() for n in names)}, 0)
         waiting = Counter(name for names in self.references.values() for name in names)
         ready = [name for name in depths if not waiting[name]]
-        for name in ready:  # it grows: objects whose references have all been followed
+        for name in ready:  # `ready` grows by objects whose references have all been followed
             for inner in self.references.get(name, ()):
                 depths[inner] = max(depths[inner], depths[name] + 1)
                 waiting[inner] -= 1
@@ -202,13 +202,13 @@ class _Reader:
                     ready.append(inner)
         deepest = max(depths.values(), default=0)
         if deepest > MAX_DEPTH or len(ready) < len(depths):
-            what = f"references lead on from one object to the next {deepest} times, at most {MAX_DEPTH} are possible"
+            what = f"references are chained {deepest} times, at most {MAX_DEPTH} are possible"
             if len(ready) < len(depths):
                 what = f"the object '{min(set(depths) - set(ready))}' is part of itself, or refers to one that is"
             raise InputError(what, str(self.file), "leave some references out")
 
     def located(self, name: str, folders: list[Path], location: str) -> str:
-        """The absolute path of a file that the scene names, once it is sure that it may be read."""
+        """The absolute path of a file that the scene names. Raises InputError if it must not be read."""
         try:
             choices = [folder / name for folder in folders]
             path = next((choice for choice in choices if choice.exists()), self.folder / name)
@@ -222,7 +222,7 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with the values of parameters in place of their names: behind each $ the longest name counts."""
+        """A value with parameters replaced by their values; after each $, the longest matching name counts."""
         if "$" not in value:
             return value
         first, *others = re.split(r"(?<!\\)\$", value)
@@ -239,12 +239,14 @@ class _Reader:
             length += len(self.values[name]) + len(rest)
             self.grown += len(self.values[name])
             if length > MAX_VALUE or self.grown > MAX_BYTES:
-                raise InputError(f"parameters such as ${name} make too long a text", location, "write values out")
+                raise InputError(
+                    f"parameters such as ${name} make the text too long", location, "write the values directly"
+                )
             result += [self.values[name], rest]
         return "".join(result)
 
     def add(self, name: str, value: str, location: str) -> None:
-        """A parameter's value, where none is given."""
+        """Set the default of a parameter."""
         if len(name) > MAX_PARAMETER:
             raise InputError(f"a parameter's name of {len(name)} characters", location, f"use {MAX_PARAMETER} or fewer")
         self.values.setdefault(name, value)
@@ -252,20 +254,20 @@ class _Reader:
             self.lengths = sorted({*self.lengths, len(name)}, reverse=True)
 
     def count(self, location: str) -> None:
-        """One more element, or parameter that is replaced."""
+        """Count an element, or a parameter that is replaced. Raises InputError if there are too many."""
         self.elements += 1
         if self.elements > MAX_ELEMENTS:
             raise InputError(f"more than {MAX_ELEMENTS} elements", location, "keep large data in other files")
 
 
 class _File:
-    """What reads one file of a scene, as the parser goes through it."""
+    """The handlers for the elements of one file of a scene, called by the parser."""
 
     def __init__(
         self, scene: _Reader, file: Path, folders: list[Path], included: Mapping[str, str] | None, level: int
     ) -> None:
         self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
-        self.open: list[str] = []  # elements around, "" for those that are carried out here and not written
+        self.open: list[str] = []  # enclosing elements, "" for those that are resolved here and not written
         self.kinds: list[str] = []  # of plugins, of the same elements
         self.ids: list[str] = []  # of the same elements
         self.parser = expat.ParserCreate()
@@ -285,7 +287,9 @@ class _File:
         if len(self.open) >= MAX_DEPTH:
             raise InputError(f"more than {MAX_DEPTH} elements inside each other", self.location)
         if len(self.open) > 1 and not self.open[-1]:
-            raise InputError(f"<{tag}> stands inside an element that holds none", self.location, "mend it there")
+            raise InputError(
+                f"<{tag}> stands inside an element that cannot contain any", self.location, "correct it there"
+            )
         attributes = {name: scene.replaced(value, self.location) for name, value in given.items()}
         written = tag
         if not self.open:
@@ -312,7 +316,7 @@ class _File:
     # ------------------------------------------------------------------ elements
 
     def _write(self, tag: str, attributes: dict[str, str]) -> None:
-        """Write an element down, its plugin and its files checked."""
+        """Append an element after checking its plugin and its files."""
         scene = self.scene
         if "type" in attributes and (tag in OBJECTS or tag == "spectrum"):
             kind = attributes["type"]
@@ -327,7 +331,7 @@ class _File:
         self._line(_tag(tag, attributes))
 
     def _note_reference(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Note to which objects a named one leads: those that it refers to, and those with names inside."""
+        """Record which objects a named one depends on: those that it refers to, and named ones inside it."""
         references, name = self.scene.references, attributes.get("id", "")
         if tag == "alias":
             references.setdefault(attributes.get("as", ""), set()).add(name)
@@ -364,8 +368,8 @@ class _File:
         self.scene.parse(path, folders, attributes, self.level + 1)
 
     def _root(self, tag: str, attributes: dict[str, str]) -> str:
-        """The first element of a file as it is written. Of an included scene only the contents are, "" then; another
-        included object has the name that the <include> gives it."""
+        """The root element as it is written: "" for an included scene, of which only the content is written; any other
+        included object gets the name of its <include>."""
         if tag not in OBJECTS:
             raise InputError(f"the file begins with <{tag}>", self.location, "a <scene> or another object is expected")
         (version,) = self._required(tag, attributes, "version")
@@ -390,11 +394,11 @@ class _File:
 
 
 def _is_old(version: str) -> bool:
-    """Whether Mitsuba takes the names of a file's properties for those that it had before version 2."""
+    """Whether Mitsuba interprets the property names of a file as those from before its version 2."""
     return version.strip().split(".")[0] in ("0", "1")
 
 
 def _tag(tag: str, attributes: Mapping[str, str]) -> str:
-    """An element's beginning, with values as Mitsuba reads them back."""
+    """The start tag of an element, with escaped values."""
     written = [f' {name}="{value.translate(_ESCAPES)}"' for name, value in attributes.items()]
     return f"<{tag}{''.join(written)}>"

@@ -1,8 +1,8 @@
-"""Setting values of a scene by path, as `gonio study --vary shapes.*.material.roughness=.1,.5` does.
+"""Overrides: setting values of a scene by path, as `gonio study --vary shapes.*.material.roughness=0.1,0.5` does.
 
-A path is a JSON pointer ("/scene/shapes/0/material/p") or dotted ("scene.shapes.0.material.p"); the leading `scene` may
-be left out, and `*` stands for every item. The value goes into the raw JSON, so that validation sees it as if it had
-been written in the file.
+A path is a JSON pointer ("/scene/shapes/0/material/p") or dotted ("scene.shapes.0.material.p"); the leading `scene`
+is optional, and `*` matches every item. Values are set in the raw JSON before validation, as if the file contained
+them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .materials import described, part_of
 
 
 def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
-    """Set each path to its value, in place. Raises InputError where a path leads nowhere, or a value is no JSON."""
+    """Set each path to its value, in place. Raises InputError for a wrong path or a value that is not JSON."""
     for path, value in overrides.items():
         _check_text(path, path)
         _set(raw, path, _plain(value, path))
@@ -31,7 +31,7 @@ def _plain(value: object, path: str) -> Json:
             _check_text(str(key), path)
         return {str(key): _plain(item, path) for key, item in value.items()}
     if isinstance(value, BSDF):
-        return described(value)  # type: ignore[return-value]  # validation lets it through as it is
+        return described(value)  # type: ignore[return-value]  # validation accepts it unchanged
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -44,7 +44,7 @@ def _plain(value: object, path: str) -> Json:
 
 
 def _check_text(text: str, path: str) -> None:
-    """Raise InputError for bytes that are no UTF-8, as the command line hands them on: no scene file can hold them."""
+    """Raise InputError for bytes from the command line that are not UTF-8, which no scene file can contain."""
     if encodable(text) != text:
         raise InputError(f"'{text}' is no text", f"path {path}", "write it in UTF-8")
 
@@ -96,7 +96,7 @@ def _keys(holder: Json) -> list[str]:
 
 
 def _below(holder: Json, step: str, path: str, before: list[str], steps: list[str]) -> list[Json]:
-    """The values one step down; with a `*` before, holders without that key are passed over."""
+    """The values one step down; after a `*`, holders without that key are skipped."""
     if step == "*":
         return list(holder.values()) if isinstance(holder, dict) else list(holder) if isinstance(holder, list) else []
     if isinstance(holder, dict):
@@ -104,7 +104,7 @@ def _below(holder: Json, step: str, path: str, before: list[str], steps: list[st
             return [holder[step]]
         if "*" in before:
             return []
-        inner = holder.get("scene")  # its keys may stand first in a dotted path
+        inner = holder.get("scene")  # a dotted path may begin with its keys
         known = [*holder, *(inner if isinstance(inner, dict) else ())]
         raise InputError(f"no key '{step}'", f"path {path}", did_you_mean(step, [str(key) for key in known]))
     if isinstance(holder, list):
@@ -122,7 +122,7 @@ def _index(holder: list[Json], step: str, path: str) -> int:
 
 
 def _that_take(holders: list[Json], key: str) -> list[Json]:
-    """Of several objects, those that have the key; where none has it, those materials that know it."""
+    """The objects that have the key; if none has, the materials that accept it."""
     with_key: list[Json] = []
     with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
     if with_key:

@@ -1,4 +1,4 @@
-"""From a path to a validated scene: read the text, set overrides, validate, find the files it names."""
+"""Reading a scene: parse the file, apply overrides, validate, and locate the files that it names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
 
-MAX_SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
+MAX_SHOWN = 4  # errors reported at once: enough to correct a file in one go, few enough to read
 
 
 def read(
@@ -32,11 +32,11 @@ def read(
 ) -> SceneDescription:
     """A scene from a folder with a scene.json, or from a .json file.
 
-    allow_outside  let textures and meshes lie outside the scene's folder
-    allow_code     let materials be classes in Python files, "ward.py:Ward", which then run
+    allow_outside  allow textures and meshes outside the scene's folder
+    allow_code     allow materials that are classes in Python files, "ward.py:Ward", which are then executed
     overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
-    names_output   whether the picture is written under the name that the scene gives it, which is checked then
-    Raises InputError for everything that is wrong with the file or with what it names.
+    names_output   whether the picture is written under the scene's name for it, which is then checked
+    Raises InputError for any error in the file or in the files that it names.
 
         description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})
     """
@@ -98,12 +98,12 @@ def _check_output(description: SceneDescription) -> None:
 
 
 def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
-    """What to warn of, as (pointer from the material on, text). Raises InputError for one that cannot be."""
+    """Warnings about a material, as (pointer relative to the material, text). Raises InputError for an invalid one."""
     warnings = [("", f"{material._source}: {notice}") for notice in material._notices]
     for name, (value, key, _) in material.arguments().items():
         parameter = material.model.parameters()[name]
         if parameter.numeric and any(number > parameter.high for number in numbers_in(value)):
-            told = f"{name} over {parameter.high:g}: the material gives back more light than it receives"
+            told = f"{name} over {parameter.high:g}: the material reflects more light than it receives"
             warnings.append((f"/{key}", told))
     for key in material.lab.ignored if material.lab else ():
         if material.get(key) is not None:
@@ -134,17 +134,20 @@ def parts(part: Part) -> Iterator[tuple[str, Part]]:
         todo += reversed(below)
 
 
-_LEAVES = frozenset((float, int, str, bool, type(None)))  # most of a large scene
+_LEAVES = frozenset((float, int, str, bool, type(None)))  # the types of most values in a large scene
 
 
 @functools.cache
 def _key(part: type[Part], field: str) -> str:
-    """The key of a field as a step of a pointer."""
+    """The key of a field as a JSON pointer."""
     return pointer(part.model_fields[field].alias or field)
 
 
 def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
-    """What writes the scene as text, overrides and all, and the files it names: textures, meshes, Python that runs."""
+    """A function that returns the scene as text, including overrides, and the files that the scene uses.
+
+    The files are textures, meshes, documents and Python files, by their names in the scene.
+    """
     named: dict[str, Path] = {}
     folder = description.folder.resolve()
     for where, part in parts(description):
@@ -165,11 +168,11 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
     return text, named
 
 
-# ---------------------------------------------------------------------- pydantic's errors in our words
+# ---------------------------------------------------------------------- pydantic's errors as InputErrors
 
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
-    """The first error with place, expectation and hint; the next few in a line each."""
+    """The first error with location, expectation and hint, and the next few with one line each."""
     problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
         where, what, hint = _one(detail, raw)
@@ -183,7 +186,7 @@ def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
 
 
 def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
-    """Pointer, what is wrong, and a hint, of one of pydantic's errors."""
+    """Pointer, problem and hint for one of pydantic's errors."""
     kind, context = detail["type"], detail.get("ctx", {})
     steps, value = _place(detail["loc"], raw, keep_last=kind == "missing")
     got = kind_of(value)
@@ -241,11 +244,11 @@ def _unquote(value: Json) -> str:
 
 
 def _place(location: tuple[str | int, ...], raw: Json, keep_last: bool) -> tuple[list[str | int], Json]:
-    """The steps into the file and the value there. Pydantic's location also names the union's tags: dropped."""
+    """The steps into the file and the value there, without the tags of unions that pydantic's location contains."""
     steps: list[str | int] = []
     value = raw
     for index, step in enumerate(location):
-        # A tag is the object's own `type`, and no key is called like a type.
+        # A tag equals the object's own `type`, and no key has the name of a type.
         in_object = isinstance(value, dict) and step in value and step != value.get("type")
         in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
         if in_object or in_list:

@@ -1,7 +1,7 @@
-"""The scene format: the lab's JSON, key by key, and Gonio's additions to it.
+"""The scene format: the keys of the lab's JSON and Gonio's additions.
 
-The classes here are the format: what they accept is what `gonio schema` exports, and their docstrings are its manual.
-Keys are spelled as in the file through their aliases.
+These classes define the format: `gonio schema` exports what they accept, with their docstrings as descriptions. Aliases
+give the keys their spelling in the file.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, V
 if TYPE_CHECKING:
     from ..transport import integrators as program
 
-MAX_SAMPLES = 2**30  # samples per pixel; a picture of one pixel could still be counted in 32 bits
+MAX_SAMPLES = 2**30  # samples per pixel; those of one pixel can still be counted in 32 bits
 
 
 class Output(Part):
-    """Where the picture goes."""
+    """The file that the picture is written to."""
 
     filename: str = Field(min_length=1)
-    """.hdr, .png, .exr or .npz; the top row comes first. With another output, `-o FILE`, any name will do."""
+    """.hdr, .png, .exr or .npz; the top row comes first. With `-o FILE`, any name is accepted."""
 
     @model_validator(mode="after")
     def _known_format(self, info: ValidationInfo) -> Output:
@@ -45,18 +45,18 @@ class Output(Part):
 
 
 class Sampler(Part):
-    """How many samples a pixel gets, and from which point set. Give xSamples and ySamples, or samples."""
+    """Number of samples per pixel, and their point set. Give xSamples and ySamples, or samples."""
 
     type: str = "independent"
-    """The lab's "independent" states no preference and reads as "default"; other names force a sampler."""
+    """The lab's "independent" states no preference and means "default"; other names force a sampler."""
     x_samples: Whole | None = Field(None, alias="xSamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     y_samples: Whole | None = Field(None, alias="ySamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     samples: Whole | None = Field(None, ge=1, le=MAX_SAMPLES)
-    """Samples per pixel, in place of the other two."""
+    """Samples per pixel, in place of xSamples and ySamples."""
     seed: Whole | None = Field(None, ge=0, lt=2**32)
-    """The same seed gives the same picture to the bit."""
+    """The same seed gives a bit-identical picture."""
 
     @model_validator(mode="after")
     def _counts(self) -> Sampler:
@@ -85,31 +85,31 @@ class Sampler(Part):
 
     @property
     def preference(self) -> str:
-        """The sampler asked for, "default" where the file does not care."""
+        """The requested sampler; "default" if the file states no preference."""
         return "default" if self.type == "independent" else self.type
 
 
 class CameraTransform(Part):
-    """Where the camera stands and looks. right = forward x up."""
+    """Position and orientation of the camera. right = forward x up."""
 
     position: Vector
-    """The eye."""
+    """Position of the camera."""
     look_at: Vector = Field(alias="lookAt")
-    """The point in the middle of the picture."""
+    """The point at the center of the picture."""
     up: Vector
-    """Upward in the picture; need not be perpendicular to the view."""
+    """The direction that points up in the picture; it need not be perpendicular to the view."""
 
     @model_validator(mode="after")
     def _spans_a_frame(self) -> CameraTransform:
         forward = np.subtract(self.look_at, self.position)
         distance, height = np.linalg.norm(forward), np.linalg.norm(self.up)
-        # 32-bit coordinates carry 24 bits: nearer than that, the direction is made of rounding errors.
+        # 32-bit coordinates carry 24 bits: below this distance, the direction consists of rounding errors.
         if distance <= 2**-22 * max(1e-30, np.abs(self.position).max(), np.abs(self.look_at).max()):
             raise invalid("position and lookAt are the same point", "move one of them", "lookAt")
         if height == 0:
             raise invalid("up has length 0", "give a direction, e.g. [0, 1, 0]", "up")
         if np.linalg.norm(np.cross(forward / distance, np.divide(self.up, height))) < 1e-5:
-            raise invalid("up is parallel to the view", "tilt one of them; which way is up cannot be told", "up")
+            raise invalid("up is parallel to the view", "tilt one of them, so that the up direction is defined", "up")
         return self
 
 
@@ -137,7 +137,7 @@ class Film(Part):
 
 
 class Camera(Part):
-    """A pinhole camera that looks down its -z."""
+    """A pinhole camera that looks along its -z axis."""
 
     type: Literal["pinhole"] = "pinhole"
     transform: CameraTransform
@@ -145,12 +145,12 @@ class Camera(Part):
     """Angle between the lower and the upper edge of the picture, degrees."""
     film: Film
     t_near: Positive = Field(1e-4, alias="tNear")
-    """Nothing nearer is seen."""
+    """Near clipping distance."""
     t_far: Positive = Field(1e10, alias="tFar")
-    """Nothing farther is seen."""
+    """Far clipping distance."""
     polarizer: Number | None = None
-    """An ideal linear polarizer over the lens, degrees: the direction that it lets through, counterclockwise from the
-    picture's horizontal. It halves light that is not polarized. Mitsuba's path tracer renders, in a polarized variant.
+    """An ideal linear polarizer over the lens: the direction that it transmits, in degrees, counterclockwise from the
+    picture's horizontal. It halves unpolarized light. Mitsuba's path tracer renders it in a polarized variant.
     """
     time_start: Number = Field(0.0, alias="timeStart")
     """Without effect: nothing moves."""
@@ -165,14 +165,14 @@ class Camera(Part):
 
 
 def integrators() -> Family[type[program.Integrator]]:
-    """The integrators, those of other packages too."""
+    """The integrators, including those of other packages."""
     from ..transport.integrators import Integrator
 
     return Integrator.family
 
 
 def _list_integrators(schema: dict[str, Any]) -> None:
-    """The names in the JSON Schema, each with what it shows, and which of them need a depth."""
+    """Add the names of integrators to the JSON Schema, each with its title, and which of them need a depth."""
     family = integrators()
     names = [{"const": name, "description": title} for name, title in family.titles().items()]
     schema["properties"]["type"] = {"oneOf": names, "title": "Type"}
@@ -181,13 +181,13 @@ def _list_integrators(schema: dict[str, Any]) -> None:
 
 
 class Integrator(Part):
-    """What the picture shows."""
+    """The integrator, which determines what the picture shows."""
 
     model_config = ConfigDict(json_schema_extra=_list_integrators)
 
     type: str
     max_depth: Whole | None = Field(None, alias="maxDepth", ge=1, le=100_000)
-    """N means N - 1 shaded vertices: 1 shows lights only, 2 is direct light."""
+    """Maximum path length: N means N - 1 shaded vertices; 1 shows lights only, 2 adds direct light."""
 
     @model_validator(mode="after")
     def _known_type(self) -> Integrator:
@@ -202,7 +202,7 @@ class Integrator(Part):
 
 
 class Rotation(Part):
-    """A rotation about an axis through the origin, counter-clockwise seen from the axis' tip."""
+    """A rotation about an axis through the origin, counterclockwise as seen from the tip of the axis."""
 
     axis: Vector
     radian: Number
@@ -214,7 +214,7 @@ class Rotation(Part):
         return self
 
     def matrix(self) -> np.ndarray:
-        """Rodrigues' formula."""
+        """The 3x3 rotation matrix, by Rodrigues' formula."""
         x, y, z = np.asarray(self.axis) / np.linalg.norm(self.axis)
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return np.eye(3) + math.sin(self.radian) * cross + (1 - math.cos(self.radian)) * cross @ cross
@@ -228,8 +228,8 @@ class Transform(Part):
     scale: Vector = (1.0, 1.0, 1.0)
 
     @model_validator(mode="after")
-    def _keeps_volume(self) -> Transform:
-        # Below this a unit shape is smaller than what 32 bits resolve at a distance of 1, and its inverse overflows.
+    def _is_invertible(self) -> Transform:
+        # Below this, a unit shape is smaller than what 32 bits resolve at a distance of 1, and its inverse overflows.
         if min(abs(s) for s in self.scale) < 1e-12:
             raise invalid(f"scale {list(self.scale)} flattens the shape", "use factors other than 0", "scale")
         return self
@@ -245,10 +245,10 @@ class Transform(Part):
 
 
 class ShapePart(Part):
-    """What all shapes share."""
+    """The keys that all shapes share."""
 
     material: Material | None = None
-    """Without one: matte, albedo 0.5."""
+    """The default is matte with albedo 0.5."""
     transform: Transform = Transform()
 
 
@@ -287,7 +287,7 @@ class Cube(ShapePart):
 
 
 def _turn(value: float) -> float:
-    if value > 2 * math.pi * (1 + 1e-3):  # room for 6.2832 and the like
+    if value > 2 * math.pi * (1 + 1e-3):  # tolerance for rounded values such as 6.2832
         raise invalid(f"phi_max {value:g} is more than a full turn", "give radians in (0, 2pi]")
     return min(value, 2 * math.pi)
 
@@ -296,7 +296,7 @@ Turn = Annotated[Positive, AfterValidator(_turn)]
 
 
 class Disk(ShapePart):
-    """In z = 0 with normal +z; u = phi / phi_max from +x toward +y, v from the rim inward."""
+    """A disk in z = 0 with normal +z; u = phi / phi_max from +x toward +y, v from the rim inward."""
 
     type: Literal["disk"]
     radius: Positive = 1.0
@@ -317,7 +317,7 @@ class Disk(ShapePart):
 
 
 class Cylinder(ShapePart):
-    """Stands from z = 0 to z = height, open at both ends; u = phi / phi_max, v = z / height."""
+    """A cylinder from z = 0 to z = height, open at both ends; u = phi / phi_max, v = z / height."""
 
     type: Literal["cylinder"]
     radius: Positive = 1.0
@@ -327,7 +327,7 @@ class Cylinder(ShapePart):
 
 
 class Cone(ShapePart):
-    """Base circle in z = 0, apex at z = height, open below; u = phi / phi_max, v = z / height."""
+    """A cone with its base in z = 0 and its apex at z = height, open below; u = phi / phi_max, v = z / height."""
 
     type: Literal["cone"]
     radius: Positive = 1.0
@@ -337,11 +337,11 @@ class Cone(ShapePart):
 
 
 class Mesh(ShapePart):
-    """Triangles from a file beside the scene: .obj or .ply. `triangle` is the lab's name for it."""
+    """Triangles from a file in the scene's folder, .obj or .ply. `triangle` is the lab's name for this type."""
 
     type: Literal["triangle", "mesh"]
     file: str = Field(min_length=1)
-    """Texture coordinates are taken as they stand, v = 0 is the top of a texture; without normals it is faceted."""
+    """Texture coordinates are used unchanged, v = 0 is the top of a texture; without normals, it is flat-shaded."""
 
 
 Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
@@ -357,7 +357,7 @@ class AreaLight(Part):
 
 
 class SpotLight(Part):
-    """A point that shines alike in all directions (the name is the lab's)."""
+    """A point light of equal intensity in all directions (the name is the lab's)."""
 
     type: Literal["spotLight"]
     position: Vector
@@ -366,34 +366,34 @@ class SpotLight(Part):
 
 
 class DirectionalLight(Part):
-    """Parallel light from infinitely far away, as of a sun without a size."""
+    """Parallel light from infinity, like that of a point-like sun."""
 
     type: Literal["directionalLight"]
     direction: Vector
-    """The way that the light travels, of any length: [0, -1, 0] shines down."""
+    """The direction in which the light travels, of any length: [0, -1, 0] shines down."""
     energy: Radiance
-    """Irradiance on a surface that faces the light, W/m^2."""
+    """Irradiance on a surface perpendicular to the light, W/m^2."""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> DirectionalLight:
         if not any(self.direction):
-            raise invalid("direction has length 0", "give the way that the light travels, e.g. [0, -1, 0]", "direction")
+            raise invalid("direction has length 0", "give the direction of the light, e.g. [0, -1, 0]", "direction")
         return self
 
     def unit(self) -> np.ndarray:
-        """The direction, of length 1."""
+        """The normalized direction."""
         scaled = np.divide(self.direction, np.abs(self.direction).max())  # squares of small numbers underflow
         return scaled / np.linalg.norm(scaled)
 
 
 class EnvironmentLight(Part):
-    """Light from everywhere: direction (sin t sin p, cos t, sin t cos p) sees u = p/2pi, v = t/pi."""
+    """Light from all directions: direction (sin t sin p, cos t, sin t cos p) has u = p/2pi, v = t/pi."""
 
     type: Literal["environmentLight"]
     texture: Sky | None = None
     """Radiance from an image or [r, g, b]."""
     radiance: Radiance | None = None
-    """Radiance that is the same in all directions, in place of a texture."""
+    """Constant radiance, in place of a texture."""
 
     @model_validator(mode="after")
     def _one_source(self) -> EnvironmentLight:
@@ -407,10 +407,10 @@ LightSource = Annotated[AreaLight | SpotLight | DirectionalLight | EnvironmentLi
 
 
 class Contents(Part):
-    """What stands before the camera."""
+    """The shapes and lights of the scene."""
 
     acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
-    """Without effect: there is one, and it is fast."""
+    """Without effect: Gonio always uses Mitsuba's acceleration structure."""
     shapes: list[Shape] = Field(default_factory=list)
     lights: list[LightSource] = Field(default_factory=list)
     ambient: Light | None = None
@@ -427,14 +427,14 @@ class SceneDescription(Part):
     """A scene in the lab's JSON format with Gonio's additions. `read` makes one; `build` renders from it."""
 
     json_schema: str | None = Field(None, alias="$schema")
-    """For editors."""
+    """URL of the JSON Schema, for editors."""
     output: Output
     sampler: Sampler
     camera: Camera
     integrator: Integrator
     contents: Contents = Field(alias="scene")
     top_ambient: Light | None = Field(None, alias="ambient")
-    """The same as scene.ambient."""
+    """Same as scene.ambient."""
 
     _path: Path = PrivateAttr(default=Path("scene.json"))
     _allow_outside: bool = PrivateAttr(default=False)
@@ -475,25 +475,25 @@ class SceneDescription(Part):
 
     @property
     def folder(self) -> Path:
-        """The folder that the scene's files lie in."""
+        """The folder that contains the scene's files."""
         return self._path.parent
 
     @property
     def warnings(self) -> list[str]:
-        """What is odd but usable, each with its place in the file."""
+        """Warnings about suspicious but usable values, each with its location in the file."""
         return list(self._warnings)
 
     @property
     def raw(self) -> dict[str, Json]:
-        """The file's JSON after overrides, as plain values."""
+        """The file's JSON with overrides applied, as plain values."""
         return self._raw
 
     def where(self, pointer: str) -> str:
-        """A place in this scene's file, for messages."""
+        """A location in this scene's file, for messages."""
         return f"{self._path}#{pointer}"
 
     def locate(self, file: str, pointer: str) -> Path:
-        """The path of a file that the scene names. Raises InputError where it is missing or outside the folder."""
+        """The path of a file that the scene names. Raises InputError if it is missing or outside the folder."""
         return located(file, self.folder, self.where(pointer), self._allow_outside)
 
 
@@ -516,8 +516,8 @@ def json_schema() -> dict[str, Any]:
 
 
 def _finished(schema: Any) -> Any:
-    """The schema without `null`, which stands for an absent key here and which the reader refuses in a file, and with
-    materials where they may stand."""
+    """The schema without `null`, which denotes an absent key here and is rejected in files, and with references to
+    materials in place of `PLACEHOLDER`."""
     if isinstance(schema, list):
         return [_finished(item) for item in schema]
     if not isinstance(schema, dict):

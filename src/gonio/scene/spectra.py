@@ -1,4 +1,4 @@
-"""Lamps by their spectra: as Mitsuba takes them in spectral variants, and as colours in the others."""
+"""Emission spectra of lamps: for Mitsuba in spectral variants, as colors in the others."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .values import LightSpectrum
 Floats = NDArray[np.float64]
 Colour: TypeAlias = float | tuple[float, float, float]
 
-GRID = np.arange(360.0, 831.0)  # nm, all that Mitsuba's observer sees
+GRID = np.arange(360.0, 831.0)  # nm, the range of Mitsuba's CIE observer
 SECOND_RADIATION = 1.438776877e7  # nm K, hc/k in Planck's law
 
 
 def emitted(light: Colour | LightSpectrum) -> PluginDict:
-    """A light's radiance as Mitsuba takes it: a spectrum where the variant has them and the light too, else rgb."""
+    """A light's radiance as a Mitsuba plugin: a spectrum if both the variant and the light are spectral, else rgb."""
     if engine.load().is_spectral and not np.any(light.scale if isinstance(light, LightSpectrum) else light):
-        return {"type": "uniform", "value": 0.0}  # no spectrum of Mitsuba's may be 0 all over
+        return {"type": "uniform", "value": 0.0}  # Mitsuba rejects a `regular` spectrum that is 0 everywhere
     if isinstance(light, LightSpectrum) and engine.load().is_spectral:
         text = ", ".join(f"{value:.9g}" for value in curve(light))
         return {"type": "regular", "wavelength_min": GRID[0], "wavelength_max": GRID[-1], "values": text}
@@ -30,8 +30,8 @@ def emitted(light: Colour | LightSpectrum) -> PluginDict:
 
 
 def colour(light: Colour | LightSpectrum) -> list[float]:
-    """A light's radiance as linear sRGB. What no mixture of red, green and blue shows becomes the nearest: negative
-    parts are cut off, and the luminance kept."""
+    """A light's radiance as linear sRGB. Colors outside the gamut are clipped at 0 and rescaled to preserve the
+    luminance."""
     if not isinstance(light, LightSpectrum):
         return values.rgb(light)
     if isinstance(light, values.Daylight):
@@ -60,12 +60,12 @@ def _relative(light: LightSpectrum) -> Floats:
     if isinstance(light, values.Led):
         peaks = [h * np.exp(-4.0 * np.log(2.0) * ((GRID - at) / width) ** 2) for at, width, h in light.peaks]
         return np.sum(peaks, axis=0)
-    assert isinstance(light, values.MeasuredLight), "there are no others"
+    assert isinstance(light, values.MeasuredLight), "all other types are handled above"
     return np.interp(GRID, light.wavelengths, light.values, left=0.0, right=0.0)
 
 
 def _observer() -> Floats:
-    """The CIE 1931 curves as Mitsuba has them, (3, N), such that the flat radiance of Mitsuba's white has Y = 1."""
+    """Mitsuba's CIE 1931 curves, (3, N), scaled so that the constant radiance of Mitsuba's white has Y = 1."""
     from ..transport.scene_data import CIE_Y_INTEGRAL
 
     mi = engine.load()

@@ -1,7 +1,7 @@
-"""The text of a scene file: strict, bounded JSON in, plain Python values out.
+"""Parsing the text of a scene file: strict JSON of bounded size and depth, as plain Python values.
 
-Python's own reader is too lenient for a file that people edit by hand (the last of two equal keys wins, NaN is a
-number) and dies of deep nesting. Here each of these is one `InputError` with the place in the file.
+Python's own parser is too lenient for a file that people edit by hand (the last of two equal keys wins, NaN is a
+number) and fails on deep nesting. Here each of these is an `InputError` with the location in the file.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import NoReturn
 from ..bridge.types import Json
 from ..errors import InputError
 
-MAX_BYTES = 64 * 2**20  # a scene is text that somebody wrote; geometry and images live in files of their own
-MAX_DEPTH = 64  # a lab scene nests 8 deep; 64 leaves room for mixes of mixes and stays far from any stack limit
-MAX_INTEGER = 2**53  # beyond this a double no longer holds every integer
+MAX_BYTES = 64 * 2**20  # geometry and images are stored in separate files
+MAX_DEPTH = 64  # a lab scene has a depth of 8; 64 allows nested mixes and is far below any stack limit
+MAX_INTEGER = 2**53  # beyond this a double cannot represent every integer
 
 
 def pointer(*steps: str | int) -> str:
@@ -27,7 +27,7 @@ def pointer(*steps: str | int) -> str:
 
 
 def read_json(path: Path) -> dict[str, Json]:
-    """The object in a JSON file. Raises InputError for anything a scene file must not hold."""
+    """The object in a JSON file. Raises InputError for anything that a scene file must not contain."""
     text = _text(path)
     try:
         value = _checked(json.loads(text, object_pairs_hook=_Object, parse_constant=_NotFinite), path, ())
@@ -42,7 +42,7 @@ def read_json(path: Path) -> dict[str, Json]:
         ) from None
     except InputError:
         raise
-    except ValueError as error:  # an integer of more digits than Python converts
+    except ValueError as error:  # an integer with more digits than Python converts
         raise InputError(f"not a usable number: {error}", str(path), "give a number below 1e18") from None
     if not isinstance(value, dict):
         raise InputError(
@@ -54,7 +54,7 @@ def read_json(path: Path) -> dict[str, Json]:
 
 
 def kind_of(value: object) -> str:
-    """What a JSON value is, in words: "the string 'x'", "a list of 2", "true"."""
+    """A description of a JSON value: "the string 'x'", "a list of 2", "true"."""
     if value is None or isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, str):
@@ -67,7 +67,7 @@ def kind_of(value: object) -> str:
 
 
 class _Object(dict[str, Json]):
-    """An object that remembers which of its keys came twice."""
+    """A JSON object with a list of its duplicate keys."""
 
     def __init__(self, pairs: list[tuple[str, Json]]) -> None:
         super().__init__(pairs)
@@ -78,7 +78,7 @@ class _Object(dict[str, Json]):
 
 
 class _NotFinite(str):
-    """`NaN` or `Infinity`, which Python's reader takes and JSON does not know."""
+    """`NaN` or `Infinity`, which Python's parser accepts although JSON does not allow them."""
 
 
 def _text(path: Path) -> str:
@@ -94,7 +94,7 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", str(path), "check the path") from None
     try:
-        text = data.decode("utf-8-sig")  # editors on Windows put a byte order mark first
+        text = data.decode("utf-8-sig")  # editors on Windows write a byte order mark
     except UnicodeDecodeError as error:
         raise InputError(
             f"not UTF-8: byte {error.start} is 0x{data[error.start]:02x}",
@@ -107,9 +107,9 @@ def _text(path: Path) -> str:
 
 
 def _check_depth(text: str, path: Path) -> None:
-    """Raises InputError with the line where the text is nested too deep."""
+    """Raise InputError with the line at which the text is nested too deeply."""
     depth = 0
-    # Strings first, so that brackets inside them are not counted; an unclosed string is left to the JSON reader.
+    # Strings first, so that brackets inside them are not counted; an unclosed string is left to the JSON parser.
     for match in re.finditer(r'"(?:[^"\\]|\\.)*"|[\[{\]}]', text):
         character = match.group()
         if character in "[{":
@@ -126,16 +126,16 @@ def _check_depth(text: str, path: Path) -> None:
 
 
 def _plain(value: Json) -> bool:
-    """Whether a value is a usable number: most of a large file is."""
+    """Whether a value is a finite float, as most values of a large file are."""
     return type(value) is float and math.isfinite(value)
 
 
 def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
-    """The value in plain types; raises at the first thing that JSON forbids or that a scene cannot use."""
+    """The value in plain types; raises InputError for the first one that JSON or a scene does not allow."""
     if _plain(value):
         return value
     if len(steps) >= MAX_DEPTH and isinstance(value, (dict, list)):
-        raise RecursionError  # said with the line
+        raise RecursionError  # `read_json` reports it with the line
 
     def refuse(what: str, hint: str) -> NoReturn:
         raise InputError(what, f"{path}#{pointer(*steps)}", hint)
@@ -183,7 +183,7 @@ def _syntax_hint(text: str, position: int) -> str:
 
 
 def walk(value: Json, steps: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Json]]:
-    """Every value in a tree of dicts and lists with the steps that lead to it, parents first."""
+    """Every value in a tree of dicts and lists, with the steps that lead to it; parents first."""
     yield steps, value
     if isinstance(value, dict):
         for key, item in value.items():

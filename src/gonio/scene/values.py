@@ -1,4 +1,4 @@
-"""The smallest parts of a scene: numbers, vectors, colours, textures, and the base of every object in it."""
+"""Elementary values of a scene: numbers, vectors, colors, textures, and the base class of all its objects."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from pydantic_core import PydanticCustomError
 from .text import kind_of
 
 VISIBLE = (380.0, 780.0)  # nm
-MAX_NUMBER = 1e18  # its square still fits a 32-bit float, so that lengths of vectors stay finite
+MAX_NUMBER = 1e18  # its square fits a 32-bit float, so that lengths of vectors stay finite
 
 
 def invalid(what: str, hint: str, key: str = "") -> PydanticCustomError:
-    """An error for a validator to raise: `key` names the key of the object that is at fault."""
-    # Braces would be read as placeholders, hence the text goes in as one.
+    """An error for a validator to raise; `key` is the key of the object that the error is about."""
+    # Braces would be read as placeholders, so the text is passed as the value of one.
     return PydanticCustomError("scene", "{what}", {"what": what, "hint": hint, "key": key})
 
 
 class Part(BaseModel):
-    """An object of the scene file: unknown keys are errors, values are not coerced, nothing changes afterwards."""
+    """An object of the scene file: unknown keys are errors, values are not coerced, and instances are immutable."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, use_attribute_docstrings=True, protected_namespaces=(), hide_input_in_errors=True
@@ -53,7 +53,7 @@ class Part(BaseModel):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """The keys of this object as the file spells them."""
+        """The keys of this object, as spelled in the file."""
         return [field.alias or name for name, field in cls.model_fields.items()]
 
     @classmethod
@@ -69,13 +69,15 @@ def _not_a_flag(value: object) -> object:
 
 
 def _integer(value: object) -> object:
-    # JSON does not tell 8 from 8.0
+    # JSON does not distinguish 8 from 8.0
     return int(value) if isinstance(value, float) and value.is_integer() else _not_a_flag(value)
 
 
 def _bounded(value: float) -> float:
     if abs(value) > MAX_NUMBER:
-        raise invalid(f"{value:g} is too large", f"numbers go up to {MAX_NUMBER:g}, what 32-bit arithmetic can square")
+        raise invalid(
+            f"{value:g} is too large", f"give at most {MAX_NUMBER:g}, so that its square fits 32-bit arithmetic"
+        )
     return value
 
 
@@ -112,7 +114,7 @@ def _kind_of_value(value: object) -> str | None:
 
 
 def _either(expected: str) -> Discriminator:
-    """Tell number, list and texture apart by what the value is. The tags stand in <> so that `reader` can drop them."""
+    """Distinguish numbers, lists and textures by the type of the value. The <> around tags let `reader` drop them."""
     return Discriminator(_kind_of_value, "expected", expected)
 
 
@@ -128,17 +130,17 @@ class ImageTexture(Part):
     file: str = Field(min_length=1)
     """Image beside the scene: .png, .jpg, .hdr or .exr; FILE.glb#N is the image N inside a glTF file."""
     color_space: Literal["raw", "srgb"] = Field("raw", alias="colorSpace")
-    """"srgb" decodes 8-bit values to linear light; "raw" (the lab's) takes them as they stand."""
+    """"srgb" decodes 8-bit values to linear light; "raw" (the lab's default) leaves them unchanged."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
-    """What lies between two texels."""
+    """Interpolation between texels."""
     wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
-    """What lies outside [0, 1]."""
+    """Continuation outside [0, 1]."""
     channel: Literal["r", "g", "b", "a"] | None = None
-    """The one channel that counts, as grey; a number's is the mean of red, green and blue otherwise."""
+    """The single channel to use, as gray; without it, a scalar parameter takes the mean of red, green and blue."""
     factor: Factor = 1.0
-    """What the image's values are multiplied by, one number or three."""
+    """Factor of the image's values, one number or three."""
     mean: Annotated[bool, Strict()] = False
-    """The image's mean everywhere, for a value that must not vary over a surface."""
+    """Whether to use the image's mean everywhere, for a parameter that must not vary over a surface."""
 
 
 class NormalMap(Part):
@@ -148,7 +150,7 @@ class NormalMap(Part):
     file: str = Field(min_length=1)
     """Image beside the scene."""
     scale: Number = 1.0
-    """What the slopes are multiplied by."""
+    """Factor of the slopes."""
 
 
 class BumpMap(Part):
@@ -158,14 +160,14 @@ class BumpMap(Part):
     file: str = Field(min_length=1)
     """Image beside the scene."""
     scale: Number
-    """What 1 stands for, in units of the scene."""
+    """Height of the value 1, in units of the scene."""
 
 
 class LightSpectrum(Part):
-    """A lamp by its spectrum: in RGB its colour, with `--spectral` itself."""
+    """The spectrum of a lamp: rendered as a color in RGB, and as a spectrum with `--spectral`."""
 
     scale: NonNegative = 1.0
-    """The radiance has the luminance of [scale, scale, scale]."""
+    """The luminance is that of the radiance [scale, scale, scale]."""
 
 
 class Daylight(LightSpectrum):
@@ -175,11 +177,11 @@ class Daylight(LightSpectrum):
 
 
 class Blackbody(LightSpectrum):
-    """A body that glows, by Planck's law: a filament (2856 K, CIE illuminant A), the sun (5778 K)."""
+    """A black body by Planck's law, such as a filament (2856 K, CIE illuminant A) or the sun (5778 K)."""
 
     type: Literal["blackbody"]
     temperature: Annotated[Number, Field(ge=500, le=1e6)]
-    """Kelvin."""
+    """Temperature in kelvin."""
 
 
 class Led(LightSpectrum):
@@ -187,7 +189,7 @@ class Led(LightSpectrum):
 
     type: Literal["led"]
     peaks: Annotated[list[tuple[Positive, Annotated[Number, Field(ge=2, le=500)], NonNegative]], Field(min_length=1)]
-    """[wavelength, full width at half maximum, height] each, in nm; heights are relative."""
+    """One [wavelength, full width at half maximum, height] per peak, in nm; heights are relative."""
 
     @model_validator(mode="after")
     def _shines(self) -> Led:
@@ -200,11 +202,11 @@ class Led(LightSpectrum):
 
 
 class MeasuredLight(LightSpectrum):
-    """A lamp's measured spectrum: radiance per wavelength, relative, linear between the points and 0 beyond."""
+    """A lamp's measured spectrum: relative radiance per wavelength, interpolated linearly, 0 outside."""
 
     type: Literal["spectrum"]
     wavelengths: list[Positive] = Field(min_length=2)
-    """nm, ascending."""
+    """Wavelengths in nm, ascending."""
     values: list[NonNegative] = Field(min_length=2)
 
     @model_validator(mode="after")
@@ -229,7 +231,7 @@ Index = Annotated[
 ]
 Colour = Annotated[
     Annotated[Number, Tag("<number>")] | Annotated[Rgb, Tag("<list>")] | Texture,
-    _either("[r, g, b], a number (grey) or a texture {type: imageTex, file}"),
+    _either("[r, g, b], a number (gray) or a texture {type: imageTex, file}"),
 ]
 Width = Annotated[
     Annotated[Number, Tag("<number>")]
@@ -240,7 +242,7 @@ Width = Annotated[
 Lamp = Annotated[Daylight | Blackbody | Led | MeasuredLight, Field(discriminator="type")]
 Radiance = Annotated[
     Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Annotated[Lamp, Tag("<texture>")],
-    _either("[r, g, b], a number (grey) or a spectrum {type: d65, blackbody, led or spectrum}"),
+    _either("[r, g, b], a number (gray) or a spectrum {type: d65, blackbody, led or spectrum}"),
 ]
 Sky = Annotated[
     Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Texture,
@@ -249,5 +251,5 @@ Sky = Annotated[
 
 
 def rgb(value: float | tuple[float, float, float]) -> list[float]:
-    """A colour as three values; a number is grey."""
+    """A color as three values; a number is gray."""
     return [float(value)] * 3 if isinstance(value, (int, float)) else [float(c) for c in value]
