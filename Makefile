@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint words bench install clean docs browser
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs browser
 
 install: .venv/installed
 
@@ -38,10 +38,7 @@ lint: .venv/installed
 	$(BIN)/ruff format --check $(OURS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-
-# names and prose that are still to be replaced by the field's words; not part of `lint` until it is empty
-words:
-	$(PYTHON) tools/words.py
+	$(BIN)/python tools/words.py
 
 # Shaders and the page are tested in a real browser: the one that is here, else Debian's, else Playwright's.
 browser: .venv/installed
