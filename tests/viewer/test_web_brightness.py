@@ -21,6 +21,7 @@ from web_page import COARSE, PIXELS, WIDE, Page, decoded
 MODELS = [name for name in models() if not models()[name].stochastic]
 SAMPLES = 64
 FEW = 32  # the light of a whole ball is a mean over hundreds of pixels
+LIVE = 16  # the same shaders as in an exported page: what may differ is what the server adds
 
 
 def lean(what: stage.Stage, path: Path) -> Path:
@@ -55,18 +56,20 @@ def test_long_materials_and_those_with_tables_of_their_own_are_lit(chrome: Any, 
 # --------------------------------------------------------------------------- everything
 
 
-def checked(what: stage.Stage, shows: list[Show], compared: Callable[[Any, Any, Any, int], np.ndarray]) -> list[str]:
+def checked(
+    what: stage.Stage, shows: list[Show], compared: Callable[[Any, Any, Any, int], np.ndarray], samples: int = SAMPLES
+) -> list[str]:
     """What is out of range. A highlight narrower than a pixel is noise in both pictures: a ball that is out of range
     among many is looked at alone, larger."""
     wrong = []
     for show in shows:
         for lamp in show.lamps:
             rows = brightness.rows_of(show)
-            found = compared(rows, [lamp], brightness.framed(what, rows), SAMPLES)
+            found = compared(rows, [lamp], brightness.framed(what, rows), samples)
             far = ~(abs(found - 1) < BAR)
             for ball in np.flatnonzero(far):
                 alone = [("m0", show.choices, [show.balls[ball]])]
-                (ratio,) = compared(alone, [lamp], brightness.framed(what, alone), 4 * SAMPLES)
+                (ratio,) = compared(alone, [lamp], brightness.framed(what, alone), 4 * samples)
                 if not abs(ratio - 1) < BAR:
                     wrong.append(f"{show.label}, {lamp['type']}, {show.balls[ball]}: {found[ball]:.3f}, {ratio:.3f}")
             print(f"{show.label}, {lamp['type']}: {found.min():.4f} to {found.max():.4f}", flush=True)
@@ -143,7 +146,7 @@ def test_a_live_page_is_as_bright_as_its_reference(live: Any, name: str) -> None
     def compared(rows: Any, lights: Any, camera: Any, spp: int) -> np.ndarray:
         tab.evaluate(brightness.SHOW, [rows, lights, camera])
         wait(f"() => ({brightness.LACKING})() === 0")
-        picture = decoded(tab.evaluate(PIXELS, SAMPLES))
+        picture = decoded(tab.evaluate(PIXELS, spp))
         wait(
             f"() => {{ const r = gonio.app.referencePicture(); return r && !r.stale && r.samples >= {min(spp, 512)}; }}"
         )
@@ -152,4 +155,4 @@ def test_a_live_page_is_as_bright_as_its_reference(live: Any, name: str) -> None
         height, width = truth.shape[:2]
         return brightness.ratios(rows, camera, picture.reshape(height, factor, width, factor, 4).mean((1, 3)), truth)
 
-    assert checked(what, list(brightness.shows(what)), compared) == []
+    assert checked(what, list(brightness.shows(what)), compared, LIVE) == []
