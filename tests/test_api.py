@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -68,7 +69,7 @@ def test_docstrings_name_every_option() -> None:
     for function in FUNCTIONS.values():
         text = inspect.getdoc(function) or ""
         for key in inspect.signature(function).parameters:
-            assert key in text or key in (inspect.getdoc(render) or ""), f"{function.__name__}: {key}"
+            assert re.search(rf"\b{key}\b", text + (inspect.getdoc(render) or "")), f"{function.__name__}: {key}"
 
 
 def test_a_picture_goes_to_a_file_and_back(tmp_path: Path, scene: Path) -> None:
