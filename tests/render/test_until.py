@@ -279,7 +279,7 @@ def test_who_cannot_tell_the_error_says_so(scene: Path, tmp_path: Path, monkeypa
     with pytest.raises(InputError, match="tells no error"):
         go.render(scene, until_error=0.1, spp=1)
     with monkeypatch.context() as other:
-        other.setattr(executor, "current", lambda: type("Executor", (), {"size": 4})())
+        other.setattr(executor, "current", lambda: type("Executor", (), {"size": 4, "remote": True})())
         with pytest.raises(InputError, match="workers render parts"):
             go.render(scene, until_error=0.1)
 
