@@ -193,3 +193,22 @@ def test_a_density_that_is_not_normalized_is_told(registered: None) -> None:
 
     with pytest.warns(GonioWarning, match=r"int D\(m\) m\.z dm is 2 .* where 1 is expected"):
         go.Conductor(ndf=Doubled)
+
+
+def test_a_clamped_cosine_in_D_changes_nothing() -> None:
+    """tan^2 by max(cos^2, 1e-7) makes D rise at the horizon: it made Lambda 4,000 times too large, and metals black."""
+
+    class Clamped(go.NDF):
+        """GGX as it is often written."""
+
+        def D(self, m: Any, alpha: Any) -> Any:
+            a2, c2 = ops.sqr(alpha.x), ops.sqr(m.z)
+            t2 = (1.0 - c2) / ops.maximum(c2, 1e-7)
+            return ops.inv_pi / (a2 * ops.sqr(c2) * ops.sqr(1.0 + t2 / a2))
+
+    closed, own = distribution("ggx"), Clamped()
+    v = random_directions(200, upper=True)
+    for width in (0.1, 0.4, 1.0):
+        alpha = vector(np.full((len(v), 2), width))
+        found, right = own.Lambda(vector(v), alpha), closed.Lambda(vector(v), alpha)
+        np.testing.assert_allclose(1 / (1 + np.array(found)), 1 / (1 + np.array(right)), atol=2e-3)

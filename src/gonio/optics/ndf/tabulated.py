@@ -33,6 +33,7 @@ Density: TypeAlias = Callable[[Floats, Floats], Floats]
 NODES = 256  # of the projected area over v'.z / |v'|, and of the inverse functions
 ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; finer steps, at which w is stored
 MIN_ROOT, MAX_SLOPE = 0.1, 1e6  # fourth root of the smallest width; slopes beyond have a share of D / 1e6 of the area
+STEEP = 100.0  # slope (89.4 degrees) from which on a rise of D is that of a clamped cosine, not of another lobe
 STEP, LOWEST, HIGHEST = 0.01, -16.0, 30.0  # of log s
 SAME = 1e-4  # fraction of the surface on which two equal densities may differ
 PAIRS = ((0.1, 0.4), (0.6, 0.2), (0.05, 0.9))  # unequal widths at which D is tested
@@ -199,12 +200,26 @@ def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
     w = width
     for last in (False, True):
         shares = _shares(density, (width, width), w * np.exp(log_s), float(AZIMUTHS[0]))
+        if not np.all(np.isfinite(shares)):
+            return None
+        shares[_clamped(shares, w * np.exp(log_s)) :] = 0.0
         area = float(shares.sum())
-        if not np.all(np.isfinite(shares)) or shares.min() < 0.0 or area <= 0.0:
+        if shares.min() < 0.0 or area <= 0.0:
             return None
         if not last:
             w *= float(shares @ np.exp(log_s)) / area * (2.0 / np.pi)
     return _Row(width, w, shares / area, area)
+
+
+def _clamped(shares: Floats, s: Floats) -> int:
+    """The index from which on normals are excluded because a cosine is clamped in D, as in
+    tan^2 = (1 - c^2) / max(c^2, 1e-7), so that D diverges at the horizon. They cover a negligible fraction of the
+    surface, but their slopes would dominate the projected area and hence Lambda."""
+    steep = int(np.argmax(s > STEEP))
+    moment = shares[steep:] * s[steep:]
+    least = np.minimum.accumulate(moment)
+    rises = np.flatnonzero(moment > 2.0 * least + 1e-12)
+    return steep + int(np.argmin(moment[: rises[0]])) if len(rises) else len(s)
 
 
 def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
