@@ -573,3 +573,12 @@ def test_the_doctor_survives_a_library_that_is_none(tmp_path: Path) -> None:
     assert (code, report["can_render"]) == ((0, True) if usable else (3, False))
     used = [finding["text"] for finding in report["findings"] if finding["state"] == "ok"]  # type: ignore[attr-defined]
     assert not any(str(wrong) in text for text in used)
+
+
+def test_several_errors_of_a_scene_are_told_apart(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = json.loads((scene / "scene.json").read_text())
+    text["integrator"]["type"] = "pathTracer"
+    text["camera"]["verticalFov"] = "wide"
+    (scene / "scene.json").write_text(json.dumps(text))
+    assert gonio("render", scene) == 2
+    assert "; also " in capsys.readouterr().err

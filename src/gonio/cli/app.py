@@ -112,7 +112,8 @@ def _fail(error: GonioError, as_json: bool) -> int:
     from rich.console import Console
     from rich.text import Text
 
-    text = Text("error: ", style="bold red").append(" ".join(error.what.split()), style="default not bold")
+    what = "; ".join(" ".join(line.split()) for line in error.what.splitlines() if line.strip())
+    text = Text("error: ", style="bold red").append(what, style="default not bold")
     for name, line in (("   in: ", error.where), (" hint: ", error.hint)):
         if line:
             text.append(f"\n{name}", style="bold cyan").append(" ".join(line.split()), style="default not bold")
