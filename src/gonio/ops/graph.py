@@ -26,7 +26,7 @@ from ..errors import GonioError
 from ..owner import exclusive
 from .evaluation import NUMPY as NUMPY
 from .evaluation import operate
-from .naming import HERE, name_locals
+from .naming import HERE, LocalNames
 from .structure import flatten, leaves, rebuild, static_key
 from .types import Value
 
@@ -71,8 +71,8 @@ class Node:
         self.name, self.depth = "", 1000
         self.index = len(function.nodes)
         # otherwise the variables of all calling frames would be searched
-        if _stack and _stack[-1][1] is function:
-            name_locals(function, Node, _define.__code__)
+        if function.names is not None and _stack[-1][1] is function:
+            function.names.search()
         function.nodes.append(self)
 
     def __repr__(self) -> str:
@@ -147,6 +147,7 @@ class Function:
         self.arguments: dict[str, Value] = {}
         self.nodes: list[Node] = []
         self.result: Value = None
+        self.names: LocalNames | None = None  # while it is being recorded
 
     def parameter(self, name: str, type: str) -> Node:
         self.parameters[name] = type
@@ -272,6 +273,7 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
     source = f"{python_function.__code__.co_filename}:{python_function.__code__.co_firstlineno}"
     function = Function(name, inspect.getdoc(python_function) or "", source)
     _stack.append((graph, function))
+    function.names = LocalNames(function, Node, _define.__code__)
     try:
         given = [pair for argument, value in arguments.items() for pair in _flatten(value, argument)]
         parameters = iter([function.parameter(path, node.type) for path, node in given])
@@ -281,6 +283,7 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
         function.result = rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
     finally:
         _stack.pop()
+        function.names = None
     graph.functions.append(function)
     return function
 

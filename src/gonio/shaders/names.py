@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 from ..ops.graph import first_free
@@ -52,11 +53,12 @@ class Names:
         """The types that distinguish overloads: those of the written arguments, where an object counts as its
         struct."""
         arguments = self.program.recorded[routine].arguments
+        struct_of = functools.cache(lambda root: self.program.struct_of(arguments.get(root)))
         types: dict[object, object] = {}
         for index in sorted(routine.used):
             parameter = routine.parameters[index]
             root, rest, _ = place(parameter.static)
-            struct = self.program.struct_of(arguments.get(root)) if rest else None
+            struct = struct_of(root) if rest else None
             types[root if struct else index] = struct.record.name if struct else parameter.type
         return tuple(types.values())
 

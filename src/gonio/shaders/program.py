@@ -7,6 +7,7 @@ computes it once per draw instead of once per pixel.
 
 from __future__ import annotations
 
+import functools
 import inspect
 import re
 from collections.abc import Iterator, Sequence
@@ -201,6 +202,7 @@ def settle(material: BSDF, derived: dict[str, object], path: str = "") -> BSDF:
 # ---------------------------------------------------------------------- paths
 
 
+@functools.cache
 def place(path: str) -> tuple[str, str, bool]:
     """(root argument, path below it, whether it is a derived value) of a parameter of a recording."""
     root, _, rest = path.partition(".")
