@@ -94,6 +94,7 @@ def test_a_picture_has_the_same_bits(
         assert np.array_equal(go.render(scene, spp=5, **options), alone)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_path: Path) -> None:
     vary = {"shapes.0.material.p": [4, 16]}
     alone = go.study(scene, vary, spp=3)
@@ -163,6 +164,7 @@ def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
             assert np.array_equal(go.resume(path), alone)
 
 
+@pytest.mark.slow
 def test_a_picture_goes_on_to_more_samples_by_a_crew(two: Cluster, scene: Path, tmp_path: Path) -> None:
     go.render(scene, spp=3, checkpoint=tmp_path / "c")
     with executor.using(two), pytest.warns(GonioWarning, match="3 of 7"):

@@ -66,13 +66,13 @@ def _check(page: Any, lang: str, name: str, side: int, lean: bool = False) -> No
 SPARED = {"film-on-glass", "kulla-conty", "blinn-phong", "modified-phong", "glass-ggx-smith-correlated"}
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", materials.each(FEW, set(FEW) - set(ALIKE) - SPARED))
 def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
     _check(page, "glsl", name, 64)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])
 def test_wgsl_gives_the_values_of_python(page: Any, name: str) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):
@@ -87,6 +87,7 @@ def test_every_model_at_65536_draws(page: Any, name: str, lang: str) -> None:
     _check(page, lang, name, 256)
 
 
+@pytest.mark.slow
 def test_a_lean_shader_gives_the_values_of_python(page: Any) -> None:
     _check(page, "glsl", "openpbr", 64, lean=True)
 

@@ -55,6 +55,7 @@ def test_functions_that_differ_in_a_number_alone_are_one() -> None:
         assert not copies, (name, copies)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("name", FEW)
 def test_nothing_is_defined_and_not_used(name: str) -> None:
     shader = written(name)
@@ -295,6 +296,7 @@ def test_numbers_do_not_shape_the_code() -> None:
     assert len(texts(*(go.KullaConty(go.Conductor(alpha=a)) for a in (0, 0.5, 1)))) == 1
 
 
+@pytest.mark.slow
 def test_names_are_legal_in_every_language() -> None:
     """GLSL keeps gl_ and every double underscore for itself, and each language its own words."""
     for lang, language in languages().items():

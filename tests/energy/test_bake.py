@@ -52,6 +52,7 @@ def test_a_stretched_layout_interpolates_within_2e_3():
         assert baked.manifest["error"]["E"]["interpolation"] < 2e-3
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("store", ["E", "1-E"])
 @pytest.mark.parametrize("flip", [True, False])
 def test_homework_pictures_read_back_pixel_by_pixel(tmp_path, store, flip):
@@ -94,6 +95,7 @@ def test_models_are_baked_with_their_own_fresnel():
     assert glass.arrays["E"].shape == (8, 8, 3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("layout", ["linear", "stretched"])
 def test_two_widths_add_the_azimuth_as_an_axis(layout):
     baked = baking.bake("beckmann", size=5, aspect=0.4, azimuths=3, layout=layout)
@@ -108,6 +110,7 @@ def test_two_widths_add_the_azimuth_as_an_axis(layout):
     assert baked.arrays["E"][2, 3, 4] == pytest.approx(drawn.value[0, 0], abs=5 * drawn.error[0, 0] + 1e-5)
 
 
+@pytest.mark.slow
 def test_two_widths_swapped_are_the_table_turned():
     wide, tall = (baking.bake("ggx", ["E", "Eavg"], size=6, aspect=a, azimuths=4) for a in (0.25, 4.0))
     np.testing.assert_allclose(wide.arrays["E"], tall.arrays["E"][::-1], atol=2e-6)
@@ -231,6 +234,7 @@ def test_an_altered_file_is_refused(tmp_path, change):
         baked_files.load(file)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("options", "text"),
     [

@@ -95,6 +95,7 @@ def test_kulla_conty_is_reciprocal(base):
     np.testing.assert_allclose(forth, back, rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("cls", [go.KullaConty, go.Turquin, go.FdezAguera])
 @pytest.mark.parametrize("alpha", [0.1, 0.7, (0.2, 0.5)])
 def test_weight_is_eval_over_pdf_and_pdf_integrates_to_one(cls, alpha):

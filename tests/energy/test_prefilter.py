@@ -104,6 +104,7 @@ def test_levels_know_up_from_down_and_left_from_right():
             assert prefilter.read(level, places)[0, 0] >= prefilter.read(level, places)[1, 0] - 1e-9 or axis[2] == 1
 
 
+@pytest.mark.slow
 def test_the_errors_are_as_stated():
     baked = prefilter.bake(environment(), levels=4)
     for index in (1, 2, 3):
@@ -139,6 +140,7 @@ def test_the_split_sum_is_judged_by_the_metal_itself(alpha):
     np.testing.assert_allclose(found, exact, rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_the_split_sum_is_exact_under_even_light_and_worse_the_rougher():
     even = prefilter.bake(np.full((32, 64, 3), 2.0), levels=3).manifest["error"]
     assert max(even[name]["split sum"] for name in ("level_1", "level_2")) < 5e-3

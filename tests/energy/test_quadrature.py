@@ -66,6 +66,7 @@ def test_e_agrees_with_an_independent_integration(ndf, masking, mu, roughness):
     assert float(ours) == pytest.approx(independent(ndf, masking, mu, roughness**2), abs=2e-5)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("masking", MASKINGS)
 @pytest.mark.parametrize("ndf", ["ggx", "beckmann", "student-t"])
 def test_e_agrees_with_finer_nodes_over_the_whole_table(ndf, masking):

@@ -95,6 +95,7 @@ def test_faults_that_are_stated_are_put_right(taken: Path, tmp_path: Path) -> No
     assert got.scene.ball is not None and np.abs(got.scene.ball.center - MIDDLE).max() < 0.1
 
 
+@pytest.mark.slow
 def test_faults_that_are_not_stated_are_noticed(taken: Path, found: run.Capture, tmp_path: Path) -> None:
     got = go.capture(again(taken, tmp_path, off(rig())), "lambert+ggx")
     assert np.any(np.abs(got.fit.values / TRUTH - 1.0) > 0.01)
@@ -130,6 +131,7 @@ def test_photographs_of_8_bits_are_enough(tmp_path: Path) -> None:
     np.testing.assert_allclose(got.fit.values[-1], TRUTH[-1], rtol=0.03)
 
 
+@pytest.mark.slow
 def test_a_flat_sample_is_measured_too(tmp_path: Path) -> None:
     raw = rig(flat=FLAT)
     raw["photographs"] = [{**one, "sample": "flat"} for one in raw["photographs"] if one["light"] != "l2"]  # grazing

@@ -33,6 +33,7 @@ def values(table: Measurement) -> np.ndarray:
 # ---------------------------------------------------------------------- light is counted
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "surface", ["gaussian:alpha=1,squares=64", "vgroove:sigma=.6", "spheres:coverage=.1", "heights.exr"]
 )
@@ -261,7 +262,7 @@ def test_a_blocked_direction_moves_to_the_rim_and_stays_above() -> None:
 # ---------------------------------------------------------------------- files
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("suffix", [".gonio", ".bsdf", ".brdf"])
 def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None:
     found = go.measure(

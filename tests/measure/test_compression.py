@@ -65,11 +65,13 @@ def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, si
     assert go.Measured(str(path)).eval([[0.0, 0.6, 0.8]], [[0.0, -0.6, 0.8]]).min() > 0.0
 
 
+@pytest.mark.slow
 def test_more_bytes_err_less(folder: Path) -> None:
     errors = [go.compress(SAMPLE, folder / "more.gonio", bytes=size)[0].sphere for size in (1500, 2500, 8000)]
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.2 * errors[0]
 
 
+@pytest.mark.slow
 def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
     path = folder / "both.gonio"
     rows = go.compress([SAMPLE, folder / "half.gonio"], path, codec="lowrank", bytes=4096)
@@ -128,6 +130,7 @@ def test_a_network_is_recorded_as_it_is_computed(network: Network, folder: Path)
     np.testing.assert_allclose(model.eval(wo, wi), model.eval(wi, wo) * wi[:, 2:] / wo[:, 2:], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_network_keeps_the_laws(network: Network, folder: Path) -> None:
     found = verify(go.Measured(str(folder / "network.gonio")), quick=True, law=["pdf", "weight", "reciprocity"])
     assert found.passed, str(found)

@@ -27,7 +27,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return found
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".binary", ".bsdf", ".zbsdf"])
 def test_a_table_keeps_the_laws(suffix: str, files: dict[str, str]) -> None:
     found = verify(go.Measured(files[suffix]), quick=True, law=["pdf", "weight", "calls", "positivity"])

@@ -34,6 +34,7 @@ def test_narrow_facets_lose_next_to_nothing_and_wide_ones_more_than_half() -> No
     assert 0.3 < _power(go.Conductor(alpha=1.0, fresnel="one"), at(60))[0] < 0.6
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("eta", [1.5, 0.7, 2.4])
 @pytest.mark.parametrize("ndf", NDFS)
 def test_rough_glass_gains_no_power(ndf: str, eta: float) -> None:

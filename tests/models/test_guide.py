@@ -81,7 +81,7 @@ def test_a_guide_is_no_noisier_than_sampling_by_hand(material: go.BSDF) -> None:
         assert found == pytest.approx(albedo, abs=4.0 * albedo * np.sqrt((by_hand + guided) / (1 << 15)) + 1e-4)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("material", [hidden(SMOOTH[1]), Retro(), Through(), OneWay()])
 def test_what_a_guide_says_is_what_it_does(material: go.BSDF) -> None:
     report = verify(material, law="pdf", quick=True)

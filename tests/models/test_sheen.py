@@ -55,6 +55,7 @@ def test_charlie_is_its_formula_in_angles() -> None:
     np.testing.assert_allclose(CHARLIE(1.0, alpha).f(WO, WI, precision="float64")[:, 0], f, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_charlie_s_gain_near_the_horizon_is_declared() -> None:
     mu = np.geomspace(2e-3, 0.02, 4)
     for alpha in (0.01, 0.05):

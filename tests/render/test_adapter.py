@@ -318,6 +318,7 @@ NATIVE = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("integrator", ["direct", "path"])
 @pytest.mark.parametrize("name", NATIVE)
 def test_pictures_are_those_of_the_native_plugins(name: str, integrator: str) -> None:

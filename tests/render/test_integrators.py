@@ -104,6 +104,7 @@ def agree(scene: Any, theirs_dict: dict, spp: int = 256, runs: int = 4, **settin
         assert worst < 6, f"{worst:.1f} sigma apart"
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_path_agrees_with_mitsuba_under_every_light(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))

@@ -137,6 +137,7 @@ def test_light_that_is_sampled_inside_a_medium_is_dimmed_on_its_way(tmp_path: Pa
     assert found[1] == pytest.approx(found[0], rel=0.02) and found[2] == pytest.approx(found[0], rel=0.02)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("eye", [6.0, 0.0])
 def test_water_that_reaches_into_its_glass_is_as_if_it_touched(tmp_path: Path, eye: float) -> None:
     """Glass from -2 to -1, water above it up to 1: modelled as water that begins inside the glass. From inside too."""

@@ -51,6 +51,7 @@ WAYS = [pytest.param(inline.MAX_COST, r, id=f"kernel-{r}") for r in (0.001, 0.05
 WAYS += [pytest.param(0, r, id=f"embree-{r}") for r in (0.01, 1.0)]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("most, radius", WAYS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ball_lights_the_floor_by_the_closed_form(
@@ -78,6 +79,7 @@ def test_one_of_several_balls_does_too(kind: str) -> None:
     assert image.mean() == pytest.approx(GREY * expected, rel=2e-3)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("most", [inline.MAX_COST, 0], ids=["kernel", "embree"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ball_does_not_light_itself(kind: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,6 +101,7 @@ def test_within_a_ball_light_is_a_geometric_series(flipped: bool) -> None:
         assert image == pytest.approx(2 - 0.5 ** (depth - 1), rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("shape", ["cube", "sphere"])
 def test_a_closed_lamp_sends_the_same_whether_its_inner_side_shines(shape: str) -> None:
     """Shadow rays that end short of a place on the far side, in front of the near one, add 1 % of light."""
@@ -110,6 +113,7 @@ def test_a_closed_lamp_sends_the_same_whether_its_inner_side_shines(shape: str) 
     assert found[0] == pytest.approx(found[1], rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_leaves_a_ball_inward_does_not_leave_it_outward(kind: str) -> None:
     """A particle begins a step off its surface, which leads out of one that is smaller, at the other side."""
@@ -119,6 +123,7 @@ def test_what_leaves_a_ball_inward_does_not_leave_it_outward(kind: str) -> None:
         assert found[0].mean() == pytest.approx(found[1].mean(), rel=0.02)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize("integrator", ["path", "directSampleLight", "directSampleBSDF"])
 def test_what_is_close_to_a_lamp_hides_it(integrator: str, others: int) -> None:
@@ -148,7 +153,7 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     assert found[0] == pytest.approx(found[1], rel=4e-3)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize(
     "shape, flipped",
@@ -218,6 +223,7 @@ def test_uv_of_a_ball_are_those_that_rays_find() -> None:
         assert np.allclose(v, si.uv.y, rtol=0, atol=1e-3)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("flip", [False, True])
 @pytest.mark.parametrize("mirror", [1, -1])
 @pytest.mark.parametrize("others", [0, 1])

@@ -197,6 +197,7 @@ def test_caustics_of_a_point_which_no_path_finds_are_those_of_particles() -> Non
     assert caustics[shadow].mean() == pytest.approx(light[shadow].mean(), rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:a small lamp")
 def test_caustics_by_wavelength_are_those_of_particles() -> None:
     """A ball of SF11, whose index depends on the wavelength, under a small lamp."""
@@ -372,7 +373,7 @@ MATERIALS = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [n if k < 3 else pytest.param(n, marks=pytest.mark.slow) for k, n in enumerate(MATERIALS)]
 )
@@ -417,6 +418,7 @@ def test_features_are_those_of_first_traces() -> None:
         assert np.array_equal(feature, caustics.aov()[name])
 
 
+@pytest.mark.slow
 def test_a_lamp_that_mirrors_alone_show_is_seen_once() -> None:
     other = {"type": "sphere", "center": [-1, -0.7, 0.5], "radius": 0.2, "bsdf": GLASS}
     drawn = before_a_wall(SILVER, 0.5, other=other)

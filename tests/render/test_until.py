@@ -155,6 +155,7 @@ def begun_anew(render: until.Until) -> np.ndarray:
             return before
 
 
+@pytest.mark.slow
 def test_what_was_too_blurred_is_shown_until_there_is_better() -> None:
     render = narrowing(1)
     before = begun_anew(render)
@@ -163,6 +164,7 @@ def test_what_was_too_blurred_is_shown_until_there_is_better() -> None:
     assert not np.array_equal(finish(render), before) and render.estimate() < told
 
 
+@pytest.mark.slow
 def test_one_that_began_anew_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     whole, stopped = (narrowing(1, 0.025) for _ in range(2))
     finish(whole, 64)

@@ -117,7 +117,7 @@ def _answers(bsdf: Any) -> tuple[np.ndarray, ...]:
     return value, np.array(pdf), weight, np.array(bs.wo), np.array(bs.pdf)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", PAIRS)
 def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
     if name == "measured metal" and not mi.is_spectral:
@@ -247,6 +247,7 @@ class Ward(BSDF):
 """
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("order", [
     "import gonio.mitsuba; go.BSDF.family.add(Ward)",
     "go.BSDF.family.add(Ward); import gonio.mitsuba",

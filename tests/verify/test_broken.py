@@ -36,7 +36,7 @@ LONG = {"BelowTheHorizon"}  # its law integrates over both hemispheres
 CONTROLS = [pytest.param(cls, marks=pytest.mark.slow) if cls.__name__ in LONG else cls for cls in BROKEN]
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda cls: cls.__name__)
 def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> None:
     report = verify(control(), quick=True, law=[control.caught_by])

@@ -145,7 +145,7 @@ def cause(material: go.BSDF, law: str) -> str:
     return verdict.cause
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("mistake", "law", "words"),
     [

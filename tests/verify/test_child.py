@@ -113,7 +113,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
     return verify(f"{file}:{name}", quick=True, law=["reciprocity", "weight", "isotropy"], **more)  # type: ignore[arg-type]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -177,6 +177,7 @@ def plain(report: Report) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 def test_the_report_is_the_same_in_one_process_in_another_and_in_several(file: Path) -> None:
     names = ["phong", "lambert", f"{file}:Good"]
     laws = ["energy", "weight", "isotropy"]

@@ -84,6 +84,7 @@ def test_phong_breaks_what_it_declares_and_exits_with_0() -> None:
     assert [v.status for v in dim.cards[0].verdicts] == ["pass"] * 2
 
 
+@pytest.mark.slow
 def test_same_seed_same_report() -> None:
     first, second = (verify(go.Conductor(alpha=0.3), quick=True, law=["pdf", "energy"], seed=5) for _ in range(2))
     assert [v.p for v in first.cards[0].verdicts] == [v.p for v in second.cards[0].verdicts]

@@ -67,6 +67,7 @@ def test_views_are_shares_of_the_hemisphere() -> None:
         assert mass @ np.abs(wo[:, 2]) == pytest.approx(2.0 / 3.0, abs=5e-3)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("sound", [RightDiffuse, RightFacets, RightLobes, go.Mirror, go.TwoSided])
 def test_a_sound_material_has_no_bias(sound: type) -> None:
     material = sound(go.Lambert()) if sound is go.TwoSided else sound()
@@ -82,6 +83,7 @@ def test_brighter_eval_than_weight() -> None:
     assert sampling(ABitBrighter()).grade is Grade.INVISIBLE
 
 
+@pytest.mark.slow
 def test_the_fault_is_told_apart_by_weights_and_pdf() -> None:
     assert sampling(Brighter(), "weights").average > 0.04 and sampling(Brighter(), "pdf").average < 1e-3
     assert sampling(HalfVectorPdf(), "pdf").average > 0.5 and sampling(HalfVectorPdf(), "weights").average < 1e-3
@@ -158,6 +160,7 @@ def test_grades(average: float, worst: float, grade: Grade) -> None:
     assert Bias(worst, average, 1.0, "", "bias").grade is grade
 
 
+@pytest.mark.slow
 def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     report = verify([Brighter(), go.Lambert(0.5)], law=["weight", "energy"])
     wrong, right = json.loads(json.dumps(report.as_dict()))["cards"]

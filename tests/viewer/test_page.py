@@ -98,7 +98,7 @@ def test_the_split_sum_is_the_albedo_of_white_by_each_masking(homework: dict[str
 # --------------------------------------------------------------------------- any models
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", [name for name in models() if not models()[name].stochastic])
 def test_every_model_makes_a_page(name: str) -> None:
     data = page.page_data(stage.of_targets([name]))
@@ -166,6 +166,7 @@ def test_an_exported_page_has_a_shader_for_what_presets_choose() -> None:
     assert all(any(v["choices"] == made for v in data["variants"]) for made in chosen if made)
 
 
+@pytest.mark.slow
 def test_other_values_than_tables_were_found_from_are_another_variant() -> None:
     """A coat over a base of another width has other tables: they were those of its default on every ball."""
     what = stage.of_targets(["coat"])

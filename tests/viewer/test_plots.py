@@ -30,7 +30,7 @@ QUICK |= {(name, kind) for name in ("lambert", "conductor", "dielectric", "mix",
 QUICK = QUICK - {("disney2015", "lobe")} | {("disney2015", "slice")}  # nine seconds of one shape more
 
 
-@pytest.mark.sample(15)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("name", "kind"),
     [

@@ -171,6 +171,7 @@ def test_the_link_holds_the_whole_state(page: Page, chrome: Any) -> None:
     tab.close()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "patch",
     [
@@ -195,6 +196,7 @@ def test_a_link_from_a_stranger_does_no_harm(page: Page, patch: Any) -> None:
     page.load()
 
 
+@pytest.mark.slow
 def test_a_link_sets_nothing_out_of_range(page: Page) -> None:
     """As a slider would not: widths over 1, fewer numbers than a colour has, masking by no known name."""
     first = page.state("valueOf()")
@@ -227,6 +229,7 @@ def test_screenshot_is_the_picture(page: Page) -> None:
     assert png[:8] == b"\x89PNG\r\n\x1a\n" and len(png) > 10_000
 
 
+@pytest.mark.slow
 def test_themes_differ_and_the_balls_do_not(page: Page) -> None:
     colors = {}
     for theme in ("dark", "light"):
@@ -304,6 +307,7 @@ def gltf(uri: str = "") -> bytes:
     ).encode()
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
@@ -384,6 +388,7 @@ def test_a_page_without_a_fitting_model_says_so(page: Page) -> None:
     assert 'no model for its material "Chalk"' in said and page.state("view.mesh") == "file"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mesh", ["torus", "shaderball"])
 def test_built_in_shapes_are_shaded(page: Page, mesh: str) -> None:
     page.set(f"s.view.mesh = '{mesh}'")
@@ -422,6 +427,7 @@ def test_usable_on_a_phone(chrome: Any, homework_file: Path) -> None:
     context.close()
 
 
+@pytest.mark.slow
 def test_every_panel_opens_without_a_complaint(page: Page) -> None:
     tabs = page.tab.get_by_role("tab")
     assert tabs.count() >= 5
@@ -432,6 +438,7 @@ def test_every_panel_opens_without_a_complaint(page: Page) -> None:
     assert page.tab.locator(".toast.error").count() == 0
 
 
+@pytest.mark.slow
 def test_one_model_without_terms_or_choices(chrome: Any, tmp_path: Path) -> None:
     what = stage.of_models([go.Lambert(albedo=(0.8, 0.4, 0.2))])
     path = page_file.export(what, tmp_path / "lambert.html")
@@ -444,6 +451,7 @@ def test_one_model_without_terms_or_choices(chrome: Any, tmp_path: Path) -> None
     tab.close()
 
 
+@pytest.mark.slow
 def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
     what = stage.of_models([go.Conductor(), go.Lambert(), go.Mirror()])
     tab = chrome.new_page(viewport={"width": 1280, "height": 720}, device_scale_factor=COARSE)

@@ -78,7 +78,7 @@ def step(w: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.nextafter(w32, w32 + rng.choice(np.float32([-1, 1]), w.shape), dtype=np.float32).astype(float)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("slot", range(len(MODELS)))
 def test_evaluator_agrees_with_python(opened: Opened, slot: int) -> None:
     rng = np.random.default_rng(1)
@@ -239,7 +239,7 @@ QUICK = {("light", WIDE, panel) for panel in PANELS if panel != "albedo"} | {("l
 QUICK |= {("dark", WIDE, panel) for panel in ("lobe", "tables")}
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("theme", "size", "panel"),
     [
@@ -321,6 +321,7 @@ REFERENCE = """([exposure]) => {
 }"""
 
 
+@pytest.mark.slow
 def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
     fresh.tab.set_viewport_size(SMALLER)
     fresh.tab.evaluate(SETTLED)
@@ -350,6 +351,7 @@ def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
     assert half[:, band].mean() - moved[:, band].mean() > 1
 
 
+@pytest.mark.slow
 def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
     fresh.tab.set_viewport_size(SMALLER)
     open_panel(fresh, "compare")
@@ -373,6 +375,7 @@ def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
     assert "0.01" in scale.text_content()
 
 
+@pytest.mark.slow
 def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
     fresh.tab.set_viewport_size(SMALLER)
     open_panel(fresh, "compare")
@@ -415,6 +418,7 @@ def test_probe_reads_the_pixel(fresh: Opened) -> None:
     assert np.allclose(ratio[:3], 2, rtol=1e-5)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("size", [(960, 540), (390, 844)])
 def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int, int]) -> None:
     fresh.tab.set_viewport_size({"width": size[0], "height": size[1]})
@@ -438,6 +442,7 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
     assert halves[0].std() > 10
 
 
+@pytest.mark.slow
 def test_a_reference_of_what_was_shown_before_is_not_measured(fresh: Opened) -> None:
     body = open_panel(fresh, "compare")
     fresh.tab.evaluate("() => gonio.converge(2)")

@@ -95,6 +95,7 @@ def test_the_difference_is_that_of_split_sum_and_truth(lit: Page) -> None:
     assert shares[0] < 0.05 < shares[2] < shares[4] < 0.6, shares  # it suits smooth surfaces
 
 
+@pytest.mark.slow
 def test_the_split_sum_is_what_gonio_bakes(lit: Page) -> None:
     """Seen straight on: E(1) times the baked level toward the camera. The page weighs by the lobe, not by i.n."""
     split = of_term(lit, "split", 32)
