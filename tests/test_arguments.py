@@ -10,7 +10,7 @@ import pytest
 from gonio import arguments, emit, render, verify
 from gonio.errors import InputError
 from gonio.pictures import images
-from gonio.scene.film import check_film
+from gonio.scene.film_size import check_film
 
 W = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
 NAN = float("nan")

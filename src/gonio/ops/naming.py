@@ -28,7 +28,7 @@ class LocalNames:
 
     def __init__(self, function: Any, node: type[Any], outermost: CodeType) -> None:
         self.function, self.node, self.outermost = function, node, outermost
-        # for each frame, the outermost first, what need not be searched again, by id; the reference keeps the id its own
+        # for each frame, the outermost first, what need not be searched again, by id; the reference keeps it alive
         self._searched: list[tuple[FrameType, dict[int, object]]] = []
 
     def search(self) -> None:

@@ -110,7 +110,9 @@ class Shown(NamedTuple):
     notice: str
 
 
-def show(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0) -> Shown:
+def write_exposed(
+    path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0
+) -> Shown:
     """Write a picture as `write` does, with an exposure that may be "auto"; the notice says what a screen clips."""
     if Path(path).suffix.lower() != ".png":
         write(path, pixels, metadata)
@@ -129,7 +131,7 @@ def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure
     check_writable(output)
     picture = read(source)
     metadata = {key: value for key, value in picture.metadata.items() if key != "exposure"}
-    return show(output, picture.pixels, metadata, exposure)
+    return write_exposed(output, picture.pixels, metadata, exposure)
 
 
 def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:

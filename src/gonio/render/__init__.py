@@ -144,7 +144,7 @@ def _picture(request: Request, level: int, notice: str = "") -> RGB:
         if output is not None:
             settings = prepared.settings | {"spp": prepared.render.done}
             settings |= {} if error is None else {"estimated_error": error}
-            notices += filter(None, [images.show(output, picture, settings, exposure).notice])
+            notices += filter(None, [images.write_exposed(output, picture, settings, exposure).notice])
     if not stopped:
         keeper.remove()
     if keeper.error:

@@ -92,7 +92,9 @@ def render_to_file(
         if stopped:
             settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
         seconds = time.perf_counter() - started
-        shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
+        shown = images.write_exposed(
+            prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure
+        )
         if not stopped:
             keeper.remove()
     failed = f"no checkpoint was written: {keeper.error.what}" if keeper.error else ""

@@ -15,7 +15,7 @@ from ..bridge import engine
 from ..errors import InputError, did_you_mean
 from ..pictures import denoise, images
 from ..scene import mitsuba_scene
-from ..scene.film import check_film
+from ..scene.film_size import check_film
 from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Renders
 from ..work import facts, garbage

@@ -13,7 +13,7 @@ from .. import files
 from ..errors import InputError
 from ..material import BSDF
 from ..pictures import denoise, exposures, images
-from ..scene.film import check_film
+from ..scene.film_size import check_film
 from .options import RenderOptions
 
 MAX_COUNT = 1 << 30  # samples per pixel, and path segments: kernels count them in 32 bits

@@ -19,7 +19,7 @@ from ..errors import InputError, did_you_mean
 from ..members import Family
 from ..pictures.images import SUFFIXES
 from .files import located
-from .film import check_film
+from .film_size import check_film
 from .materials import BY_TYPE, PLACEHOLDER, Material, any_material
 from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 

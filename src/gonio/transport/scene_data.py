@@ -125,7 +125,7 @@ class SceneData:
         return ray, weight, self.surfaces.nearest(ray, active, coherent=True)
 
     def begins_path(self, hit: Hit) -> Mask:
-        """Whether a camera ray that ends at `hit` begins a path."""
+        """Whether a camera ray that ends at `hit` begins a path: every one does, but in `foreground.py`."""
         return self.mi.Bool(True)
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:

@@ -1,4 +1,4 @@
-"""Sums of samples, per lane of a picture."""
+"""The film: sums of samples per pixel, which `Render.image` develops into a picture."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class PathState:
     """The state of a path, one per lane."""
 
     index: UInt  # of the sample
-    depth: UInt  # segments traced so far
+    depth: UInt  # vertices passed so far: 0 at the first hit
     ray: Ray  # the next segment, and
     hit: Hit  # its first intersection
     throughput: Radiance
@@ -112,20 +112,19 @@ class LightTransport(Integrator):
 
     def _path(self, index: UInt, ray: Ray, hit: Hit, weight: Radiance, active: Mask) -> PathState:
         mi = self.mi
-        depth, none, zero = mi.UInt32(0), mi.UInt32(0), mi.Float(0)
         return PathState(
-            index,
-            depth,
-            ray,
-            hit,
-            weight,
-            mi.Float(1),
-            zero,
-            mi.Float(0),
-            mi.Spectrum(0),
-            none,
-            self.camera_media,
-            mi.Bool(active),
+            index=index,
+            depth=mi.UInt32(0),
+            ray=ray,
+            hit=hit,
+            throughput=weight,
+            eta=mi.Float(1),
+            pdf=mi.Float(0),
+            solid_angle=mi.Float(0),
+            radiance=mi.Spectrum(0),
+            hero_only=mi.UInt32(0),
+            inside=self.camera_media,
+            active=mi.Bool(active),
         )
 
     def numbers(self, path: PathState, key: UInt) -> VertexNumbers:
@@ -145,8 +144,8 @@ class LightTransport(Integrator):
     # ------------------------------------------------------------------ the steps at a vertex
 
     def intersect(self, path: PathState) -> tuple[Vertex, Radiance]:
-        """The surface that the path's ray hits, and the path's throughput there after absorption by media on the
-        way."""
+        """The surface at the hit that `trace` or `camera_path` found, and the path's throughput there after absorption
+        by media on the way."""
         active, throughput, media = path.active, path.throughput, self.media
         si = self.data.surfaces.interaction(path.hit, path.ray, active)
         vertex = Vertex(si, si.bsdf(path.ray))
@@ -154,6 +153,7 @@ class LightTransport(Integrator):
             here = active & si.is_valid()
             throughput = dr.select(here, throughput * media.transmitted(path.inside, si, si.t), throughput)
             vertex.crossing = media.crossing(si, vertex.bsdf, path.inside, here)
+            # carries the index outside to the plugins of materials, which see nothing else of the media
             si.duv_dx = self.mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
         return vertex, throughput
 
@@ -174,7 +174,9 @@ class LightTransport(Integrator):
     def sample_bsdf(
         self, vertex: Vertex, light: LightSample | None, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-        """(BSDF times cosine toward the light, its pdf, a sampled direction, the weight of that).
+        """(BSDF times cosine toward the light, the pdf of that direction, a sampled direction, the weight of that).
+
+        One call of the BSDF gives them all where both are needed.
 
         Without a light the first two are 0; if only lights are sampled, the others are.
         """

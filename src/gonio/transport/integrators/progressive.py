@@ -1,4 +1,4 @@
-"""Progressive rendering.
+"""Progressive rendering: rounds of samples that are added to a film (`Sums`), and its development into a picture.
 
 Performance:
 

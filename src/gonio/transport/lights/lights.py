@@ -193,8 +193,8 @@ class Lights:
         return isinstance(self.lamps, RectangleLight)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
-        """The light along a ray, with its density as in `pdf`: one pair, or several if lights do not occlude one
-        another. Anything else that the ray may hit is ignored."""
+        """The light along a ray, with its density as in `pdf`: one pair, or several where lights do not occlude one
+        another, as in `foreground.py`. Anything else that the ray may hit is ignored."""
         if isinstance(self.lamps, RectangleLight):
             return [self.lamps.along(ray, solid_angle, active)]
         hit = self.surfaces.nearest(ray, active)
