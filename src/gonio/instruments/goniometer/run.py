@@ -186,15 +186,13 @@ def measure(
                  text, facets are smooth (alpha = 0) unless it sets alpha
     table        in .gonio files: angles, half-difference, adaptive, specular, samples
     theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, 0.006 for
-                 surfaces
+    solid_angle  of the detector, sr, over which values are averaged; None: 0.006 for surfaces, a point for materials
     noise        relative standard deviation of a reading
     blocked      degrees about the lamp where the detector cannot be placed. There, cells of MERL files are invalid and
                  samples are omitted; other tables hold the value at the rim
     bounces      for a surface: "all" light, that of the "first" bounce, or that of "later" bounces
     samples      rays per angle of incidence
-    patches      number of measured patches of a random surface, rounded up to a multiple of 8; the standard error
-                 includes their spread and that of the rays
+    patches      measured patches of a random surface, rounded up to a multiple of 8; errors include their spread
     seed         0 if None; the same seed gives the same values
     device       "cpu", "cuda" or "auto", for surfaces
     progress     called with the number of rays traced and their total
@@ -206,18 +204,15 @@ def measure(
     detector = Detector(solid_angle, noise, blocked, bounces)
     tracing = Tracing(samples, patches, 0 if seed is None else seed, device, progress)
     _check_numbers(detector, tracing)
-    path = None if output is None else Path(output)
     target = None if output is None else files.check_file(output)
+    path = None if output is None else Path(output)
     plan = Plan(path, table, grid_of(theta_i, theta_r, phi))
-    if surface is None:
-        specimen: Specimen = _model(material, detector)
-    elif material is None:
-        specimen = _rough(surface, facet, detector, tracing, plan)
-    else:
+    if surface is not None and material is not None:
         raise InputError("a material and a surface given", "MODEL", "name the material of the facets by --facet")
+    rough = None if surface is None else _rough(surface, facet, detector, tracing, plan)
+    specimen = rough or _model(material, detector)
     measured, hidden, notes = _filled(plan, specimen, detector, tracing.seed)
-    if target is not None:
-        notes += _written(measured, plan, target)
+    notes += [] if target is None else _written(measured, plan, target)
     return _readout(measured, specimen, path, "" if path is None else plan.file.name, hidden, notes, begun)
 
 
