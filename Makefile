@@ -71,7 +71,7 @@ test-all: .venv/installed browser lint
 GPU_TESTS := tests/render/test_integrators.py tests/render/test_adapter.py tests/render/test_run.py \
 	tests/render/test_checkpoints.py tests/render/test_lights.py
 test-gpu: .venv/installed
-	@$(BIN)/python -c 'import sys; from gonio.render import engine; sys.exit(not engine.cuda_available())' \
+	@$(BIN)/python -c 'import sys; from gonio.bridge import engine; sys.exit(not engine.cuda_available())' \
 	|| { echo "NO GPU: no NVIDIA driver with a device answers, so NOTHING WAS TESTED on CUDA" >&2; exit 1; }
 	GONIO_TEST_DEVICE=cuda $(BIN)/python -m pytest -m 'not slow' $(GPU_TESTS)
 

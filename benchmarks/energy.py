@@ -158,7 +158,9 @@ def sampling() -> None:
     ways = {
         "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).white,
         "normals, 1024 independent samples": lambda: (
-            monte_carlo.estimate("ggx", "smith-correlated", MU, ROUGHNESS**2, "ggx", 1024, "independent").value
+            monte_carlo.estimate(
+                "ggx", "smith-correlated", quadrature.Points(MU, ROUGHNESS**2), "ggx", 1024, "independent"
+            ).value
         ),
     }
     product = {}
@@ -173,7 +175,7 @@ def sampling() -> None:
     for masking in MASKINGS:
         truth = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).white
         for points in ("hammersley", "independent"):
-            found = monte_carlo.estimate("ggx", masking, MU, ROUGHNESS**2, "ggx", 1024, points)
+            found = monte_carlo.estimate("ggx", masking, quadrature.Points(MU, ROUGHNESS**2), "ggx", 1024, points)
             rms = np.sqrt(np.mean((found.value - truth)[part] ** 2))
             if points == "hammersley":
                 figure(

@@ -131,7 +131,7 @@ class Family(Generic[Member]):
         self._watchers[watcher] = None
 
     def remove(self, name: str) -> None:
-        """Undo `add`."""
+        """Remove a member that `add` added."""
         self._added.pop(name, None)
 
     def _announced(self, point: EntryPoint) -> None:

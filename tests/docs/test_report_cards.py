@@ -43,11 +43,11 @@ def test_every_verdict_on_a_plugin_has_a_grade_a_cause_and_a_program() -> None:
 def test_every_program_shows_its_fault_without_gonio() -> None:
     made = {line.split("Mitsuba ")[1].split(",")[0] for path in PROGRAMS for line in path.read_text().splitlines()[:1]}
     assert len(made) == 1
-    if made != {version("mitsuba")}:
-        pytest.skip(f"NOT TRIED: the programs are about Mitsuba {made.pop()}, here is {version('mitsuba')}")
     llvm.use()
     command = [sys.executable, "-c", RUN, *map(str, PROGRAMS)]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""}, timeout=300)
     assert done.returncode == 0, done.stderr
     ends = json.loads(done.stdout.splitlines()[-1])
-    assert {Path(p).name: end for p, end in ends.items() if not end.startswith("AssertionError: ")} == {}
+    mended = {Path(p).name: end for p, end in ends.items() if not end.startswith("AssertionError: ")}
+    about = f"the cards are about Mitsuba {made.pop()}, this is {version('mitsuba')}: run docs/make_report_cards.py"
+    assert mended == {}, about

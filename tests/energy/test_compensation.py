@@ -225,7 +225,9 @@ def test_walkers_that_leave_at_once_are_the_single_scattering_of_glass(eta, mu):
     _, left = walk.walk(bound, wo, None, rng, bound.alpha, True)
     once = np.asarray(left.bounces.numpy()) == 1
     same = np.asarray(left.w.z.numpy()) * mu > 0.0
-    power = quadrature.glass("ggx", "smith-correlated", "exact", abs(mu), 0.6, eta if mu > 0 else 1.0 / eta)
+    power = quadrature.glass(
+        "ggx", "smith-correlated", "exact", quadrature.Points(abs(mu), 0.6), eta if mu > 0 else 1.0 / eta
+    )
     for share, expected in ((once & same, power.reflected), (once & ~same, power.transmitted)):
         assert share.mean() == pytest.approx(float(expected), abs=4 * np.sqrt(0.25 / count) + 1e-3)
 

@@ -11,7 +11,7 @@ import pytest
 from gonio import cli
 from gonio.errors import InputError
 from gonio.instruments.goniometer.plan import axis_of, beside_lamp, between
-from gonio.instruments.goniometer.readings import SMALLEST, Rough, gathered, projected
+from gonio.instruments.goniometer.readings import SMALLEST, Rough, Tracing, gathered, projected
 from gonio.instruments.goniometer.run import DETECTOR, facet_of, surface_of
 from gonio.instruments.goniometer.specimen import Model
 from gonio.measure import compare, read
@@ -53,7 +53,7 @@ def test_a_turned_start_of_the_period_changes_nothing() -> None:
     heights = np.random.default_rng(4).standard_normal((24, 24))
     found = []
     for shift in (0, 11):
-        rough = Rough(_Map(np.roll(heights, shift, (0, 1))), go.Mirror(), DETECTOR, 1 << 16, 8, 1)
+        rough = Rough(_Map(np.roll(heights, shift, (0, 1))), go.Mirror(), DETECTOR, Tracing(1 << 16, 8, 1))
         rough.prepare(np.radians([80.0]))
         found.append(rough.first[0, 0])
     assert found[0] == pytest.approx(found[1], abs=5e-3)
@@ -298,7 +298,7 @@ def test_errors_of_another_shape_are_refused(tmp_path: Path) -> None:
 def test_few_angles_are_measured_each_and_many_on_a_grid() -> None:
     few = go.measure(surface=SMALL, theta_i=[7.0, 50.0], theta_r=[0.0, 30.0], phi=[0.0], samples=1024, solid_angle=0.05)
     assert few.incidence == pytest.approx((7.0, 50.0))
-    many = Rough(surface_of(SMALL), go.Mirror(), 0.05, 1024, 8, 1)
+    many = Rough(surface_of(SMALL), go.Mirror(), 0.05, Tracing(1024, 8, 1))
     many.prepare(np.linspace(0.0, 0.5 * np.pi, 1000))
     assert 10 < len(many.lights) < 20 and many.lights[-1] == pytest.approx(np.radians(89.0))
 
@@ -402,6 +402,6 @@ def test_facets_are_smooth_where_nothing_else_is_said() -> None:
 
 def test_the_smallest_detector_is_said() -> None:
     with pytest.raises(InputError, match="half angle") as caught:
-        Rough(surface_of(SMALL), go.Mirror(), 1e-7, 1000, 8, 1)
+        Rough(surface_of(SMALL), go.Mirror(), 1e-7, Tracing(1000, 8, 1))
     least = 2.0 * np.pi * (1.0 - np.cos(np.radians(SMALLEST)))
     assert f"{least:.2g}" in str(caught.value.hint)

@@ -115,7 +115,7 @@ def test_reciprocity_halves_a_table_of_angles() -> None:
     assert isinstance(again, angles.Angles)
     np.testing.assert_array_equal(again.values, table.values)
     one_way = angles.Angles(
-        table.theta_i, table.theta_r, table.phi, table.values * np.arange(1.0, 8.0)[:, None, None, None]
+        (table.theta_i, table.theta_r, table.phi), table.values * np.arange(1.0, 8.0)[:, None, None, None]
     )
     assert not one_way.reciprocal and one_way.arrays()["values"].shape == (7, 7, 5, 3)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,36 @@ from ..errors import InputError
 from ..files import check_file, write_whole
 from ..measure import names_table, read
 from ..work import parts
-from .data import GRAZING, data_of
+from .data import GRAZING, Data, data_of
 from .fit import Fit, fit, ranked
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings shared by all fits, as in `fit`; `metric` is its `loss`, `fixed` its `param`."""
+
+    lobes: int = 1
+    metric: str = "relative"
+    fixed: Mapping[str, object] = field(default_factory=dict)
+    free: tuple[str, ...] = ()
+    grazing: float = GRAZING
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """The part of a cache key that they determine."""
+        return (self.lobes, self.metric, tuple(sorted(self.fixed.items())), self.free, self.grazing)
+
+    def fit(self, cells: Data, model: str) -> Fit:
+        """The fit of a model to measured values."""
+        return fit(
+            cells,
+            model,
+            lobes=self.lobes,
+            loss=self.metric,
+            param=self.fixed,
+            free=self.free,
+            grazing=self.grazing,
+        )
 
 
 @dataclass(frozen=True)
@@ -65,18 +93,14 @@ def check_output(path: Path) -> Path:
 def run(
     files: Sequence[str],
     models: Sequence[str],
+    settings: Settings | None = None,
     *,
-    lobes: int = 1,
-    metric: str = "relative",
-    fixed: Mapping[str, object] | None = None,
-    free: tuple[str, ...] = (),
-    grazing: float = GRAZING,
     report: Callable[[int, int, str], None] = lambda done, total, text: None,
     notice: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
     """Fit each model to each file. An error is raised for a single file; with several files it goes into `failed`."""
-    given = dict(fixed or {})
-    how = (tuple(models), lobes, metric, tuple(sorted(given.items())), free, grazing)
+    settings = settings or Settings()
+    how = (tuple(models), *settings.key)
     job = parts.Parts("fit", how, tuple(files)) if len(files) > 1 else None
     if job is not None and job.found:
         notice(f"{job.found} of {len(files)} files were fitted before")
@@ -89,13 +113,8 @@ def run(
             rows.append(Row(file, tuple(json.loads(str(stored.facts["fits"])))))
             continue
         try:
-            cells = data_of(read(file), grazing, file)
-            fits = ranked(
-                [
-                    fit(cells, model, lobes=lobes, loss=metric, param=given, free=free, grazing=grazing)
-                    for model in models
-                ]
-            )
+            cells = data_of(read(file), settings.grazing, file)
+            fits = ranked([settings.fit(cells, model) for model in models])
         except InputError as error:
             if len(files) == 1:
                 raise

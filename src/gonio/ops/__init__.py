@@ -178,7 +178,7 @@ def fma(a: Value, b: Value, c: Value) -> Value:
 
 @function
 def sqr(x: T) -> T:
-    """x * x."""
+    """The square of x, as one product."""
     return x * x
 
 

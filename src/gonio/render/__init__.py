@@ -57,32 +57,43 @@ def render(
                    bit-identical results. None writes it beside the output if the render takes more than a minute
     until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
                    pixel (65,536 if None); warns if they did not suffice
-    gradient       paths of numbers and colors of materials; the result is then (1 + paths, height, width, 3): the
-                   picture and its derivative along each path. The path of a color means all three channels together,
-                   "....albedo.r" a single one. Equal materials are one material and change together
+    gradient       paths of numbers and colors of materials; the result is the picture and its derivative by each,
+                   (1 + paths, height, width, 3). "....albedo.r" is one channel of a color. Equal materials are one
     Warns (GonioWarning) of suspicious scenes, of a .png that clips, and when it continues from a checkpoint.
     Raises InputError, MachineError.
     """
-    from ..catalog import notation, operands
-    from ..material import BSDF
     from .request import Request
 
-    if not isinstance(scene, BSDF):
-        accepted = {operands.Kind.SCENE, *operands.MATERIALS}
-        if operands.kind_of(scene, accepted, "render: scene") is not operands.Kind.SCENE:
-            scene = notation.named(str(scene), allow_code=options.get("allow_code", False))[0]
+    path, material = _shown(scene, options.get("allow_code", False))
     request = Request(
-        Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
-        output=None if output is None else Path(output),
+        path,
+        output=_path(output),
         timeout=timeout,
         overrides=overrides or {},
-        material=scene if isinstance(scene, BSDF) else None,
-        checkpoint=None if checkpoint is None else Path(checkpoint),
+        material=material,
+        checkpoint=_path(checkpoint),
         until_error=until_error,
         gradient=tuple(gradient),
         **options,
     )
     return _picture(request, level=5)  # past the checks and the lock
+
+
+def _path(named: str | Path | None) -> Path | None:
+    return None if named is None else Path(named)
+
+
+def _shown(scene: str | Path | BSDF, allow_code: bool) -> tuple[Path, BSDF | None]:
+    """The path of a scene and None, or a material's name and the material, which may be given as text."""
+    from ..catalog import notation, operands
+    from ..material import BSDF
+
+    if not isinstance(scene, BSDF):
+        accepted = {operands.Kind.SCENE, *operands.MATERIALS}
+        if operands.kind_of(scene, accepted, "render: scene") is operands.Kind.SCENE:
+            return Path(scene), None
+        scene = notation.named(str(scene), allow_code=allow_code)[0]
+    return Path(scene.name), scene
 
 
 @public
@@ -110,7 +121,7 @@ def resume(
 
     change = Request(
         Path(),
-        output=None if output is None else Path(output),
+        output=_path(output),
         spp=spp,
         threads=threads,
         timeout=timeout,

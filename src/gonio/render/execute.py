@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..scene import mitsuba_scene
@@ -15,6 +16,9 @@ from ..work import executor
 from . import checkpoints
 from .checkpoints import Keeper
 from .prepare import Prepared
+
+if TYPE_CHECKING:
+    from . import tiles
 
 
 def of_scene(prepared: Prepared) -> AbstractContextManager[None]:
@@ -42,7 +46,6 @@ def execute(
     long       seconds from which a job counts as long; a minute if None
     tell       called at the start with a notice if a checkpoint was found
     """
-    from ..transport import integrators, until
     from . import tiles
 
     request, (width, height) = prepared.request, prepared.size
@@ -52,18 +55,7 @@ def execute(
         notice, unasked = checkpoints.earlier(path, prepared, unasked)
         if notice:
             tell(notice)
-    gathered = None
-    goal: int | Callable[[], int] = prepared.spp
-    if isinstance(prepared.render, until.Until):
-        drawing = prepared.render
-        goal = lambda: drawing.goal  # noqa: E731
-        if executor.current().remote:
-            what = "workers render parts of a picture, and its error is that of the whole"
-            raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif executor.current().remote and prepared.render.done < prepared.spp:
-        tiles.travelling(prepared)  # raises before anything is written
-        assert isinstance(prepared.render, integrators.Render)
-        gathered = tiles.Gathered(prepared.render, prepared.spp)
+    goal, gathered = _goal(prepared), _gathered(prepared)
     keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
 
     def after(progress: Progress) -> None:
@@ -90,6 +82,32 @@ def execute(
     finally:
         keeper.close()
     return stopped, keeper
+
+
+def _goal(prepared: Prepared) -> int | Callable[[], int]:
+    """Samples per pixel to reach: a number, or for a render until an error a function that knows it by then."""
+    from ..transport import until
+
+    render = prepared.render
+    if not isinstance(render, until.Until):
+        return prepared.spp
+    if executor.current().remote:
+        what = "workers render parts of a picture, and its error is that of the whole"
+        raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
+    return lambda: render.goal
+
+
+def _gathered(prepared: Prepared) -> tiles.Gathered | None:
+    """The sums of the parts that workers will compute; None if this process renders."""
+    from ..transport import integrators, until
+    from . import tiles
+
+    render = prepared.render
+    if isinstance(render, until.Until) or not executor.current().remote or render.done >= prepared.spp:
+        return None
+    tiles.travelling(prepared)  # raises before anything is written
+    assert isinstance(render, integrators.Render)
+    return tiles.Gathered(render, prepared.spp)
 
 
 def execute_all(

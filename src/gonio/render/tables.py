@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -80,52 +80,45 @@ def bake(
     """
     folder = None if output is None else files.check_folder(output)
     ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
+    axes = {"resolution": resolution, "layout": layout, "aspect": aspect, "azimuths": azimuths}
+    sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed}
+    picture = {"store": store, "flip": flip}
     if _is_picture(target, lut):
-        others: dict[str, object] = {"resolution": resolution, "method": method, "samples": samples}
-        others |= {
-            "sampler": sampler,
-            "seed": seed,
-            "layout": layout,
-            "aspect": aspect,
-            "azimuths": azimuths,
-            "store": store,
-            "flip": flip,
-        }
-        _check_default(others, "an environment takes --ndf, --levels and --masking")
+        _check_default({**axes, **sampling, **picture}, "an environment takes --ndf, --levels and --masking")
         return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
-    what = _target(target)
-    tables = tuple(lut) if lut else None
-    homework = layout == "homework"
-    if homework:
-        tables = tables or ("E", "Eavg")
-        if not isinstance(what, str) or aspect not in (None, 1.0):
-            problem = "a material, or two widths, in the homework's layout"
-            raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
-        if "glass" in tables:
-            hint = "give E, Eavg or dfg, or another layout"
-            raise InputError("table 'glass' in the homework's layout, which has no picture of it", "--lut", hint)
-    baked = baking.cached(
-        what,
-        lut=tables,
-        size=resolution,
-        method=method,
-        masking=masking,
-        spp=samples,
-        points=sampler,
-        seed=0 if seed is None else seed,
-        layout="linear" if homework else layout,
-        aspect=aspect,
-        azimuths=azimuths,
-    )
-    if folder is None:
-        return baked
-    if homework:
+    options = {"masking": masking, **axes, **sampling}
+    if layout == "homework":
+        return _homework(_target(target), folder, lut, options, store, flip)
+    baked = _baked(_target(target), lut, options)
+    if folder is not None:
+        _write(baked, folder, _pictures(baked))
+    return baked
+
+
+def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, Any]) -> Baked:
+    """The tables, by the options of `bake`."""
+    names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy.tables.bake`
+    given = {names.get(name, name): value for name, value in options.items()}
+    return baking.cached(target, lut=tuple(lut) if lut else None, **{**given, "seed": given["seed"] or 0})
+
+
+def _homework(
+    target: str | BSDF, folder: Path | None, lut: Sequence[str] | None, options: Mapping[str, Any], store: str,
+    flip: bool,
+) -> Baked:  # fmt: skip
+    """Tables with linear axes, and the homework's pictures of them, written if a folder is given."""
+    if not isinstance(target, str) or options["aspect"] not in (None, 1.0):
+        problem = "a material, or two widths, in the homework's layout"
+        raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
+    if "glass" in (lut or ()):
+        hint = "give E, Eavg or dfg, or another layout"
+        raise InputError("table 'glass' in the homework's layout, which has no picture of it", "--lut", hint)
+    baked = _baked(target, lut or ("E", "Eavg"), {**options, "layout": "linear"})
+    if folder is not None:
         contents = {f"{name}.png": images.png_bytes(p) for name, p in homework_pictures(baked, store, flip).items()}
         baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
-    else:
-        contents = _pictures(baked)
-    _write(baked, folder, contents)
+        _write(baked, folder, contents)
     return baked
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import drjit as dr
 import numpy as np
 
@@ -24,6 +26,22 @@ MAX_BITS = 58  # of one splat; a larger one is skipped and counted as invalid
 DITHER = 0xD1B54A32
 NEAREST = 1e-2  # fraction of the scene's size: distance to a point light at which its brightness is bounded
 AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection from the lamp itself
+
+
+class Splat(NamedTuple):
+    """Light that reaches the camera from a point of the scene.
+
+    uv     position on the film, pixels
+    value  radiance
+    si     the point that it comes from
+    eye    the point that must be visible from there; None for infinity, in the direction `away`
+    """
+
+    uv: Point
+    value: Radiance
+    si: SurfaceInteraction
+    eye: Point | None
+    away: Vector | None = None
 
 
 class SplatCamera:
@@ -83,7 +101,7 @@ class SplatCamera:
             ds, importance = self.sample_direction(key, low, AT_LAMP, si, here)
             si.wi = si.to_local(ds.d)
             value = particle.emitter.eval(si, here) * particle.direct_weight * importance * abs(si.wi.z)
-            invalid += self.splat(key, low, sums, ds.uv, value, si, ds.p, here)
+            invalid += self.splat(key, low, sums, Splat(ds.uv, value, si, ds.p), here)
         if INFINITE in self.particles.sources.known:
             si, here = dr.zeros(mi.SurfaceInteraction3f), particle.kind == INFINITE
             si.p = self.eye - particle.direction * self.far
@@ -91,7 +109,7 @@ class SplatCamera:
             ds, importance = self.sample_direction(key, low, AT_LAMP, si, here)
             value = particle.direct_weight * importance * dr.square(ds.dist)
             si.p = ds.p  # the shadow ray runs from the camera to infinity
-            invalid += self.splat(key, low, sums, ds.uv, value, si, None, here, -ds.d)
+            invalid += self.splat(key, low, sums, Splat(ds.uv, value, si, None, -ds.d), here)
         return invalid
 
     def sample_direction(
@@ -103,39 +121,26 @@ class SplatCamera:
             lens = self.mi.Point2f(*self.data.pair(key, low, dimension + LENS))
         return camera_sample(self.sensor, si, lens, active)
 
-    def splat(
-        self,
-        key: UInt,
-        low: UInt,
-        sums: Sums,
-        uv: Point,
-        value: Radiance,
-        si: SurfaceInteraction,
-        eye: Point | None,
-        active: Mask,
-        away: Vector | None = None,
-    ) -> UInt:
-        """Add light to the pixel at `uv`; returns 1 where its value is not finite.
-
-        eye   the point that must be visible from `si`; None for infinity, in the direction `away`
-        """
-        mi = self.mi
-        x, y = mi.Int32(dr.floor(uv.x)), mi.Int32(dr.floor(uv.y))
+    def splat(self, key: UInt, low: UInt, sums: Sums, light: Splat, active: Mask) -> UInt:
+        """Add light to its pixel; returns 1 where its value is not finite."""
+        mi, si, eye = self.mi, light.si, light.eye
+        x, y = mi.Int32(dr.floor(light.uv.x)), mi.Int32(dr.floor(light.uv.y))
         active = active & (x >= 0) & (y >= 0) & (x < mi.Int32(self.width)) & (y < mi.Int32(self.height))
-        active &= dr.any(value != 0)
+        active &= dr.any(light.value != 0)
         near, far = self.clips
         if eye is not None:
             depth = dr.dot(si.p - eye, self.ahead)
             active &= (depth >= near) & (depth <= far)
             active = self.data.visible(si, eye + (si.p - eye) * (near / depth), active)
         else:
-            ahead = dr.maximum(dr.dot(away, self.ahead), 1e-6)
-            ray = mi.Ray3f(si.p + away * (near / ahead), away)
+            assert light.away is not None, "given without an eye"
+            ahead = dr.maximum(dr.dot(light.away, self.ahead), 1e-6)
+            ray = mi.Ray3f(si.p + light.away * (near / ahead), light.away)
             ray.maxt = (far - near) / ahead
             active &= ~self.data.surfaces.blocked(ray, active)
         place = mi.UInt32(y) * self.width + mi.UInt32(x)
         dither = mi.Float64(sampler.independent_pair(key, low, place ^ DITHER)[0])
-        color = [mi.Float64(v) * self.per_unit for v in self.data.rgb(value, si.wavelengths)]
+        color = [mi.Float64(v) * self.per_unit for v in self.data.rgb(light.value, si.wavelengths)]
         countable = abs(color[0]) + abs(color[1]) + abs(color[2]) < 2.0**MAX_BITS  # False for NaN as well
         for target, v in zip(sums.splats, color, strict=True):
             dr.scatter_add(target, mi.Int64(dr.floor(v + dither)), place, active & countable)

@@ -79,11 +79,9 @@ def verify(
     seed = DEFAULT_SEED if seed is None else seed
     if seed < 0:
         raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
-    if quick and deep:
-        raise InputError("quick and deep together", "--quick", "give one of them")
+    effort = _effort(quick, deep)
     outputs = Outputs(output, junit, sarif, baseline, write_baseline)
     known = outputs.check()
-    effort = "quick" if quick else "deep" if deep else "default"
     names = None if law is None else [law] if isinstance(law, str) else list(law)
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
     if isolated or (isolated is None and _isolable(all_)):
@@ -97,6 +95,13 @@ def verify(
         result = _here(_subjects(all_, vary), chosen(names), effort, seed, progress)
     outputs.write(result, known)
     return result
+
+
+def _effort(quick: bool, deep: bool) -> str:
+    """The key of `EFFORTS`."""
+    if quick and deep:
+        raise InputError("quick and deep together", "--quick", "give one of them")
+    return "quick" if quick else "deep" if deep else "default"
 
 
 def _isolable(targets: list[Target]) -> bool:

@@ -31,7 +31,7 @@ class Conversion:
     facts: dict[str, object] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return {"output": str(self.output), **self.facts}
 
     def __str__(self) -> str:

@@ -108,7 +108,7 @@ class Application:
             session.send_from_thread(message)
 
     async def show(self, request: Request) -> Response:
-        """The page."""
+        """The HTML of the page."""
         refusal = self.access.refusal(request.headers, request.scope["query_string"], needs_origin=False)
         if refusal:
             return PlainTextResponse(f"{refusal}: open the address that gonio view printed\n", 403, HEADERS)

@@ -85,11 +85,7 @@ def fit(
         rows = batch.run(
             files,
             how.models(what.model or ()) or ["lambert+ggx"],
-            lobes=what.lobes,
-            metric=what.loss,
-            fixed=how.fixed(),
-            free=tuple(how.free or ()),
-            grazing=how.grazing,
+            batch.Settings(what.lobes, what.loss, how.fixed(), tuple(how.free or ()), how.grazing),
             report=lambda done, total, text: bar.step(done, total, text),
             notice=bar.tell,
         )

@@ -145,17 +145,15 @@ def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> N
             * (mu > 0.0)[:, None]
         )
     index = float(surface.eta)  # type: ignore[arg-type]
+    # for o below the surface the facets are rotated by 180 degrees: the azimuth of -o
+    azimuth = np.where(mu < 0.0, phi + np.pi, phi) - turn
     power = quadrature.glass(
         surface.ndf,
         surface.masking,
         surface.fresnel,
-        np.abs(mu),
-        x,
+        quadrature.Points(np.abs(mu), x, None if x == y else y, azimuth),
         np.where(mu >= 0.0, index, 1.0 / index),
-        None if x == y else y,
-        # for o below the surface the facets are rotated by 180 degrees: the azimuth of -o
-        np.where(mu < 0.0, phi + np.pi, phi) - turn,
-        nodes=quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES,
+        quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES,
     )
     total = power.reflected + (power.transmitted if surface.transmits else 0.0)
     return total[:, None] * np.broadcast_to(np.asarray(surface.albedo, float), 3)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ... import ops
 from ...errors import InputError, did_you_mean
@@ -19,7 +18,7 @@ from ...ops import Precision, backend
 from ...ops.backend import Array
 from ...optics import frame, masking, warp
 from ...optics.ndf import NDF, distribution
-from .quadrature import known_masking
+from .quadrature import Points, known_masking
 
 POINTS = ("hammersley", "independent")
 
@@ -51,19 +50,15 @@ def methods(ndf: str) -> tuple[str, ...]:
 def estimate(
     ndf: str,
     masking_name: str,
-    mu: ArrayLike,
-    alpha: ArrayLike,
+    at: Points,
     method: str,
     spp: int = 1024,
     points: str = "hammersley",
     seed: int = 0,
     precision: Precision = "float32",
-    alpha_y: ArrayLike | None = None,
-    phi: ArrayLike = 0.0,
 ) -> Estimate:
-    """E at each (mu, alpha) from `spp` samples.
+    """E at each point from `spp` samples.
 
-    alpha_y, phi  the width along y, if different, and the azimuth of wo
     points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each
     Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
     """
@@ -71,7 +66,7 @@ def estimate(
     _check(ndf, method, points, spp)
     dr = backend.drjit()
     kind = backend.types(precision)
-    given = (mu, alpha, alpha if alpha_y is None else alpha_y, phi)
+    given = (at.mu, at.alpha, at.alpha if at.alpha_y is None else at.alpha_y, at.phi)
     arrays = np.broadcast_arrays(*[np.asarray(a, float) for a in given])
     shape, count = arrays[0].shape, arrays[0].size
     mu_, along_x, along_y, turn = [backend.float_of(a.ravel(), kind) for a in arrays]

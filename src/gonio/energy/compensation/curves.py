@@ -27,7 +27,7 @@ from ...ops import Direction, Pair, Scalar, Table, sqr, sqrt
 from ...ops.backend import Array
 from ...optics.special import gauss
 from .. import cache
-from ..albedo import quadrature
+from ..albedo import normals, quadrature
 from ..bend import DEGREE, Form, cosine, descent, form_of, numpy_knee, numpy_rise
 
 ROWS = 129  # roughness 0 to 1; linear interpolation between them has an error of 3e-5
@@ -92,7 +92,7 @@ def isotropic(ndf: str, masking: str) -> Table:
     """Coefficients over roughness (ROWS, CHANNELS) of a distribution and masking."""
 
     def build() -> np.ndarray:
-        alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+        alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, normals.SMALLEST_ALPHA)
         form = form_of(ndf, masking)
         return fit(
             form,
@@ -107,7 +107,7 @@ def isotropic(ndf: str, masking: str) -> Table:
 @cache.of_members
 def lobe(ndf: str, masking: str) -> Table:
     """mu^2 over (roughness, u): the inverse distribution function of the lobe proportional to M mu."""
-    alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+    alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, normals.SMALLEST_ALPHA)
     form = form_of(ndf, masking)
     bend = numpy_knee(form, masking, alpha)
     inverse = _inverse(form, isotropic(ndf, masking).values[:, :-1], bend, LOBE_NODES)
@@ -133,7 +133,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
     def build() -> np.ndarray:
         form = form_of(ndf, masking)
-        floor = np.sqrt(quadrature.SMALLEST_ALPHA)
+        floor = np.sqrt(normals.SMALLEST_ALPHA)
         aspect = np.maximum(np.linspace(0.0, 1.0, ASPECTS), 0.02)
         larger = np.maximum(np.linspace(0.0, 1.0, ASPECT_ROWS), floor) ** 2
         big = np.tile(larger, ASPECTS)
@@ -191,7 +191,7 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its less dense and denser side."""
 
     def build() -> np.ndarray:
-        alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+        alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
         roots = np.linspace(0.0, 1.0, GLASS_ETAS) ** 2 * MAX_ROOT
         eta = np.maximum((1.0 + roots) / (1.0 - roots), 1.0 + 1e-4)
         alphas, etas = np.tile(alpha, GLASS_ETAS), np.repeat(eta, GLASS_ROWS)
@@ -200,7 +200,7 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
             form = form_of(ndf, masking, side)
 
             def missing(mu: np.ndarray, ratio: np.ndarray = ratio) -> np.ndarray:
-                power = quadrature.glass(ndf, masking, fresnel, mu, alphas[:, None], ratio[:, None])
+                power = quadrature.glass(ndf, masking, fresnel, quadrature.Points(mu, alphas[:, None]), ratio[:, None])
                 return 1.0 - power.reflected - power.transmitted
 
             sides.append(fit(form, numpy_knee(form, masking, alphas), missing, nodes=36))
@@ -242,7 +242,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 
     def build() -> np.ndarray:
         tables = glass(ndf, masking, fresnel)
-        larger = np.maximum(np.linspace(0.0, 1.0, ASPECT_ROWS) ** 2, quadrature.SMALLEST_ALPHA)[None, :, None]
+        larger = np.maximum(np.linspace(0.0, 1.0, ASPECT_ROWS) ** 2, normals.SMALLEST_ALPHA)[None, :, None]
         smaller = np.maximum(np.linspace(0.0, 1.0, ASPECTS) ** 2, 0.02**2)[:, None, None] * larger
         node, weight = gauss(16)
         mu = (node**2)[None, None, :]
@@ -278,7 +278,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 @cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     """`lobe` over (the root of sqrt(F0), roughness, u), for either side."""
-    alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+    alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
         form = form_of(ndf, masking, side)

@@ -12,25 +12,17 @@ so a quarter turn suffices, and mirroring at its ends is exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...optics.masking import term
 from ...optics.ndf import distribution
 from .. import bend
-from ..albedo import quadrature
+from ..albedo import normals
+from ..albedo.quadrature import Points
 
 LAYOUTS = ("linear", "stretched")
-
-
-class Points(NamedTuple):
-    """Points at which E is evaluated, in the form of `quadrature.moments`."""
-
-    mu: np.ndarray
-    alpha: np.ndarray
-    alpha_y: np.ndarray | None
-    phi: Any
 
 
 @dataclass(frozen=True)
@@ -69,7 +61,7 @@ class Axes:
         return Points(*np.broadcast_arrays(self.mu(index[-1], roughness, phi), *self.widths(roughness), phi))
 
     def nodes(self) -> Points:
-        """Every node."""
+        """All nodes of the table, in the shape of its axes."""
         return self.at(*np.ix_(*map(np.arange, self.shape)))
 
     def roughness(self, index: Any) -> np.ndarray:
@@ -132,5 +124,5 @@ def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
     """The cosine at a position x in [0, 1] of the stretched axis for a width."""
     form, _ = stretch(ndf, masking)
-    knee = bend.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
+    knee = bend.numpy_knee(form, masking, np.maximum(alpha, normals.SMALLEST_ALPHA))
     return bend.cosine(form, x, knee)

@@ -243,9 +243,7 @@ def _directional(
         judge = asked.exact(axes.at(*here), fine=True)
         return exact, {name: _figures(exact[name][here] - judge[name]) for name in exact}
     at = axes.nodes()
-    estimate = monte_carlo.estimate(
-        axes.ndf, axes.masking, at.mu, at.alpha, method, spp, points, seed, alpha_y=at.alpha_y, phi=at.phi
-    ).value
+    estimate = monte_carlo.estimate(axes.ndf, axes.masking, at, method, spp, points, seed).value
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 

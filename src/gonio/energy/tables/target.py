@@ -11,7 +11,8 @@ from ...ops import backend
 from ...work import executor, parts
 from .. import cache
 from ..albedo import quadrature
-from .axes import Axes, Points
+from ..albedo.quadrature import Points
+from .axes import Axes
 
 BLOCK = 1024  # points per part: about 0.1 s, and 1 s with the reference quadrature
 
@@ -34,19 +35,18 @@ class Target:
 
     def at(self, points: Points, fine: bool) -> dict[str, np.ndarray]:
         """`exact` in a single part."""
-        shape = {"mu": points.mu, "alpha": points.alpha, "alpha_y": points.alpha_y, "phi": points.phi}
         judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
         nodes = judge if fine else None
         if self.model is None:
-            moments = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
+            moments = quadrature.moments(self.ndf, self.masking, *points, nodes=nodes)
             return {"E": moments.white, "dfg": np.stack([moments.white - moments.schlick, moments.schlick], -1)}
         surface = self.model.microsurface
         if surface.eta is None:
             reflectance = self.model.bind(backend.types("float64")).reflectance
-            return {"E": quadrature.reflected(self.ndf, self.masking, reflectance, **shape, nodes=nodes)}
+            return {"E": quadrature.reflected(self.ndf, self.masking, reflectance, *points, nodes=nodes)}
         glass_nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
         eta, fresnel = float(surface.eta), surface.fresnel
-        power = quadrature.glass(self.ndf, self.masking, fresnel, eta=eta, nodes=glass_nodes, **shape)
+        power = quadrature.glass(self.ndf, self.masking, fresnel, points, eta, glass_nodes)
         total = power.reflected + (power.transmitted if surface.transmits else 0.0)
         return {"E": total[..., None] * np.broadcast_to(np.asarray(surface.albedo, float), 3)}
 
@@ -89,7 +89,7 @@ def glass_power(
 ) -> dict[str, np.ndarray]:
     """One part of `_glass`: reflected and transmitted power."""
     nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-    return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, mu, alpha, eta, nodes=nodes), -1)}
+    return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, Points(mu, alpha), eta, nodes), -1)}
 
 
 def together(function: executor.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:

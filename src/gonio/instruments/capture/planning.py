@@ -46,7 +46,7 @@ class Proposal:
     errors: Floats
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """Dictionary for JSON."""
         errors = {name: float(error) for name, error in zip(self.names, self.errors, strict=True)}
         return {"position": list(self.position), "angle": self.angle, "errors": errors}
 

@@ -55,7 +55,7 @@ class Plan:
             wo, wi = angles.pairs(*self._grid)
             f = source.rgb(wo, wi) / wi[:, 2:]
             if self.kind == "angles":
-                return Angles(*self._grid, f.reshape(*map(len, self._grid), 3), **about)
+                return Angles(self._grid, f.reshape(*map(len, self._grid), 3), **about)
             i, r, p = (a.ravel() for a in np.meshgrid(*self._grid, indexing="ij"))
             return Samples(np.stack([i, 0.0 * i, r, p], -1), f, **about)
         if self.kind == "angles":

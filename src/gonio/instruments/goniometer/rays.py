@@ -72,6 +72,27 @@ class Left(NamedTuple):
     lost: Kernel
 
 
+class Box(NamedTuple):
+    """One period of a patch in the kernel: its half extents, the height of its top, and the offset from facets."""
+
+    half_x: Kernel
+    half_y: Kernel
+    top: Kernel
+    offset: Kernel
+
+
+class State(NamedTuple):
+    """A ray on its way: position, direction, throughput, facets hit, steps taken, one of the states above."""
+
+    place: Kernel
+    along: Kernel
+    weight: Kernel
+    bounces: Kernel
+    steps: Kernel
+    state: Kernel
+    rng: Kernel
+
+
 def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> Left:
     """Trace rays from above the surface until they leave.
 
@@ -87,55 +108,59 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     u, v = _positions(number, each, rng)
     turn = rng.next_float32()
     cos = dr.gather(mi.Float, cosines, angle)
-    half_x, half_y, top, offset = (
-        dr.opaque(mi.Float, x) for x in (0.5 * on.size[0], 0.5 * on.size[1], on.top, on.offset)
-    )
+    box = Box(*(dr.opaque(mi.Float, x) for x in (0.5 * on.size[0], 0.5 * on.size[1], on.top, on.offset)))
     sin_phi, cos_phi = dr.sincos(2.0 * dr.pi * turn)
     sin = dr.safe_sqrt(1.0 - dr.square(cos))
-    place = mi.Point3f((2.0 * u - 1.0) * half_x, (2.0 * v - 1.0) * half_y, top)
+    place = mi.Point3f((2.0 * u - 1.0) * box.half_x, (2.0 * v - 1.0) * box.half_y, box.top)
     along = mi.Vector3f(-sin * cos_phi, -sin * sin_phi, -cos)
-
-    def step(
-        place: Kernel, along: Kernel, weight: Kernel, bounces: Kernel, steps: Kernel, state: Kernel, rng: Kernel
-    ) -> tuple[Kernel, ...]:
-        # before a facet, a ray may reach a boundary of the period or the top
-        wall_x, wall_y = _boundary(place.x, along.x, half_x), _boundary(place.y, along.y, half_y)
-        wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
-        roof = dr.select(along.z > 0.0, (top - place.z) / along.z, dr.inf)
-        ray = mi.Ray3f(place, along)
-        ray.maxt = dr.minimum(wall, roof)
-        hit = on.scene.ray_intersect_preliminary(ray, False, True)
-        is_hit = hit.is_valid()
-        away = ~is_hit & (roof <= wall)
-        through = ~is_hit & ~away
-        # scattering at the facet
-        si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, is_hit)
-        frame = mi.Frame3f(si.n)
-        back = frame.to_local(-along)
-        u = mi.Point3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
-        drawn = facet.sample(back, u)
-        onward = mi.Vector3f(drawn.wi)
-        behind = is_hit & (back.z <= 0.0)
-        on_front = is_hit & ~behind
-        dark = on_front & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
-        weight = dr.select(on_front, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
-        bounces = dr.select(on_front, bounces + 1, bounces)
-        along_next = dr.select(on_front, dr.normalize(frame.to_world(onward)), along)
-        # a ray that crosses a boundary enters on the opposite side
-        beyond = _wrapped(place + along * wall, along, wall_x <= wall_y, half_x, half_y)
-        place = dr.select(on_front, si.p + si.n * offset, dr.select(through, beyond, place))
-        steps = steps + 1
-        over = (bounces >= MAX_BOUNCES) | (steps >= MAX_STEPS)
-        state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
-        return place, along_next, weight, bounces, steps, mi.UInt32(state), rng
-
-    start = (place, along, mi.Color3f(1.0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(UNDERWAY), rng)
-    labels = ("place", "along", "weight", "bounces", "steps", "state", "rng")
-    _, along, weight, bounces, _, state, _ = dr.while_loop(
-        start, lambda *now: now[5] == UNDERWAY, step, labels=labels, label="goniometer"
+    start = State(place, along, mi.Color3f(1.0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(UNDERWAY), rng)
+    left = State(
+        *dr.while_loop(
+            tuple(start),
+            lambda *now: now[5] == UNDERWAY,
+            lambda *now: tuple(_step(on.scene, facet, box, State(*now))),
+            labels=State._fields,
+            label="goniometer",
+        )
     )
+    along = left.along
     direction = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
-    return Left(angle, direction, weight, bounces, state == AWAY, state == LOST)
+    return Left(angle, direction, left.weight, left.bounces, left.state == AWAY, left.state == LOST)
+
+
+def _step(scene: Scene, facet: BSDF, box: Box, now: State) -> State:
+    """The ray at the next facet, on the opposite side of the period, or above the top."""
+    mi = engine.load()
+    place, along, weight, bounces, steps, state, rng = now
+    # before a facet, a ray may reach a boundary of the period or the top
+    wall_x, wall_y = _boundary(place.x, along.x, box.half_x), _boundary(place.y, along.y, box.half_y)
+    wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
+    roof = dr.select(along.z > 0.0, (box.top - place.z) / along.z, dr.inf)
+    ray = mi.Ray3f(place, along)
+    ray.maxt = dr.minimum(wall, roof)
+    hit = scene.ray_intersect_preliminary(ray, False, True)
+    is_hit = hit.is_valid()
+    away = ~is_hit & (roof <= wall)
+    through = ~is_hit & ~away
+    # scattering at the facet
+    si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, is_hit)
+    frame = mi.Frame3f(si.n)
+    back = frame.to_local(-along)
+    drawn = facet.sample(back, mi.Point3f(rng.next_float32(), rng.next_float32(), rng.next_float32()))
+    onward = mi.Vector3f(drawn.wi)
+    behind = is_hit & (back.z <= 0.0)
+    on_front = is_hit & ~behind
+    dark = on_front & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
+    weight = dr.select(on_front, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
+    bounces = dr.select(on_front, bounces + 1, bounces)
+    along_next = dr.select(on_front, dr.normalize(frame.to_world(onward)), along)
+    # a ray that crosses a boundary enters on the opposite side
+    beyond = _wrapped(place + along * wall, along, wall_x <= wall_y, box.half_x, box.half_y)
+    place = dr.select(on_front, si.p + si.n * box.offset, dr.select(through, beyond, place))
+    steps = steps + 1
+    over = (bounces >= MAX_BOUNCES) | (steps >= MAX_STEPS)
+    state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
+    return State(place, along_next, weight, bounces, steps, mi.UInt32(state), rng)
 
 
 def _positions(number: Kernel, each: int, rng: Kernel) -> tuple[Kernel, Kernel]:

@@ -10,6 +10,7 @@ horizon, so f is an average over them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,23 @@ MAX_RAYS = 1 << 24  # rays per patch and angle that a float32 sum can hold
 MAX_BYTES = 4 << 30  # memory limit of the maps
 
 
+@dataclass(frozen=True)
+class Tracing:
+    """How many rays are traced, and where.
+
+    samples   rays per angle of incidence, over all patches
+    patches   measured patches of a random surface; rounded up to a multiple of `GROUPS`
+    device    "cpu", "cuda" or "auto"
+    progress  called with the number of rays traced and their total
+    """
+
+    samples: int
+    patches: int
+    seed: int
+    device: str = "cpu"
+    progress: Callable[[int, int], None] | None = None
+
+
 class Rough(Specimen):
     """A surface of facets, measured with rays. The attributes are set by `prepare`.
 
@@ -42,27 +60,18 @@ class Rough(Specimen):
     """
 
     def __init__(
-        self,
-        surface: Surface,
-        facet: BSDF,
-        solid_angle: float,
-        rays_each: int,
-        patches: int,
-        seed: int,
-        device: str = "cpu",
-        progress: Callable[[int, int], None] | None = None,
-        facet_name: str = "",
+        self, surface: Surface, facet: BSDF, solid_angle: float, tracing: Tracing, facet_name: str = ""
     ) -> None:
-        """rays_each: rays per angle of incidence over all patches; patches: rounded up to a multiple of `GROUPS`."""
+        """solid_angle: of the detector, sr; facet_name: of the facets' material in the title."""
         check_facet(facet)
-        self.surface, self.facet, self.seed, self.device = surface, facet, seed, device
+        self.surface, self.facet, self.seed, self.device = surface, facet, tracing.seed, tracing.device
         self.half_angle = half_angle(solid_angle)
         if not np.radians(SMALLEST) <= self.half_angle:
             what = f"{solid_angle:.3g} sr, a half angle of {np.degrees(self.half_angle):.2g} degrees"
             least = 2.0 * np.pi * (1.0 - np.cos(np.radians(SMALLEST)))
             raise InputError(f"the detector has {what}", "--solid-angle", f"give {least:.2g} sr or more")
-        self.rays_each, self.patches = rays_each, -(-patches // GROUPS) * GROUPS
-        self._progress = progress or (lambda done, total: None)
+        self.samples, self.patches = tracing.samples, -(-tracing.patches // GROUPS) * GROUPS
+        self._progress = tracing.progress or (lambda done, total: None)
         self.side = int(np.ceil(SQUARES * np.sqrt(2.0) / self.half_angle))  # squares along the radius of the disk
         self.title = f"{surface} of {facet_name or written(facet)}"
         self.about = {
@@ -71,9 +80,9 @@ class Rough(Specimen):
             "surface": str(surface),
             "facet": written(facet),
             "detector": f"{solid_angle:g} sr",
-            "rays": f"{rays_each} for each angle of incidence",
+            "rays": f"{self.samples} for each angle of incidence",
             "patches": str(self.patches),
-            "seed": str(seed),
+            "seed": str(self.seed),
         }
         self.sent = 0
 
@@ -93,7 +102,7 @@ class Rough(Specimen):
         import drjit as dr
 
         facet = rays.bound(self.facet)
-        each = max(self.rays_each // self.patches, 1)
+        each = max(self.samples // self.patches, 1)
         channels = 1 if is_gray(self.facet) else 3
         lights, squares = len(self.lights), 2 * self.side * self.side
         total, size = lights * each, 2 * lights * channels * squares

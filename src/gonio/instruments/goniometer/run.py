@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...owner import public
 from ..surfaces import base as surfaces
 from ..surfaces.base import Surface
 from .plan import Plan, beside_lamp, grid_of, without
-from .readings import Rough
+from .readings import Rough, Tracing
 from .specimen import BOUNCES, GROUPS, Model, Specimen
 
 Floats = NDArray[np.float64]
@@ -31,8 +31,34 @@ MAX_BLOCKED = 60.0  # degrees
 
 
 @dataclass(frozen=True)
+class Detector:
+    """What a detector reads, by the arguments of `measure`.
+
+    solid_angle  its opening, sr; None for the default of the specimen
+    noise        relative standard deviation of a reading
+    blocked      degrees about the lamp where it cannot be placed
+    bounces      the light that it collects, a key of `BOUNCES`
+    """
+
+    solid_angle: float | None
+    noise: float
+    blocked: float
+    bounces: str
+
+    @property
+    def blocked_angle(self) -> float:
+        """`blocked` in radians."""
+        return float(np.radians(self.blocked))
+
+
+@dataclass(frozen=True)
 class Readout:
     """Result of a measurement.
+
+    f is the light that arrives in the cone of the detector, over the projected solid angle of the cone above the
+    horizon. If a format has few angles of incidence, each is measured; otherwise a grid with the spacing of the
+    detector's half angle, up to 89 degrees, is measured and interpolated linearly. The sample rotates, so the result is
+    isotropic.
 
     table      the values; `table.beside` holds their standard errors ("error") and, for a surface, the part reflected
                by one facet only ("first")
@@ -77,40 +103,40 @@ class _Pass(Measurement):
     def __init__(
         self,
         specimen: Specimen,
-        bounces: str,
-        blocked: float,
-        noise: float,
+        detector: Detector,
         seed: int,
         part: int | None = None,
         known: dict[int, Floats] | None = None,
     ) -> None:
         """known: noise-free f by number of the query, for queries whose results are the same in all parts."""
         super().__init__(specimen.title, specimen.about)
-        self._specimen, self._bounces, self._blocked, self._noise, self._seed = specimen, bounces, blocked, noise, seed
+        self._specimen, self._detector, self._seed = specimen, detector, seed
         self._part, self._known = part, {} if known is None else known
         self._asked = 0
 
     def part(self, part: int) -> _Pass:
         """The same queries, to one part of the measurement."""
-        made = self._specimen, self._bounces, self._blocked, self._noise, self._seed
-        return _Pass(*made, part, self._known)
+        return _Pass(self._specimen, self._detector, self._seed, part, self._known)
 
     def first(self) -> _Pass:
         """The same queries for the first bounce only, without noise."""
-        return _Pass(self._specimen, "first", self._blocked, 0.0, self._seed, None, self._known)
+        return _Pass(self._specimen, replace(self._detector, noise=0.0, bounces="first"), self._seed, None, self._known)
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
         self._asked += 1
         f = self._known.get(self._asked)
         if f is None:
-            f = self._specimen.f(beside_lamp(wo, wi, self._blocked), wi, self._part, self._bounces)
+            away = beside_lamp(wo, wi, self._detector.blocked_angle)
+            f = self._specimen.f(away, wi, self._part, self._detector.bounces)
             if self._specimen.exact or wo is wi:
                 self._known[self._asked] = f
-        if self._noise > 0.0:
+        if self._detector.noise > 0.0:
             # adaptive tables derive coordinates from retroreflection: all parts share one set, including its noise
             is_shared = self._part is None or wo is wi
             rng = np.random.default_rng([self._seed, 92, GROUPS if is_shared else self._part or 0, self._asked])
-            f = f * (1.0 + self._noise * (1.0 if is_shared else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
+            f = f * (
+                1.0 + self._detector.noise * (1.0 if is_shared else np.sqrt(GROUPS)) * rng.standard_normal(f.shape)
+            )
         return f * wi[:, 2:]
 
 
@@ -160,90 +186,82 @@ def measure(
                  text, facets are smooth (alpha = 0) unless it sets alpha
     table        in .gonio files: angles, half-difference, adaptive, specular, samples
     theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, 0.006 for
-                 surfaces
+    solid_angle  of the detector, sr, over which values are averaged; None: 0.006 for surfaces, a point for materials
     noise        relative standard deviation of a reading
     blocked      degrees about the lamp where the detector cannot be placed. There, cells of MERL files are invalid and
                  samples are omitted; other tables hold the value at the rim
     bounces      for a surface: "all" light, that of the "first" bounce, or that of "later" bounces
     samples      rays per angle of incidence
-    patches      number of measured patches of a random surface, rounded up to a multiple of 8; the standard error
-                 includes their spread and that of the rays
+    patches      measured patches of a random surface, rounded up to a multiple of 8; errors include their spread
     seed         0 if None; the same seed gives the same values
     device       "cpu", "cuda" or "auto", for surfaces
     progress     called with the number of rays traced and their total
 
-    Returns a `Readout`: the table with a standard error per value, the energy and the time. f is the light that arrives
-    in the cone of the detector, over the projected solid angle of the cone above the horizon. If a format has few
-    angles of incidence, each is measured; otherwise a grid with the spacing of the detector's half angle, up to 89
-    degrees, is measured and interpolated linearly. The sample rotates, so the result is isotropic.
-
+    Returns a `Readout`: the table with a standard error per value, the energy and the time.
     Raises InputError for unknown, out-of-range or unwritable arguments, before anything is computed.
     """
     begun = time.perf_counter()
-    seed = 0 if seed is None else seed
-    _check_numbers(bounces, solid_angle, noise=noise, blocked=blocked, samples=samples, patches=patches, seed=seed)
+    detector = Detector(solid_angle, noise, blocked, bounces)
+    tracing = Tracing(samples, patches, 0 if seed is None else seed, device, progress)
+    _check_numbers(detector, tracing)
     target = None if output is None else files.check_file(output)
-    plan = Plan(None if output is None else Path(output), table, grid_of(theta_i, theta_r, phi))
-    specimen: Specimen
-    if surface is not None:
-        if material is not None:
-            raise InputError("a material and a surface given", "MODEL", "name the material of the facets by --facet")
-        made = facet_of(facet) if isinstance(facet, str) else facet
-        specimen = Rough(
-            _surface(surface),
-            made,
-            DETECTOR if solid_angle is None else solid_angle,
-            samples,
-            patches,
-            seed,
-            device,
-            progress,
-            facet if isinstance(facet, str) else "",
-        )
-        scout = _Scout()
-        plan.table(scout)
-        specimen.prepare(np.unique(np.concatenate(scout.theta_i)))
-    else:
-        specimen = _model(material, solid_angle, bounces)
-    measured, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
-    if target is not None:
-        files.write_whole(target, plan.file.write(measured))
-        if "error" in measured.beside and plan.file.writes != "any":
-            notes.append(f"{plan.file.name} files have no place for standard errors; .gonio files store them")
     path = None if output is None else Path(output)
-    return _readout(measured, specimen, path, "" if output is None else plan.file.name, hidden, notes, begun)
+    plan = Plan(path, table, grid_of(theta_i, theta_r, phi))
+    if surface is not None and material is not None:
+        raise InputError("a material and a surface given", "MODEL", "name the material of the facets by --facet")
+    rough = None if surface is None else _rough(surface, facet, detector, tracing, plan)
+    specimen = rough or _model(material, detector)
+    measured, hidden, notes = _filled(plan, specimen, detector, tracing.seed)
+    notes += [] if target is None else _written(measured, plan, target)
+    return _readout(measured, specimen, path, "" if path is None else plan.file.name, hidden, notes, begun)
 
 
-def _check_numbers(bounces: str, solid_angle: float | None, **values: float) -> None:
+def _check_numbers(detector: Detector, tracing: Tracing) -> None:
     """Raise InputError if an argument of `measure` is out of range."""
-    if bounces not in BOUNCES:
-        raise InputError(f"'{bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
-    for name, high in (("noise", 1.0), ("blocked", MAX_BLOCKED)):
-        if not 0.0 <= values[name] <= high:
-            raise InputError(f"{values[name]:g} given, 0 to {high:g} expected", f"--{name}")
+    if detector.bounces not in BOUNCES:
+        raise InputError(f"'{detector.bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
+    for name, value, high in (("noise", detector.noise, 1.0), ("blocked", detector.blocked, MAX_BLOCKED)):
+        if not 0.0 <= value <= high:
+            raise InputError(f"{value:g} given, 0 to {high:g} expected", f"--{name}")
+    solid_angle = detector.solid_angle
     if solid_angle is not None and not 0.0 < solid_angle < np.pi:
         raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
     for name, low, most in (("samples", 1000, 1 << 40), ("patches", 1, 4096), ("seed", 0, 1 << 31)):
-        if not low <= values[name] <= most:
-            raise InputError(f"{values[name]} given, {low} to {most} expected", f"--{name}")
+        if not low <= getattr(tracing, name) <= most:
+            raise InputError(f"{getattr(tracing, name)} given, {low} to {most} expected", f"--{name}")
 
 
-def _surface(surface: Surface | str) -> Surface:
+def _rough(surface: Surface | str, facet: BSDF | str, detector: Detector, tracing: Tracing, plan: Plan) -> Rough:
+    """The surface of facets, measured at the angles of incidence of the planned table."""
     built = surface_of(surface) if isinstance(surface, str) else surface
     if not isinstance(built, Surface):
         raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=0.3"')
-    return built
+    name, material = (facet, facet_of(facet)) if isinstance(facet, str) else ("", facet)
+    solid_angle = DETECTOR if detector.solid_angle is None else detector.solid_angle
+    specimen = Rough(built, material, solid_angle, tracing, name)
+    scout = _Scout()
+    plan.table(scout)
+    specimen.prepare(np.unique(np.concatenate(scout.theta_i)))
+    return specimen
 
 
-def _model(material: BSDF | str | None, solid_angle: float | None, bounces: str) -> Model:
+def _model(material: BSDF | str | None, detector: Detector) -> Model:
     if material is None:
         raise InputError("nothing to measure", "MODEL", "name a material, or a surface by --surface")
-    if bounces != "all":
-        raise InputError(f"{bounces} bounces of a material requested", "--bounces", "use it with --surface only")
+    if detector.bounces != "all":
+        what = f"{detector.bounces} bounces of a material requested"
+        raise InputError(what, "--bounces", "use it with --surface only")
     if isinstance(material, str):
-        return Model(notation.named(material)[0], solid_angle, material)
-    return Model(material, solid_angle)
+        return Model(notation.named(material)[0], detector.solid_angle, material)
+    return Model(material, detector.solid_angle)
+
+
+def _written(measured: Measurement, plan: Plan, target: Path) -> list[str]:
+    """Write the table; notes on what its format cannot store."""
+    files.write_whole(target, plan.file.write(measured))
+    if "error" in measured.beside and plan.file.writes != "any":
+        return [f"{plan.file.name} files have no place for standard errors; .gonio files store them"]
+    return []
 
 
 def _readout(
@@ -277,14 +295,12 @@ def _readout(
     )
 
 
-def _filled(
-    plan: Plan, specimen: Specimen, blocked: float, noise: float, bounces: str, seed: int
-) -> tuple[Measurement, float, list[str]]:
+def _filled(plan: Plan, specimen: Specimen, detector: Detector, seed: int) -> tuple[Measurement, float, list[str]]:
     """The table with its standard errors and first-bounce part, the share of blocked cells, and notes."""
-    asked = _Pass(specimen, bounces, blocked, noise, seed)
+    asked = _Pass(specimen, detector, seed)
     table = plan.table(asked)
     values = vars(table)["values"]
-    if noise > 0.0 or not specimen.exact:
+    if detector.noise > 0.0 or not specimen.exact:
         total, square = np.zeros_like(values), np.zeros_like(values)
         for part in range(GROUPS):
             off = vars(plan.table(asked.part(part)))["values"] - values
@@ -292,11 +308,11 @@ def _filled(
             square += off * off
         variance = np.maximum(square - total * total / GROUPS, 0.0) / (GROUPS - 1.0)
         table.beside["error"] = np.sqrt(variance / GROUPS)
-    if bounces == "all" and not specimen.exact:
+    if detector.bounces == "all" and not specimen.exact:
         table.beside["first"] = vars(plan.table(asked.first()))["values"]
-    table, hidden, left_out = without(table, blocked)
+    table, hidden, left_out = without(table, detector.blocked_angle)
     notes = []
-    if blocked > 0.0 and not left_out:
+    if detector.blocked > 0.0 and not left_out:
         notes.append(f"{table.name} tables have a value everywhere: near the lamp they hold the value at the rim")
     return table, hidden, notes
 

@@ -1,4 +1,4 @@
-"""V-grooves."""
+"""V-grooves: a surface of long symmetric cavities."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class BlinnPhong(_Empirical):
 
     @function
     def _peak(self, wo: Direction, wi: Direction) -> Scalar:
-        """(n.h)^p."""
+        """The lobe (n.h)^p about the normal, 1 at its peak."""
         h = half_vector(wo, wi)
         return power_of_cosine(h.z, sin2(h), self._exponent)
 

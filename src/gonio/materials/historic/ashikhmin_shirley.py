@@ -60,7 +60,7 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _density(self, h: Direction) -> Scalar:
-        """p(h), 1/sr."""
+        """Density p(h) of half vectors, 1/sr."""
         n = self.exponent
         h_local = frame.rotate(h, self.rotation)
         sin2 = frame.sin2(h_local)

@@ -92,5 +92,5 @@ class Lafortune(_Glossy):
 
 @function
 def _less(c: Scalar) -> Scalar:
-    """1 - c^2."""
+    """1 - c^2, a squared sine."""
     return (1.0 - c) * (1.0 + c)

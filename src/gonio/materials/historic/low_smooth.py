@@ -57,7 +57,7 @@ class LowSmooth(_Glossy):
         return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F by name."""
+        """F at a cosine, by the name of its formula."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function

@@ -112,12 +112,7 @@ def derive(model: _OpenPBR) -> Between:
         tuple(mean(one / level - 1.0) * w for one, w in zip(parts, weights, strict=True))
         for parts, level in ((under, sheer), (both, joint))
     )
-    f_metal = white
-    if model.has("base_metalness"):
-        f_metal = averaged([model.bare_metal(x + zeros_like(rough)) for x in PLACES])
-        if filmed:
-            few = [x + zeros_like(rough) for x in FEW_PLACES]
-            f_metal = f_metal + averaged([model.metal(x, eta, medium) - model.bare_metal(x) for x in few])
+    f_metal = mean_of_metal(model, eta, medium, bool(filmed))
     sheet = colors_of_sheet(model, bare, filmed, rough, eta) if model.geometry_thin_walled else None
     glass, other = None, None
     if model.refracts:
@@ -144,6 +139,17 @@ def derive(model: _OpenPBR) -> Between:
         glass=glass,
         other=other,
     )
+
+
+def mean_of_metal(model: _OpenPBR, eta: Scalar, medium: Scalar, filmed: bool) -> Spectrum:
+    """Mean over the hemisphere of the metal's F, under its film if there is one; 1 without a metal."""
+    if not model.has("base_metalness"):
+        return ones_like(model.base_color)
+    f_metal = averaged([model.bare_metal(x + zeros_like(eta)) for x in PLACES])
+    if filmed:
+        few = [x + zeros_like(eta) for x in FEW_PLACES]
+        f_metal = f_metal + averaged([model.metal(x, eta, medium) - model.bare_metal(x) for x in few])
+    return f_metal
 
 
 def colors_of_sheet(

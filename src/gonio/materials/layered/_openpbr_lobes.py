@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from ... import ops
 from ...material import binding
 from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, inv_pi, maximum, sqr, vec3, where
@@ -17,6 +19,19 @@ from . import _openpbr_tables as tables
 from ._openpbr_formulas import direction_at, lobe_value, mix, total_of
 from ._openpbr_layers import Sides
 from ._openpbr_slabs import _OpenPBR
+
+
+class Facets(NamedTuple):
+    """The facets that mirror one direction into the other.
+
+    cos     cosine of both directions to their normal
+    value   their lobe at F = 1
+    smooth  rays for which all facets are parallel; None if there are none
+    """
+
+    cos: Scalar
+    value: Scalar
+    smooth: Mask | None
 
 
 def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Mask | None = None) -> Spectrum:
@@ -35,7 +50,7 @@ def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Ma
     multiple = lobe_value(multiple_scattering(model, o, i), None, ideal)
     through = zero
     if model.refracts:
-        glossy, dielectric, through = glass_lobes(model, wo, wi, pair, cos, mode, facets, smooth, ideal)
+        glossy, dielectric, through = glass_lobes(model, wo, wi, pair, Facets(cos, facets, smooth), mode, ideal)
     else:
         glossy = model.glossy(cos, b.ratio, b.eta, b.medium)
         dielectric = glossy * model.specular_color * facets
@@ -92,14 +107,12 @@ def glass_lobes(
     wo: Direction,
     wi: Direction,
     pair: Sides,
-    cos: Scalar,
+    facets: Facets,
     mode: Mode,
-    facets: Scalar,
-    smooth: Mask | None,
     ideal: Mask | None,
 ) -> tuple[Spectrum, Spectrum, Spectrum]:
     """(F, light reflected by glass, light transmitted by it) for a pair of directions, from either side."""
-    b, glass, T = model.derived, interface(model), model.transmission_weight
+    cos, b, glass, T = facets.cos, model.derived, interface(model), model.transmission_weight
     white, above = ops.ones_like(model.base_color), wo.z > 0.0
     eta = glass._relative_eta(wo)
     at = glass._facet(wo, wi, eta)
@@ -117,8 +130,8 @@ def glass_lobes(
     opaque = model.glossy(cos, b.ratio, b.eta, b.medium)
     mirrored = where(above, f * model.specular_color, mix(opaque, inner, T))
     tint = where(above, model.specular_color, white)
-    reflected = mirrored * facets + tint * (twice * T)
-    spread = lobe_value(where(at.reflects, 0.0, glass._value(at)), smooth, ideal, 1.0 / sqr(eta))
+    reflected = mirrored * facets.value + tint * (twice * T)
+    spread = lobe_value(where(at.reflects, 0.0, glass._value(at)), facets.smooth, ideal, 1.0 / sqr(eta))
     spread = spread * sqr(eta) if mode == "importance" else spread
     colour = where(model.transmission_depth > 0.0, white, model.transmission_color)
     left = layers.past_layers(model, outside) * colour

@@ -64,7 +64,7 @@ def _albedos(masking: str) -> Table:
         alpha = _rows(ROUGHNESSES)[None, :, None] ** 2
         mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
-        return quadrature.glass("ggx", masking, "exact", mu, alpha, eta).reflected
+        return quadrature.glass("ggx", masking, "exact", quadrature.Points(mu, alpha), eta).reflected
 
     values = cache.remember(("openpbr", masking, INDICES, ROUGHNESSES, COSINES), build)
     return Table("openpbr_reflected", values[..., None])
@@ -208,7 +208,7 @@ def _faced(masking: str) -> Table:
     def build() -> np.ndarray:
         alpha = _rows(rows)[:, None] ** 2
         mu = np.linspace(0.0, 1.0, columns)[None, :] ** 2
-        return np.stack(quadrature.over_normals("ggx", one, len(PLACES), mu, alpha, None, 0.0), -1)
+        return np.stack(quadrature.over_normals("ggx", one, len(PLACES), quadrature.Points(mu, alpha)), -1)
 
     return Table("openpbr_faced", cache.remember(("openpbr-faced", masking, rows, columns, len(PLACES)), build))
 
@@ -251,7 +251,7 @@ def _spared(masking: str) -> tuple[Table, Table]:
         places = np.concatenate([np.linspace(0.0, 1.0, LOSS_COSINES), x])[None, None, :]
         sides = [
             quadrature.over_normals(
-                "ggx", one, len(FEW_PLACES), places**2, alpha, None, 0.0, ratio, quadrature.GLASS_NODES
+                "ggx", one, len(FEW_PLACES), quadrature.Points(places**2, alpha), ratio, quadrature.GLASS_NODES
             )
             for ratio in (eta, 1.0 / eta)
         ]

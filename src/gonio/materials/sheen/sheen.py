@@ -95,7 +95,7 @@ class Sheen(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """albedo R."""
+        """The color at a view: albedo times R, the albedo of the lobe's fit."""
         return self.albedo * self._lobe(wo).R
 
     def known_albedo(

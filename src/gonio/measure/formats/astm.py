@@ -119,4 +119,4 @@ def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floa
     theta_i, theta_r, phi = axes
     values = np.empty((int(count), rows.shape[1] - 4))
     values[place] = rows[:, 4:]
-    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, axes), -1), where, title, source, nm)
+    return Angles((theta_i, theta_r, phi), values.reshape(*map(len, axes), -1), where, title, source, nm)

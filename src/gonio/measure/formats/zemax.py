@@ -127,10 +127,9 @@ class Zemax(Format):
         if len(channels) == 3:
             values = values @ colours.XYZ_TO_RGB.T
         title = next((text.partition(":")[2].strip() for text in comments if text.lower().startswith("model")), "")
-        return Specular(
-            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], values, where,
-            title or (comments[0] if comments else ""), {"format": self.name, **head},
-        )  # fmt: skip
+        grid = axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"]
+        title = title or (comments[0] if comments else "")
+        return Specular(grid, values, where, title, {"format": self.name, **head})
 
     def write(self, table: Measurement) -> bytes:
         assert isinstance(table, Specular), "`resampled` made it so"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import ClassVar
 
@@ -38,17 +38,16 @@ class Angles(Guided, Measurement):
 
     def __init__(
         self,
-        theta_i: NDArray[np.generic],
-        theta_r: NDArray[np.generic],
-        phi: NDArray[np.generic],
+        grid: Sequence[NDArray[np.generic]],
         values: NDArray[np.generic],
         where: str = "",
         title: str = "",
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """values  (theta_i, theta_r, phi, channel)"""
+        """grid: the nodes of theta_i, theta_r and phi; values: at these nodes, and of each channel."""
         super().__init__(title, source, wavelengths)
+        theta_i, theta_r, phi = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
         self.theta_r = axis(theta_r, "theta_r", where, 0.0, 0.5 * np.pi)
         self.phi = axis(phi, "phi", where, 0.0, np.pi)
@@ -125,7 +124,7 @@ class Angles(Guided, Measurement):
             i, r = np.ogrid[:count, :count]
             high, low = np.maximum(i, r), np.minimum(i, r)
             values = values[high * (high + 1) // 2 + low]
-        return cls(arrays["theta_i"], arrays["theta_r"], arrays["phi"], values, **about)
+        return cls([arrays[name] for name in cls.axes], values, **about)
 
     @property
     def flaws(self) -> dict[str, float]:
@@ -161,4 +160,4 @@ def sampled(value: ops.Value, thetas: int = 46, phis: int = 73, **about: ops.Val
     theta, phi = nodes(thetas, phis)
     wo, wi = pairs(theta, theta, phi)
     f = value(wo, wi) / wi[:, 2:]
-    return Angles(theta, theta, phi, f.reshape(thetas, thetas, phis, 3), **about)
+    return Angles((theta, theta, phi), f.reshape(thetas, thetas, phis, 3), **about)

@@ -24,7 +24,7 @@ class Guided(Measurement):
         return guide_search.of_values(self)
 
     def prepare(self) -> None:
-        """The guide."""
+        """Compute the guide, by which directions are sampled."""
         _ = self.guide
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import ClassVar
 
@@ -36,17 +36,16 @@ class Specular(Guided, Measurement):
 
     def __init__(
         self,
-        theta_i: NDArray[np.generic],
-        azimuth: NDArray[np.generic],
-        radial: NDArray[np.generic],
+        grid: Sequence[NDArray[np.generic]],
         values: NDArray[np.generic],
         where: str = "",
         title: str = "",
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """values  (theta_i, azimuth, radial, channel)"""
+        """grid: the nodes of theta_i, azimuth and radial; values: at these nodes, and of each channel."""
         super().__init__(title, source, wavelengths)
+        theta_i, azimuth, radial = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
         self.azimuth = axis(azimuth, "azimuth", where, 0.0, 2.0 * np.pi)
         self.radial = axis(radial, "radial", where, 0.0, np.pi)
@@ -99,7 +98,7 @@ class Specular(Guided, Measurement):
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Specular:
-        return cls(arrays["theta_i"], arrays["azimuth"], arrays["radial"], arrays["values"], **about)
+        return cls([arrays[name] for name in cls.axes], arrays["values"], **about)
 
     @property
     def flaws(self) -> dict[str, float]:
@@ -149,4 +148,4 @@ def sampled(value: ops.Value, **about: ops.Value) -> Specular:
     wo[:, 2] = np.maximum(wo[:, 2], 1e-3)
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     f = value(wo, wi) / wi[:, 2:]
-    return Specular(theta_i, azimuth, radial, f.reshape(len(theta_i), len(azimuth), len(radial), 3), **about)
+    return Specular((theta_i, azimuth, radial), f.reshape(len(theta_i), len(azimuth), len(radial), 3), **about)

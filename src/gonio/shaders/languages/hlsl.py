@@ -29,7 +29,7 @@ _RESERVED = """
 
 
 class HLSL(Language):
-    """HLSL 2021."""
+    """HLSL 2021, the language of Direct3D."""
 
     name = "hlsl"
     title = "HLSL 2021 (shader model 6)"

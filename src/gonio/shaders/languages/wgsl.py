@@ -30,7 +30,7 @@ _RESERVED = """
 
 
 class WGSL(Language):
-    """WGSL."""
+    """WGSL, the language of WebGPU."""
 
     name = "wgsl"
     title = "WGSL (WebGPU)"

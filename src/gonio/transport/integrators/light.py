@@ -9,7 +9,7 @@ import drjit as dr
 from ...bridge.types import UInt
 from ..particles import Flight, Particles
 from ..scene_data import SceneData
-from ..splats import SplatCamera
+from ..splats import Splat, SplatCamera
 from ..sums import Sums
 from .base import Settings
 from .light_transport import LightTransport
@@ -72,7 +72,7 @@ class Light(LightTransport):
         value = particles.eval_bsdf(vertex, vertex.si.to_local(ds.d), active) * importance
         value = particles.through_media(vertex, value, ds)
         value *= flight.flux * flight.throughput
-        result = camera.splat(key, low, sums, ds.uv, value, vertex.si, ds.p, active)
+        result = camera.splat(key, low, sums, Splat(ds.uv, value, vertex.si, ds.p), active)
 
         # Follow the sampled direction.
         return particles.follow(key, low, flight, vertex, bs, weight, active), invalid + result
