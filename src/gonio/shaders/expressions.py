@@ -248,7 +248,7 @@ class ExpressionWriter:
         arguments = [self.unparenthesized(a) for a in value.args]
         if table.channels > 4:
             arguments.append(str(group))
-        return f"{how}_{table.name}({', '.join(arguments)})"
+        return f"{self.names.table(table, how + '_')}({', '.join(arguments)})"
 
     # ------------------------------------------------------------------ calls
 
