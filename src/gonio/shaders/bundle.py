@@ -19,10 +19,12 @@ from ..owner import exclusive
 from . import program as programs
 from . import text as texts
 from .languages import Language
-from .manifest import Json, numbers_of
+from .manifest import Json, manifest, numbers_of
 from .module import Module, of_several
+from .names import Names
 from .placement import Placement
 from .program import Program
+from .python_file import python_file
 from .textures import pixels
 
 
@@ -104,6 +106,8 @@ def bundle(
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
+    if language.standalone:
+        return _file(model, language, functions, lean, place)
     models = [model] if isinstance(model, BSDF | str) or not isinstance(model, Sequence) else list(model)
     if not models:
         raise InputError("no material given", "emit", "name at least one, such as conductor")
@@ -115,8 +119,24 @@ def bundle(
     return Bundle(text, whole, {name: pixels(table) for name, table in module.tables.items()})
 
 
+def _file(model: object, language: Language, functions: Sequence[str], lean: bool, place: Placement) -> Bundle:
+    """A file that runs by itself, which holds its tables."""
+    if place.prefix or place.first_binding:
+        what = f"a prefix or a binding given, and {language.name} is a file of its own"
+        raise InputError(what, "emit: lang", "import it under a name")
+    models = list(model) if isinstance(model, list | tuple) else [model]
+    if len(models) != 1:
+        what = f"{len(models)} materials given, and a file in {language.name} holds one"
+        raise InputError(what, "emit: lang", "write a file for each")
+    made, numbers = _recorded(models[0], functions, lean, (), single=False)
+    names = Names(made, language)
+    text = python_file(made, names, numbers)
+    whole = manifest(made, names, numbers, {id(table): 0 for table in made.tables})
+    return Bundle(text, {**whole, "textures": []}, {})
+
+
 def _recorded(
-    model: BSDF | str, functions: Sequence[str], lean: bool, on: Collection[str]
+    model: BSDF | str, functions: Sequence[str], lean: bool, on: Collection[str], single: bool = True
 ) -> tuple[Program, dict[str, Json]]:
     """The parts of a material's shader, and the values of its numeric parameters by path."""
     if isinstance(model, str):
@@ -125,6 +145,6 @@ def _recorded(
     numbers = dict(numbers_of(model))  # raises for arrays of materials
     try:
         without = [path for path in switched_off(model) if path not in on] if lean else ()
-        return Program(model, functions, without), numbers
+        return Program(model, functions, without, single), numbers
     except graph.RecordingError as error:
         raise InputError(f"it cannot be written as shader code: {error.what}", error.where, error.hint) from error

@@ -116,7 +116,8 @@ class Names:
     def number(self, value: Value) -> str:
         """A constant by its name if it has one, else as a literal."""
         number = float(value.static)
-        check_single(number, value.source)
+        if self.language.single:
+            check_single(number, value.source)
         if value.name and self.constants.get(value.name, (number,))[0] == number:
             self.constants.setdefault(value.name, (number, module_constant(number, value.source)[1]))
             return self.public(value.name)
@@ -124,4 +125,4 @@ class Names:
             if abs(number) == known:
                 self.constants.setdefault(name, (known, ""))
                 return self.public(name) if number > 0 else f"-{self.public(name)}"
-        return literal(number)
+        return literal(number) if self.language.single else repr(number)

@@ -9,14 +9,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from .._version import __version__
-from ..material import BSDF, tree
+from ..material import tree
 from ..ops.table import Table
-from ..ops.types import Value
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment, wrap
 from .manifest import TERMS
 from .names import Names
-from .program import Program
+from .program import ENTRIES, Program, choices
 from .routine import RoutineWriter
 from .syntax import literal
 from .textures import READERS, axes
@@ -108,14 +107,14 @@ def values(made: Program, names: Names, numbers: Mapping[str, Any]) -> Block:
 def head(made: Program, names: Names) -> list[str]:
     model, language = made.model, names.language
     entries = sorted(made.entries.items(), key=lambda entry: list(ENTRIES).index(entry[0]))
-    choices = [f"{path} = {value}" for path, value in _choices(model)]
+    shaped = [f"{path} = {value}" for path, value in choices(model)]
     lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
     lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
     if made.without:
         off = ", ".join(f"{path} = {tree.value_at(model, path):g}" for path in made.without)
         lines += ["//", *(f"// {text}" for text in textwrap.wrap(f"Written without parts that are off: {off}.", 105))]
-    if choices:
-        lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
+    if shaped:
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(shaped) + ".", 105))]
     lines += ["//"]
     calls = [
         f"{names.routines[routine]}({', '.join(_arguments(made, method, language))})" for method, routine in entries
@@ -130,29 +129,11 @@ def head(made: Program, names: Names) -> list[str]:
     return lines
 
 
-# descriptions of the functions that a program calls
-ENTRIES = {
-    "derive": "quantities that depend on the parameters alone: call it once per draw",
-    "eval": "the BSDF times |cos theta_i|, RGB, 1/sr",
-    "pdf": "density with which `sample` chooses wi, 1/sr",
-    "sample": "wi, its weight eval / pdf, its pdf; u: three random numbers in [0, 1)",
-    "terms": "the factors of eval, for inspection",
-}
-
-
 def _arguments(made: Program, method: str, language: Language) -> list[str]:
     first = [language.word("self")]
     if method == "derive":
         return first
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
-
-
-def _choices(model: BSDF) -> list[tuple[str, Value]]:
-    """(path, value) of the choices that shape the code: classes of materials, options and flags."""
-    return [
-        *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
-        *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),
-    ]
 
 
 def structs(made: Program, names: Names) -> list[Record]:

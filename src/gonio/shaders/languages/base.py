@@ -24,6 +24,9 @@ class Language:
     overloads            whether functions of one name may differ in their types
     parameters_change    whether a function may assign to a parameter
     struct_literal       whether `Name(a, b)` constructs a struct inside an expression
+    end                  the end of a statement
+    single               whether all values are float32
+    standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
     templates            whether `a < b, c > d` is parsed as template arguments
     """
@@ -59,6 +62,9 @@ class Language:
     parameters_change: ClassVar[bool] = True
     struct_literal: ClassVar[bool] = True
     groups: ClassVar[bool] = False
+    end: ClassVar[str] = ";"
+    single: ClassVar[bool] = True
+    standalone: ClassVar[bool] = False
     templates: ClassVar[bool] = False
 
     def type(self, name: str) -> str:
