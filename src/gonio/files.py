@@ -52,9 +52,15 @@ def check_file(path: str | Path) -> Path:
     return target
 
 
-def check_folder(folder: str | Path) -> Path:
-    """The folder, if it exists or can be made where it is named; InputError before anything is computed where not."""
+def check_folder(folder: str | Path, parents: bool = False) -> Path:
+    """The folder, if it exists or can be made where it is named; InputError before anything is computed where not.
+
+    parents  whether the folders above it may be missing too: `write_all` makes them
+    """
     folder = Path(os.path.expanduser(folder))
+    if parents and not os.path.lexists(folder.parent):
+        check_folder(folder.parent, parents=True)
+        return folder
     if not os.path.isdir(folder):
         if os.path.exists(folder):
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
@@ -177,6 +183,7 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files.
 
+    Folders above it are made.
     Raises MachineError where it cannot be written, which says where its files are instead.
     """
 
@@ -191,6 +198,7 @@ def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
     part = None
     try:
         part = with_ending(folder.absolute(), f".{os.getpid()}.part", ".")
+        part.parent.mkdir(parents=True, exist_ok=True)
         fill(part)
         if not folder.exists():
             os.replace(part, folder)

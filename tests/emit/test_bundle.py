@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from gonio.shaders import bundle
-from gonio.shaders.bundle import layout
 from gonio.shaders.languages import languages
+from gonio.shaders.manifest import layout
 from variants import EVERY
 
 import browser

@@ -5,9 +5,11 @@ from __future__ import annotations
 import functools
 
 import gonio as go
+import numpy as np
 import pytest
-from gonio.material.recording import switched_off
+from gonio.material.recording import record, switched_off
 from gonio.shaders import bundle
+from gonio.shaders.manifest import numbers_of
 
 from varnished import Varnished
 
@@ -65,3 +67,14 @@ def test_a_lean_mirrorless_surface_is_isotropic_and_opaque() -> None:
     assert manifest["isotropic"] and not manifest["transmits"]
     whole = bundle(go.OpenPBR()).manifest
     assert not whole["isotropic"] and whole["transmits"]
+
+
+def test_a_weight_of_zero_leaves_no_samples_to_its_lobe() -> None:
+    """The whole OpenPBR without transmission sampled the lower side: its pdf differed from Python's for all pairs."""
+    go.set_precision("float64")  # until the end of the test
+    material = go.OpenPBR(specular_roughness=0.3, base_metalness=0.2)
+    directions = np.abs(np.random.default_rng(1).normal(size=(2, 1000, 3)))
+    wo, wi = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    values = {f"self_{path}": np.asarray(v)[:, None] if np.ndim(v) else v for path, v in numbers_of(material)}
+    recorded = record(material, "pdf").evaluate(wo=wo.T, wi=wi.T, **values)
+    assert np.allclose(recorded, material.pdf(wo, wi), rtol=1e-12, atol=1e-12)

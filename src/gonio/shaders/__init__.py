@@ -2,5 +2,6 @@
 
 from .bundle import Bundle, bundle, emit
 from .languages import Language
+from .placement import Placement
 
-__all__ = ["Bundle", "Language", "bundle", "emit"]
+__all__ = ["Bundle", "Language", "Placement", "bundle", "emit"]

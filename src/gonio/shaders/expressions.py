@@ -116,6 +116,10 @@ class ExpressionWriter:
             "exp": "power",
         }.get(value.op, {"add": "sum", "sub": "difference", "mul": "product"}.get(value.op, "value"))
 
+    def wrapped(self, line: str) -> list[str]:
+        """A statement of the body in lines."""
+        return wrap(line, INDENT)
+
     # ------------------------------------------------------------------ expressions
 
     def statement(self, value: Value) -> str:
@@ -138,7 +142,7 @@ class ExpressionWriter:
         text, level = self.compose(value)
         if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # a call is broken at its commas
             name = self.fresh(self._name_for(value))
-            self.lines += wrap(self.language.local(self.names.note(value.type), name, text), INDENT)
+            self.lines += self.wrapped(self.language.local(self.names.note(value.type), name, text))
             self.locals[value.order] = name
             return name, ATOM
         return text, level
@@ -248,7 +252,7 @@ class ExpressionWriter:
         arguments = [self.unparenthesized(a) for a in value.args]
         if table.channels > 4:
             arguments.append(str(group))
-        return f"{how}_{table.name}({', '.join(arguments)})"
+        return f"{self.names.table(table, how + '_')}({', '.join(arguments)})"
 
     # ------------------------------------------------------------------ calls
 
@@ -306,7 +310,7 @@ class ExpressionWriter:
                 line = self.language.local(type_name, local, f"{type_name}({', '.join(parts)})")
             else:
                 line = f"{type_name} {local} = {{ {', '.join(parts)} }};"
-            self.lines += wrap(line, INDENT)
+            self.lines += self.wrapped(line)
             self.built[key] = local
         return self.built[key]
 

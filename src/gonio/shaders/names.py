@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 
 from ..ops.graph import first_free
+from ..ops.table import Table
 from .languages import Language
+from .placement import Placement
 from .program import Program, place
 from .source import module_constant
 from .syntax import literal
@@ -21,10 +24,18 @@ class Names:
     routines   name of each routine
     constants  name -> (number, description)
     records    name -> struct
+    renamed    names that another shader of the module uses otherwise -> the names instead, both without prefix
     """
 
-    def __init__(self, program: Program, language: Language) -> None:
+    def __init__(
+        self,
+        program: Program,
+        language: Language,
+        placement: Placement | None = None,
+        renamed: Mapping[str, str] | None = None,
+    ) -> None:
         self.program, self.language = program, language
+        self.placement, self.renamed = placement or Placement(), renamed or {}
         self.constants: dict[str, tuple[float, str]] = {}
         self.routines: dict[Routine, str] = {}
         self.records: dict[str, Record] = {}
@@ -34,6 +45,22 @@ class Names:
             name = self._routine_name(routine, used)
             used.add(name)
             self.routines[routine] = name
+        for routine, name in self.routines.items():
+            if stem_of(routine) not in language.native:
+                self.routines[routine] = self.public(name)
+
+    def public(self, name: str) -> str:
+        """A global name as it is written: replaced if another shader of the module has it, after the prefix."""
+        return self.placement.prefix + self.renamed.get(name, name)
+
+    def table(self, table: Table, start: str = "") -> str:
+        """The public name of a table, or with "table_", "lookup_", "fetch_" that of its texture and its functions."""
+        stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
+        return f"{self.placement.prefix}{start}{stem}"
+
+    def struct(self, record: Record) -> str:
+        """The public name of a struct."""
+        return self.public(self.language.word(record.name))
 
     def _routine_name(self, routine: Routine, used: set[str]) -> str:
         name = self.language.word(stem_of(routine))
@@ -85,18 +112,19 @@ class Names:
             record = record.record
         if isinstance(record, Record):
             self.records.setdefault(record.name, record)
-            return self.language.word(record.name)
+            return self.struct(record)
         return self.language.type(record)
 
     def number(self, value: Value) -> str:
         """A constant by its name if it has one, else as a literal."""
         number = float(value.static)
-        check_single(number, value.source)
+        if self.language.single:
+            check_single(number, value.source)
         if value.name and self.constants.get(value.name, (number,))[0] == number:
             self.constants.setdefault(value.name, (number, module_constant(number, value.source)[1]))
-            return value.name
+            return self.public(value.name)
         for name, known in CONSTANTS.items():
             if abs(number) == known:
                 self.constants.setdefault(name, (known, ""))
-                return name if number > 0 else f"-{name}"
-        return literal(number)
+                return self.public(name) if number > 0 else f"-{self.public(name)}"
+        return literal(number) if self.language.single else repr(number)

@@ -23,6 +23,15 @@ from .values import Record, Routine, Value, shape
 
 FUNCTIONS = ("eval", "pdf", "sample", "terms")
 
+# descriptions of the functions that a program calls
+ENTRIES = {
+    "derive": "quantities that depend on the parameters alone: call it once per draw",
+    "eval": "the BSDF times |cos theta_i|, RGB, 1/sr",
+    "pdf": "density with which `sample` chooses wi, 1/sr",
+    "sample": "wi, its weight eval / pdf, its pdf; u: three random numbers in [0, 1)",
+    "terms": "the factors of eval, for inspection",
+}
+
 
 class Struct:
     """An argument made of fields: the parameters of a model, or quantities derived from them."""
@@ -41,15 +50,18 @@ class Program:
     entries   method -> its routine, including "derive" if there is something to derive
     structs   of parameters, derived values and results, in order of use
     without   paths of parameters that are off and shape the code
+    single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
     tables    the tables that are read
     readings  for each table, by identity, how it is read: "lookup" or "fetch"
     """
 
-    def __init__(self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = ()) -> None:
+    def __init__(
+        self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = (), single: bool = True
+    ) -> None:
         self.model, self.without = model, tuple(without)
         self.bound = recording.symbols(model, self.without)
-        recorded = _record(self.bound, functions)
-        simplified = routines(recorded)
+        recorded = _record(self.bound, functions, single)
+        simplified = routines(recorded, guarded=not single)
         self.driver = simplified.pop()
         functions_of = dict(zip((r.name for r in simplified), recorded.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
@@ -171,14 +183,14 @@ class Program:
         return list(tables.values())
 
 
-def _record(bound: BSDF, functions: tuple[str, ...]) -> graph.Graph:
+def _record(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
         """The driver of a recording; not part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
         return tuple(getattr(self, method)(wo, u if method == "sample" else wi) for method in functions)
 
-    into = graph.Graph(POLYFILLS, single=True)
+    into = graph.Graph(POLYFILLS if single else {}, single=single)
     return ops.record(every, types={"wo": "vec3", "wi": "vec3", "u": "vec3"}, name="every", into=into, self=bound)
 
 
@@ -296,3 +308,11 @@ _KNOWN = "known: " + ", ".join(FUNCTIONS)
 def stochastic(model: BSDF) -> BSDF | None:
     """The material, this one or a nested one, whose values are random numbers; else None."""
     return next((inner for _, inner in tree.walk(model) if inner.stochastic), None)
+
+
+def choices(model: BSDF) -> list[tuple[str, Value]]:
+    """(path, value) of the choices that shape the code: classes of materials, options and flags."""
+    return [
+        *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
+        *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),
+    ]

@@ -22,18 +22,26 @@ class RoutineWriter(ExpressionWriter):
 
     def text(self) -> list[str]:
         """The lines of the routine."""
-        routine = self.routine
-        values = routine.values()
+        body = self.body()
+        return [*comment(self.doc()), *wrap(self.head(), ""), *body, "}"]
+
+    def head(self) -> str:
+        """The line with its name and its parameters."""
+        result = self.names.note(self.routine.type)
+        return self.language.signature(result, self.names.routines[self.routine], self.heads)
+
+    def body(self) -> list[str]:
+        """The statements."""
+        values = self.routine.values()
         self._plan(values)
         statements = [value for value in values if value.order in self.named]
         last_use = self._last_uses(statements)
         for index, value in enumerate(statements):
             self._define(value, index, last_use)
-        body = self._result()
-        head = self.language.signature(self.names.note(routine.type), self.names.routines[routine], self.heads)
-        return [*comment(self._doc()), *wrap(head, ""), *self.lines, *body, "}"]
+        result = self._result()
+        return [*self.lines, *result]
 
-    def _doc(self) -> str:
+    def doc(self) -> str:
         """The docstring without the entries of arguments that shaped the code and are not arguments of the function."""
         entry = self.routine in self.program.entries.values()
         given = {place(p.static)[0] for i, p in enumerate(self.routine.parameters) if entry or i in self.routine.used}
@@ -52,17 +60,17 @@ class RoutineWriter(ExpressionWriter):
     def _result(self) -> list[str]:
         routine = self.routine
         if routine.single:
-            return wrap(f"return {self.statement(routine.results[0][1])};", INDENT)
+            return self.wrapped(f"return {self.statement(routine.results[0][1])}{self.language.end}")
         record = routine.record
         assert record is not None
         values = [value for _, value in routine.results]
         called = self._forwarded()
         if called is not None:
-            return wrap(f"return {self.statement(called)};", INDENT)
+            return self.wrapped(f"return {self.statement(called)}{self.language.end}")
         parts = [self.splat(value, type_) for value, (_, type_) in zip(values, record.fields, strict=True)]
         name = self.names.note(record)
         if self.language.struct_literal:
-            return wrap(f"return {name}({', '.join(parts)});", INDENT)
+            return self.wrapped(f"return {name}({', '.join(parts)}){self.language.end}")
         result = self.fresh("result")
         lines = wrap(f"{name} {result} = {{ {', '.join(parts)} }};", INDENT)
         return [*lines, f"{INDENT}return {result};"]
@@ -136,11 +144,11 @@ class RoutineWriter(ExpressionWriter):
             if name in self.first_lines:
                 line = self.first_lines[name]
                 self.lines[line] = self.language.changeable(self.lines[line])
-            self.lines += wrap(f"{name} = {text};", INDENT)
+            self.lines += self.wrapped(f"{name} = {text}{self.language.end}")
         else:
             name = self.fresh(wanted)
             self.first_lines[name] = len(self.lines)
-            self.lines += wrap(self.language.local(type_, name, text), INDENT)
+            self.lines += self.wrapped(self.language.local(type_, name, text))
         self.holders[name] = value
         self.locals[value.order] = name
 

@@ -17,19 +17,22 @@ from .source import module_constant
 from .values import COMPARE, ELEMENTWISE, LOGIC, SIZES, Kind, Routine, Static, Value, shape
 
 
-def routines(recorded: graph.Graph) -> list[Routine]:
-    """All functions of a recording, simplified, callees first."""
+def routines(recorded: graph.Graph, guarded: bool = False) -> list[Routine]:
+    """All functions of a recording, simplified, callees first.
+
+    guarded  keep a selection inside another one by the same mask, which makes the gradient of the unused branch finite
+    """
     known: dict[graph.Function, Routine] = {}
     for function in recorded.functions:
-        known[function] = _Simplifier(function, known).routine
+        known[function] = _Simplifier(function, known, guarded).routine
     return list(known.values())
 
 
 class _Simplifier:
     """Converts a recorded function into a simplified routine."""
 
-    def __init__(self, function: graph.Function, known: dict[graph.Function, Routine]) -> None:
-        self.known = known
+    def __init__(self, function: graph.Function, known: dict[graph.Function, Routine], guarded: bool) -> None:
+        self.known, self.guarded = known, guarded
         self.table: dict[tuple, Value] = {}
         self.count = 0
         self.assumed: dict[tuple, Value] = {}
@@ -265,6 +268,8 @@ class _Simplifier:
         shifted = self._equal_up_to_constant(mask, a, b)
         if shifted is not None:
             return shifted
+        if self.guarded:
+            return None
         a2, b2 = self.assume(a, mask, True), self.assume(b, mask, False)
         if a2 is not a or b2 is not b:
             return self.build("where", (mask, a2, b2), type_)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..ops.table import Table
-from .languages import Language
+from .names import Names
 
 
 def axes(table: Table) -> tuple[int, ...]:
@@ -37,12 +37,13 @@ def pixels(table: Table) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(split, -2, 0), dtype=np.float32).reshape(*reversed(axes(table)), -1)
 
 
-def reader(language: Language, table: Table) -> list[str]:
+def reader(names: Names, table: Table) -> list[str]:
     """The function that interpolates a table linearly between texel centers, clamped outside (`gonio.ops.table`).
 
     Hardware filtering is too coarse: its weights have eight bits.
     """
-    names, sizes, lines = _head(language, table, "lookup")
+    language = names.language
+    letters, sizes, lines = _head(names, table, "lookup")
     real, integer = language.type("float"), language.type("int")
     for axis, count in sizes.items():
         at, cell = f"at_{axis}", f"{axis}0"
@@ -55,7 +56,7 @@ def reader(language: Language, table: Table) -> list[str]:
 
     def texel(steps: dict[str, int]) -> str:
         return _texel(
-            language, table, [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in names]
+            names, table, [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in letters]
         )
 
     def between(rest: list[str], steps: dict[str, int], indent: str) -> str:
@@ -65,33 +66,35 @@ def reader(language: Language, table: Table) -> list[str]:
         low, high = (between(others, {**steps, axis: step}, indent + "    ") for step in (0, 1))
         return f"{indent}{language.mix}(\n{low},\n{high},\n{indent}    t_{axis})"
 
-    body = between(names, {}, "    ").strip()
+    body = between(letters, {}, "    ").strip()
     return [*lines, *f"    return {body};".splitlines(), "}"]
 
 
-def fetcher(language: Language, table: Table) -> list[str]:
+def fetcher(names: Names, table: Table) -> list[str]:
     """The function that reads one texel at integer positions, clamped outside (`gonio.ops.fetch`)."""
-    _, sizes, lines = _head(language, table, "fetch")
+    language = names.language
+    _, sizes, lines = _head(names, table, "fetch")
     integer = language.type("int")
     places = [f"{integer}(clamp({axis}, 0.0, {count - 1}.0))" for axis, count in sizes.items()]
-    return [*lines, f"    return {_texel(language, table, places)};", "}"]
+    return [*lines, f"    return {_texel(names, table, places)};", "}"]
 
 
 READERS = {"lookup": reader, "fetch": fetcher}
 
 
-def _head(language: Language, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
+def _head(names: Names, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
     """Names of the axes in the order of a lookup, slowest first; their numbers of texels; the function's first line."""
-    names = list("xyz"[: len(table.shape)])
+    language = names.language
+    letters = list("xyz"[: len(table.shape)])
     channels = width(table)
     real = language.type("float")
     result = real if channels == 1 else language.type(f"vec{channels}")
-    parameters = [(real, name) for name in names] + [(language.type("int"), "group")] * (groups(table) > 1)
-    sizes = dict(zip(names, table.shape, strict=True))
-    return names, sizes, [language.signature(result, f"{how}_{table.name}", parameters)]
+    parameters = [(real, name) for name in letters] + [(language.type("int"), "group")] * (groups(table) > 1)
+    sizes = dict(zip(letters, table.shape, strict=True))
+    return letters, sizes, [language.signature(result, names.table(table, f"{how}_"), parameters)]
 
 
-def _texel(language: Language, table: Table, places: list[str]) -> str:
+def _texel(names: Names, table: Table, places: list[str]) -> str:
     """A texel at positions along the axes, slowest first."""
     at = places[::-1]
     if groups(table) > 1 and len(at) == 3:
@@ -100,4 +103,4 @@ def _texel(language: Language, table: Table, places: list[str]) -> str:
         at.append("group")
     elif len(at) == 1:
         at.append("0")
-    return language.fetch(f"table_{table.name}", at) + {1: ".r", 2: ".rg", 4: ""}[width(table)]
+    return names.language.fetch(names.table(table, "table_"), at) + {1: ".r", 2: ".rg", 4: ""}[width(table)]

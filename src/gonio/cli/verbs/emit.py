@@ -5,21 +5,38 @@ from __future__ import annotations
 import json
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from typer import Option
+from typer import Argument, Option
 
 from .. import completion
-from ..options import Json, Material, Model, output_option
+from ..options import Json, Material, output_option
 from .base import MATERIALS, verb
 
 SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
 
+@dataclass
+class Place:
+    """The place of a shader in a module with other code."""
+
+    prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
+    group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, in WGSL and HLSL.")] = 0
+    first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
+
+
 @verb(MATERIALS, place=3)
 def emit(
-    model: Model,
+    model: Annotated[
+        list[str],
+        Argument(
+            metavar="MODEL",
+            help="A material; several share one module and the options.",
+            autocompletion=completion.materials,
+        ),
+    ],
     *,
     lang: Annotated[
         str, Option(metavar="NAME", help="The shader language.", autocompletion=completion.languages)
@@ -33,6 +50,10 @@ def emit(
     lean: Annotated[
         bool, Option("--lean", help="Omit layers that are off at these values, such as a coat of weight 0.")
     ] = False,
+    constants: Annotated[
+        bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
+    ] = False,
+    place: Place,
     as_json: Json = False,
 ) -> None:
     """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, or a language of yours.
@@ -45,8 +66,11 @@ def emit(
       gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
       gonio emit kulla-conty -p base=conductor -o shaders/
       gonio emit openpbr -p coat_weight=1 --lean
+      gonio emit conductor dielectric --prefix g_ --lang wgsl --group 1 --first-binding 4
+      gonio emit conductor --preset Au --constants
     """
     from ... import files
+    from ...shaders import Placement
     from ...shaders import bundle as make_bundle
 
     folders = [Path(one) for one in output or () if one.endswith(SLASHES)]
@@ -54,8 +78,13 @@ def emit(
     for path in single:  # before anything is computed or written
         files.check_file(path)
     for path in folders:
-        files.check_folder(path)
-    shader = make_bundle(made.text(model), lang, functions, lean=lean)
+        files.check_folder(path, parents=True)
+    options = {
+        "lean": lean,
+        "constants": constants,
+        "placement": Placement(place.prefix, place.group, place.first_binding),
+    }
+    shader = make_bundle(made.texts(model), lang, functions, **options)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())

@@ -92,8 +92,10 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
         near, far = near + 0.5 * twice, 0.5 * twice
     mirrored = metal * M + back * (1.0 - M) * mean(model.specular_color) + 0.01
     near, far = even + near + 0.01, far + passed
-    if model.two_faced:
+    if model.geometry_thin_walled:
         far = far + 0.01 * (1.0 - M)
+    elif model.refracts:  # a weight that is 0 in a shader has the probabilities of one that is left out
+        far = far + where(T > 0.0, 0.01 * (1.0 - M), 0.0)
     mirrored, refracted, near, far = (left * share for share in (mirrored, refracted, near, far))
     total = 1.0 / (fuzz + coat + mirrored + refracted + near + far)
     return Shares(*(share * total for share in (fuzz, coat, mirrored, refracted, near, far)))

@@ -24,6 +24,10 @@ class Language:
     overloads            whether functions of one name may differ in their types
     parameters_change    whether a function may assign to a parameter
     struct_literal       whether `Name(a, b)` constructs a struct inside an expression
+    end                  the end of a statement
+    single               whether all values are float32
+    standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
+    groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
     templates            whether `a < b, c > d` is parsed as template arguments
     """
 
@@ -57,6 +61,10 @@ class Language:
     overloads: ClassVar[bool] = True
     parameters_change: ClassVar[bool] = True
     struct_literal: ClassVar[bool] = True
+    groups: ClassVar[bool] = False
+    end: ClassVar[str] = ";"
+    single: ClassVar[bool] = True
+    standalone: ClassVar[bool] = False
     templates: ClassVar[bool] = False
 
     def type(self, name: str) -> str:
@@ -82,6 +90,10 @@ class Language:
     def constant(self, name: str, text: str) -> str:
         """The declaration of a constant."""
         return f"const float {name} = {text};"
+
+    def values(self, type_: str, name: str, parts: list[str]) -> str:
+        """The declaration of a constant struct."""
+        return f"const {type_} {name} = {type_}({', '.join(parts)});"
 
     def struct(self, name: str, fields: list[tuple[str, str]]) -> list[str]:
         """The lines of a struct with fields (type, name)."""

@@ -52,12 +52,17 @@ class HLSL(Language):
     mix = "lerp"
     reserved = frozenset(_RESERVED.split())
     struct_literal = False
+    groups = True
 
     def constant(self, name: str, text: str) -> str:
         return f"static const float {name} = {text};"
 
-    def binding(self, name: str, dimension: int, place: int) -> list[str]:
-        return [f"Texture{dimension}D<float4> {name} : register(t{place});"]
+    def values(self, type_: str, name: str, parts: list[str]) -> str:
+        return f"static const {type_} {name} = {{ {', '.join(parts)} }};"
+
+    def binding(self, name: str, dimension: int, place: int, group: int = 0) -> list[str]:
+        space = f", space{group}" if group else ""
+        return [f"Texture{dimension}D<float4> {name} : register(t{place}{space});"]
 
     def fetch(self, table: str, places: list[str]) -> str:
         return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"

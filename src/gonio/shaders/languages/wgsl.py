@@ -55,6 +55,7 @@ class WGSL(Language):
     overloads = False
     parameters_change = False
     templates = True
+    groups = True
 
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
         return f"fn {name}({', '.join(f'{p}: {type_}' for type_, p in parameters)}) -> {result} {{"
@@ -68,11 +69,14 @@ class WGSL(Language):
     def constant(self, name: str, text: str) -> str:
         return f"const {name} = {text}f;" if "e" in text else f"const {name}: f32 = {text};"
 
+    def values(self, type_: str, name: str, parts: list[str]) -> str:
+        return f"const {name} = {type_}({', '.join(parts)});"
+
     def struct(self, name: str, fields: list[tuple[str, str]]) -> list[str]:
         return [f"struct {name} {{", *(f"    {field}: {type_}," for type_, field in fields), "}"]
 
-    def binding(self, name: str, dimension: int, place: int) -> list[str]:
-        return [f"@group(0) @binding({place}) var {name}: texture_{dimension}d<f32>;"]
+    def binding(self, name: str, dimension: int, place: int, group: int = 0) -> list[str]:
+        return [f"@group({group}) @binding({place}) var {name}: texture_{dimension}d<f32>;"]
 
     def fetch(self, table: str, places: list[str]) -> str:
         return f"textureLoad({table}, vec{len(places)}i({', '.join(places)}), 0)"

@@ -1,0 +1,159 @@
+"""The text of a shader: its head, and the blocks that declare one name each."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from .._version import __version__
+from ..material import tree
+from ..ops.table import Table
+from .languages import Language
+from .layout import COLUMNS, INDENT, comment, wrap
+from .manifest import TERMS
+from .names import Names
+from .program import ENTRIES, Program, choices
+from .routine import RoutineWriter
+from .syntax import literal
+from .textures import READERS, axes
+from .values import Record, stem_of
+
+
+class Block(NamedTuple):
+    """The declaration of one name, or of one overload of a function.
+
+    kind   "constant", "struct", "table", "function" or "values"
+    name   without prefix; of a table "table_NAME", which stands for the functions that read it as well
+    table  the table, of that kind
+    """
+
+    kind: str
+    name: str
+    lines: list[str]
+    table: Table | None = None
+
+
+def blocks(made: Program, names: Names, bindings: Mapping[int, int]) -> list[Block]:
+    """The declarations of a shader, each before its use.
+
+    bindings  number of the binding of each table, by the table's identity
+    """
+    language = names.language
+    bodies = [
+        Block("function", _raw(names, names.routines[r]), RoutineWriter(names, r).text())
+        for r in made.routines
+        if stem_of(r) not in language.native
+    ]
+    result = []
+    for name, (value, about) in names.constants.items():
+        line = language.constant(names.public(name), literal(value))
+        if about and len(line) + len(about) + 4 <= 110:
+            result.append(Block("constant", name, [f"{line}  // {about}"]))
+        else:
+            result.append(Block("constant", name, [*(f"// {text}" for text in textwrap.wrap(about, 105)), line]))
+    for record in structs(made, names):
+        lines = [*comment(record.doc), *_struct(record, names)]
+        result.append(Block("struct", language.word(record.name), lines))
+    for table in made.tables:
+        result.append(Block("table", f"table_{table.name}", _table(made, names, table, bindings[id(table)]), table))
+    return result + bodies
+
+
+def _raw(names: Names, name: str) -> str:
+    """A public name without the prefix, as it was before it was replaced."""
+    name = name.removeprefix(names.placement.prefix)
+    return next((before for before, after in names.renamed.items() if after == name), name)
+
+
+def joined(head: Sequence[str], declared: Sequence[Block]) -> str:
+    """The text of a shader: constants line after line, all else parted by an empty line."""
+    constants = [line for block in declared if block.kind == "constant" for line in block.lines]
+    parts = [list(head), constants, *(block.lines for block in declared if block.kind != "constant")]
+    return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
+
+
+def _table(made: Program, names: Names, table: Table, binding: int) -> list[str]:
+    """The declaration of a table's texture, and the functions that read it."""
+    language = names.language
+    size = " x ".join(map(str, table.shape))
+    channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
+    readings = sorted(made.readings[id(table)])
+    rule = "linear between texel centers, " if "lookup" in readings else ""
+    about = f"// {size} texels, {channels}; {rule}clamped outside."
+    group = [names.placement.group] if language.groups else []
+    dimension = 3 if len(axes(table)) == 3 else 2
+    binding_lines = language.binding(names.table(table, "table_"), dimension, binding, *group)
+    readers = [line for how in readings for line in ("", *READERS[how](names, table))]
+    return [*binding_lines, "", about, *readers[1:]]
+
+
+def values(made: Program, names: Names, numbers: Mapping[str, Any]) -> Block:
+    """The material's own values as a constant of its struct."""
+    struct = made.struct_of(made.bound)
+    assert struct is not None
+    language = names.language
+    parts = []
+    for (_, type_), path in zip(struct.record.fields, struct.paths, strict=True):
+        inside = ", ".join(map(literal, numbers[path])) if type_ != "float" else literal(numbers[path])
+        parts.append(inside if type_ == "float" else f"{language.type(type_)}({inside})")
+    name = f"{language.word(struct.record.name)}_values"
+    line = language.values(names.struct(struct.record), names.public(name), parts or ["0.0"])
+    return Block("values", name, ["// The values of this material.", *wrap(line, "")])
+
+
+def head(made: Program, names: Names) -> list[str]:
+    model, language = made.model, names.language
+    entries = sorted(made.entries.items(), key=lambda entry: list(ENTRIES).index(entry[0]))
+    shaped = [f"{path} = {value}" for path, value in choices(model)]
+    lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
+    lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
+    if made.without:
+        off = ", ".join(f"{path} = {tree.value_at(model, path):g}" for path in made.without)
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap(f"Written without parts that are off: {off}.", 105))]
+    if shaped:
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(shaped) + ".", 105))]
+    lines += ["//"]
+    calls = [
+        f"{names.routines[routine]}({', '.join(_arguments(made, method, language))})" for method, routine in entries
+    ]
+    for call, (method, _) in zip(calls, entries, strict=True):
+        lines.append(f"// {call:{max(map(len, calls))}}  {ENTRIES[method]}")
+    lines += [
+        "//",
+        "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
+        f"// the shading normal. Colors are linear RGB. {language.precision}",
+    ]
+    return lines
+
+
+def _arguments(made: Program, method: str, language: Language) -> list[str]:
+    first = [language.word("self")]
+    if method == "derive":
+        return first
+    return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
+
+
+def structs(made: Program, names: Names) -> list[Record]:
+    own = made.struct_of(made.bound)
+    assert own is not None
+    names.note(own.record)
+    if made.derived is not None:
+        names.note(made.derived.record)
+    return list(names.records.values())
+
+
+def _struct(record: Record, names: Names) -> list[str]:
+    fields = [(names.language.type(type_), names.language.word(name)) for name, type_ in record.fields]
+    if not fields:  # a struct needs at least one member
+        fields = [(names.language.type("float"), "nothing")]
+    lines = names.language.struct(names.struct(record), fields)
+    for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
+        about = record.docs.get(name) or (TERMS.get(name, "") if record.name.endswith("Terms") else "")
+        if about and len(lines[place]) + len(about) + 5 <= COLUMNS + 10:
+            lines[place] += f"  // {about}"
+        elif about:
+            lines[place:place] = [f"{INDENT}// {text}" for text in textwrap.wrap(about, COLUMNS)]
+    return lines
