@@ -43,6 +43,7 @@ _PLACES = {
     ),
     "catalog.library": ("fits", "materials"),
     "catalog.notation": ("material",),
+    "catalog.shaders": ("Shader",),
     "measure.compression.compress": ("compress",),
     "fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from . import ops
     from .catalog import notation as _notation
     from .catalog.library import fits, materials
+    from .catalog.shaders import Shader
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError
     from .fitting.fit import fit
@@ -225,6 +227,7 @@ __all__ = [
     "RandomWalk",
     "Sample",
     "Scalar",
+    "Shader",
     "Spectrum",
     "Stretched",
     "ThinDielectric",

@@ -29,7 +29,7 @@ from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.parameters import ChoiceParameter, IndexParameter, Parameter, Value
 from ..optics.indices import DispersiveIndex
-from . import documents, library, outside
+from . import documents, library, outside, texts
 from .texts import apart, assignment, class_named, split, taken_apart
 
 Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
@@ -227,7 +227,9 @@ def as_json(material: BSDF) -> dict[str, object]:
     Raises InputError for a class without a file, and for values that JSON cannot express.
     """
     notation: dict[str, object] = {"type": spelled(type(material))}
-    if notation["type"] != type(material).name and ":" not in str(notation["type"]):
+    if type(material).spelling:
+        notation = {"type": texts.SHADER, "file": type(material).spelling}
+    elif notation["type"] != type(material).name and ":" not in str(notation["type"]):
         what = f"the class {type(material).__name__} is known to this program only"
         raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
     for name, value in settings(material).items():
@@ -261,7 +263,7 @@ def from_json(described: Mapping[str, object]) -> BSDF:
     if not isinstance(described, Mapping) or "type" not in described:
         raise InputError(f"{described!r:.60} describes no material", "material", 'such as {"type": "conductor"}')
     fields = dict(described)
-    return made(class_named(str(fields.pop("type")), "material"), fields)[0]
+    return made(class_named(texts.named_by(fields), "material"), fields)[0]
 
 
 def settings(material: BSDF) -> dict[str, Value]:
@@ -318,7 +320,9 @@ def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
 
 
 def spelled(cls: type[BSDF]) -> str:
-    """The text that names a class: a material's name, or FILE.py:CLASS."""
+    """The text that names a class: a material's name, FILE.py:CLASS, or the file of a shader."""
+    if cls.spelling:
+        return cls.spelling
     if BSDF.family.all().get(cls.name) is cls:
         return cls.name
     try:

@@ -121,7 +121,7 @@ def readings(text: str) -> list[Kind]:
         return _in_folder(path, _names(head))
     if documents.names_document(head):
         return _described(_type_of_file(head), Kind.DOCUMENT)
-    if outside.reader_of(head):
+    if outside.names_data(head):
         return [Kind.TABLE]
     by_suffix = _of_file(path)
     if by_suffix:

@@ -31,16 +31,22 @@ from ..material.user_code import (
 )
 from ..ops import ForbiddenOperator, RecordingError
 from ..owner import exclusive
+from . import shaders
 
 __all__ = [
     "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
-    "names_code", "probe", "reader_of", "thing", "with_imports",
+    "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
 ]  # fmt: skip
 
 
 def reader_of(text: str) -> type[BSDF] | None:
     """The material class of a data file, by its name: Measured for "gold.binary"; None if there is none."""
     return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
+
+
+def names_data(text: str) -> bool:
+    """Whether a text names a file that is a material by itself: measured values, or a shader."""
+    return shaders.names_shader(text) or reader_of(text) is not None
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:

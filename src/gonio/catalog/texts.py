@@ -15,8 +15,9 @@ from ..errors import InputError
 from ..material import is_model, model, tree
 from ..material.bsdf import BSDF
 from ..material.parameters import Value
-from . import documents, library, outside
+from . import documents, library, outside, shaders
 
+SHADER = "shader"  # the type of shaders in scenes and JSON: {"type": "shader", "file": "my.glsl"}
 RANGE_STEPS = 5  # values of a range
 _RANGE = re.compile(r"(.+?)\.\.(.+)", re.DOTALL)
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
@@ -47,6 +48,8 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
         _refuse_code(described, head, allow_code)
         cls = class_named(str(described.pop("type")), where)
         return cls, {**described, **given}
+    if shaders.names_shader(head):
+        return shaders.class_of(head), given
     reader = outside.reader_of(head)
     if reader is not None:
         return reader, {"file": head, **given}
@@ -69,7 +72,7 @@ def split(text: str) -> tuple[str, str]:
         return text[:end], text[end:].strip("() ")
     head = text
     while True:
-        if outside.reader_of(head) or (documents.names_document(head) and not _SETTINGS.search(head)):
+        if outside.names_data(head) or (documents.names_document(head) and not _SETTINGS.search(head)):
             return head, text[len(head) :].strip("() ")
         head, bracket, _ = head.rpartition("(")
         if not bracket:
@@ -140,6 +143,8 @@ def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
     with the closest known name, for an unknown name."""
     if outside.names_code(name):
         return outside.load(name, where=where), ""
+    if shaders.names_shader(name):
+        return shaders.class_of(name), ""
     if not is_model(name) and (":" in name or library.resembles(name)):
         return library.named(name, where)
     return model(name), ""
@@ -154,9 +159,15 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise _no_material(value, where)
     fields = documents.from_scenes(value)
-    name = str(fields.pop("type"))
+    name = named_by(fields)
     cls, preset = class_and_preset(name, where)
     return cls, {"preset": preset, **fields} if preset else fields
+
+
+def named_by(fields: dict[str, object]) -> str:
+    """The name of a class by the "type" of a description, and by the "file" of a shader; both are removed."""
+    name = str(fields.pop("type"))
+    return str(fields.pop("file")) if name == SHADER and "file" in fields else name
 
 
 def as_text(value: object) -> str:

@@ -50,6 +50,7 @@ class BSDF(Material):
     """Base of every material. Subclasses are frozen dataclasses; `name` is derived from the class name by default.
 
     known_violations    law -> KnownViolation, for laws that the model violates by design (Phong: reciprocity, energy)
+    spelling    the file that a class was made from, by which texts name it; "" for classes written in Python
     only_rgb    whether eval returns red, green and blue regardless of the renderer's channels
     stochastic  whether eval, pdf and weight are random estimates whose expectation is the exact value
     reads_wavelengths  whether it needs the rays' wavelengths, as `wavelengths` of its bound copy
@@ -59,6 +60,7 @@ class BSDF(Material):
 
     family: ClassVar[Family[type[BSDF]]]
     name: ClassVar[str] = ""
+    spelling: ClassVar[str] = ""
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {}
     stochastic: ClassVar[bool] = False
     only_rgb: ClassVar[bool] = False

@@ -1,0 +1,247 @@
+"""Shader files as material classes, made once per saved version.
+
+cls = class_of("my.glsl")      # a class with the shader's parameters
+Shader("my.glsl", roughness=0.3)
+"""
+
+from __future__ import annotations
+
+import copyreg
+import keyword
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...material import parameters as kinds
+from ...material.bsdf import BSDF
+from ...ops.table import Table
+from ...spirv import compile_text, parse
+from ...spirv.images import Texture
+from . import adapter as adapters
+from . import explorer
+from .adapter import Adapter
+from .material import _SampledShaderFile, _ShaderFile
+from .program import Declared, Program
+
+SUFFIXES = (".glsl", ".frag", ".hlsl", ".spv", ".brdf")
+MAX_FILE = 4 << 20  # bytes of a shader
+MAX_TABLE = 1 << 28
+MAX_CLASSES = 64  # in memory
+# parameters whose names say that they lie in [0, 1]
+_UNIT = re.compile(
+    r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.IGNORECASE
+)
+
+
+def names_shader(text: str) -> bool:
+    """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
+    path = Path(os.path.expanduser(text.strip()))
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES or "\0" in text:
+        return False
+    if suffix != ".brdf":
+        return True
+    try:
+        with path.open("rb") as file:
+            return explorer.is_explorer(file.read(1 << 16).decode("utf-8", "replace"))
+    except OSError:
+        return False
+
+
+def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:  # noqa: N802: it makes a material, as a class does
+    """A material from a shader: GLSL, HLSL, SPIR-V, or a .brdf file of the BRDF Explorer.
+
+        go.Shader("my.glsl", roughness=0.3)
+
+    file        the shader; FILE.toml beside it is its adapter, see docs/shaders.md
+    parameters  values of its parameters
+    Raises InputError, with file and line, for what cannot be read; MachineError without a compiler.
+    """
+    cls: Any = class_of(os.fspath(file))
+    unknown = [name for name in parameters if name not in cls.parameters()]
+    if unknown:
+        known = ", ".join(cls.parameters()) or "none"
+        raise InputError(f"no parameter '{unknown[0]}'", os.fspath(file), f"it has: {known}")
+    material: BSDF = cls(**parameters)
+    return material
+
+
+_classes: dict[tuple[str, str], tuple[object, type[BSDF]]] = {}
+
+
+def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
+    """The class of a shader file.
+
+    inside  the folder in which the files that the adapter names must lie, None for any folder
+    """
+    path = Path(os.path.expanduser(text.strip())).absolute()
+    beside = next((one for one in (Path(f"{path}.toml"), path.with_suffix(".toml")) if one.is_file()), None)
+    try:
+        stamp = tuple((one.stat().st_mtime_ns, one.stat().st_size) for one in (path, beside) if one is not None)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no file '{text}'", text, str(getattr(error, "strerror", "") or "")) from None
+    key = str(path), str(inside)
+    known = _classes.pop(key, None)
+    if known is None or known[0] != stamp:
+        program = read(path, beside, inside)
+        known = stamp, _made(path, program)
+    _classes[key] = known
+    while len(_classes) > MAX_CLASSES:
+        _classes.pop(next(iter(_classes)))
+    return known[1]
+
+
+def read(path: Path, beside: Path | None, inside: Path | None = None) -> Program:
+    """The program of a file, with the adapter beside it or guesses."""
+    where = path.name
+    if not path.is_file():
+        raise InputError(f"'{path}' is no file", where)
+    if path.stat().st_size > MAX_FILE:
+        raise InputError(f"over {MAX_FILE >> 20} MB", where, "a shader is shorter")
+    if beside is not None:
+        _confined(beside, inside)
+    adapter = adapters.read(beside) if beside is not None else Adapter()
+    data = path.read_bytes()
+    if path.suffix.lower() == ".spv":
+        module = parse(data, where)
+    else:
+        text = data.decode("utf-8", "replace")
+        if path.suffix.lower() == ".brdf":
+            text, described = explorer.read(text, where)
+            adapter = described if beside is None else adapter
+        language = adapter.language or ("hlsl" if path.suffix.lower() == ".hlsl" else "glsl")
+        folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
+        module = parse(compile_text(text, where, language=language, defines=adapter.defines, folders=folders), where)
+    textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
+    return Program(module, adapter, textures, where)
+
+
+def _confined(path: Path, inside: Path | None) -> Path:
+    """A file or folder that an adapter names."""
+    resolved = path.resolve()
+    if inside is not None and not resolved.is_relative_to(inside.resolve()):
+        raise InputError(f"'{path.name}' lies outside the scene's folder {inside}", str(path), "copy it there")
+    return resolved
+
+
+def _texture(name: str, about: Mapping[str, str], folder: Path, inside: Path | None) -> Texture:
+    path = _confined(folder / about["file"], inside)
+    where = f"textures.{name}"
+    try:
+        if path.stat().st_size > MAX_TABLE:
+            raise InputError(f"'{path.name}' has over {MAX_TABLE >> 20} MB", where)
+        values = np.load(path, allow_pickle=False)
+        values = np.asarray(values, np.float64)
+    except (OSError, ValueError, EOFError) as error:
+        what = f"'{about['file']}' is no table: {error}"
+        raise InputError(what[:200], where, "an .npy of numbers, (rows, columns, channels)") from None
+    if values.ndim not in (2, 3, 4) or values.shape[-1] > 4 or values.size == 0 or not np.all(np.isfinite(values)):
+        what = f"'{about['file']}' of shape {values.shape}, finite numbers of 1 to 4 channels last expected"
+        raise InputError(what, where, "numpy.save(FILE, array) with shape (rows, columns, channels)")
+    return Texture(name, Table(name, values), about.get("wrap", "clamp"), about.get("filter", "linear"))
+
+
+# --------------------------------------------------------------------------- classes
+
+
+class _ShaderType(type):
+    """The type of classes made from files, by which they are pickled as the file's name."""
+
+
+def _pickled(cls: _ShaderType) -> object:
+    text = getattr(cls, "spelling", "")
+    return (class_of, (text,)) if text else cls.__qualname__
+
+
+copyreg.pickle(_ShaderType, _pickled)  # type: ignore[arg-type]
+
+
+class _Shader(_ShaderFile, metaclass=_ShaderType):
+    """Base of classes without a density of their own."""
+
+
+class _SampledShader(_SampledShaderFile, metaclass=_ShaderType):
+    """Base of classes with one."""
+
+
+def _made(path: Path, program: Program) -> type[BSDF]:
+    sampled = {"pdf", "sample"} <= set(program.formulas)
+    fields: dict[str, tuple[str, ...]] = {}
+    namespace: dict[str, Any] = {"__annotations__": {}}
+    for declared in program.parameters.values():
+        for name, value in _fields(declared):
+            fields[declared.name] = (*fields.get(declared.name, ()), name)
+            namespace[name] = value
+            namespace["__annotations__"][name] = "parameter"
+    stem = "".join(word.capitalize() for word in re.findall(r"[A-Za-z0-9]+", path.stem)) or "Shader"
+    stem = stem if stem[0].isalpha() else f"Shader{stem}"
+    about = program.adapter.doc or f"The function {program.adapter.function} of {path.name}"
+    namespace |= {
+        "__doc__": f"{about.rstrip('.')}.",
+        "__module__": __name__,
+        "spelling": str(path),
+        "name": re.sub(r"[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "shader",
+        "program": program,
+        "fields": fields,
+    }
+    cls: Any = _ShaderType(stem, (_SampledShader if sampled else _Shader,), namespace)
+    _probe(cls())
+    return cls  # type: ignore[no-any-return]
+
+
+def _probe(material: BSDF) -> None:
+    """Raise InputError, with file and line, for constructs that are not read, before a law or a render meets them."""
+    for formula in ("eval", "pdf", "sample") if not type(material).guided else ("eval",):
+        material.record(formula)
+
+
+_RESERVED = {
+    *dir(BSDF),
+    *keyword.kwlist,
+    "file",
+    "type",
+    "preset",
+    "normalmap",
+    "bump",
+    "two_sided",
+    "program",
+    "fields",
+}
+
+
+def _fields(declared: Declared) -> list[tuple[str, Any]]:
+    """The fields of a parameter: one, or one per component of vectors that are no colors."""
+    name = f"{declared.name}_" if declared.name in _RESERVED else declared.name.lstrip("_")
+    uniform = declared.uniform
+    doc = uniform.doc or f"{declared.shape} {declared.name} of the shader"
+    guess = (0.0, 1.0) if _UNIT.search(declared.name) else (-np.inf, np.inf)
+    low = guess[0] if uniform.low is None else uniform.low
+    high = guess[1] if uniform.high is None else uniform.high
+    default = 0.5 if uniform.default is None else uniform.default
+    if declared.shape == "bool":
+        return [(name, kinds.flag(bool(uniform.default), doc))]
+    if declared.shape == "vec3":
+        color = default if isinstance(default, tuple) else float(default)
+        return [(name, kinds.spectrum(color, doc, low=low, high=high, unit=uniform.unit))]
+    if declared.shape in ("vec2", "vec4"):
+        letters = "xyzw"[: int(declared.shape[-1])]
+        parts = default if isinstance(default, tuple) else (default,) * len(letters)
+        if len(parts) != len(letters):
+            raise InputError(f"{len(parts)} defaults of {declared.shape} {declared.name}", "adapter")
+        return [
+            (f"{name}_{letter}", kinds.number(float(part), f"{doc}, {letter}", low=low, high=high))
+            for letter, part in zip(letters, parts, strict=True)
+        ]
+    if isinstance(default, tuple):
+        raise InputError(f"{len(default)} defaults of {declared.shape} {declared.name}", "adapter", "one number")
+    return [(name, kinds.number(float(default), doc, low=low, high=high, unit=uniform.unit))]
+
+
+def forget() -> None:
+    """Read all files again on their next use."""
+    _classes.clear()

@@ -1,0 +1,130 @@
+"""A shader as a material: eval, and pdf and sample if the shader has both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...material import tree
+from ...material.bsdf import BSDF
+from ...material.calling import method
+from ...material.sample import Sample
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum
+from ...ops.types import Value
+from ...spirv.values import leaves, numeric, truth, where
+
+if TYPE_CHECKING:
+    from .program import Program
+
+ROTATIONS = 64  # directions at which isotropy is tested
+ISOTROPIC = 1e-9  # relative change by a rotation, in 64 bits
+
+
+class _ShaderFile(BSDF):
+    """A shader's BRDF; a guide samples it.
+
+    program  the shader, with the meaning of its functions
+    fields   parameter of the shader -> the fields that hold it, one per component of vectors that are no colors
+    """
+
+    program: ClassVar[Program]
+    fields: ClassVar[dict[str, tuple[str, ...]]] = {}
+    only_rgb: ClassVar[bool] = True
+
+    @property
+    def transmits(self) -> bool:
+        return self.program.adapter.transmits
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether rotations about the normal change no value: tested at some directions."""
+        plain = self.plain
+        cached = vars(plain).get("_isotropic")
+        if cached is None:
+            cached = _is_isotropic(plain)
+            vars(plain)["_isotropic"] = cached
+        return bool(cached)
+
+    def _values(self) -> dict[str, Value]:
+        values: dict[str, Value] = {}
+        for name, fields in self.fields.items():
+            given = [getattr(self, field) for field in fields]
+            if self.program.parameters[name].shape == "vec3":
+                values[name] = tuple(ops.channels(given[0]))
+            else:
+                values[name] = given[0] if len(given) == 1 else tuple(given)
+        return values
+
+    def _run(self, formula: str, wo: Direction, **others: Direction) -> Value:
+        directions = {"view": (wo.x, wo.y, wo.z), **{name: (v.x, v.y, v.z) for name, v in others.items()}}
+        return self.program.run(formula, self._values(), directions)
+
+    def _above(self, wo: Direction, wi: Direction) -> Mask:
+        if self.program.adapter.transmits:
+            return (wo.z != 0.0) & (wi.z != 0.0)
+        return (wo.z > 0.0) & (wi.z > 0.0)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The shader's function, times |cos theta_i| unless it includes that."""
+        factor = 1.0 if self.program.adapter.cosine else ops.abs(wi.z)
+        above = self._above(wo, wi)
+        color = self.program.color(self._run("eval", wo, light=wi))
+        return ops.vec3(*[where(above, channel * factor, 0.0) for channel in color])
+
+
+class _SampledShaderFile(_ShaderFile):
+    """A shader with its own pdf and sample."""
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The shader's density."""
+        density = numeric(leaves(self._run("pdf", wo, light=wi))[0])
+        return where(self._above(wo, wi), density, 0.0)  # type: ignore[no-any-return]
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """The shader's direction; its weight is the shader's own if it returns one, else eval / pdf."""
+        drawn = self._run("sample", wo, u=u)
+        members = dict(zip(self.program.members("sample"), drawn, strict=False))
+        direction = next((members[name] for name in ("wi", "direction", "L", "l", "dir") if name in members), drawn)
+        wi: Value = ops.vec3(*[numeric(part) for part in leaves(direction)[:3]])
+        if "weight" not in members or "pdf" not in members:
+            return self._weighted(wi=wi, wo=wo, mode=mode)
+        weight: Value = ops.vec3(*[numeric(part) for part in leaves(members["weight"])])
+        made = Sample.of_density(wi, weight, numeric(members["pdf"]))
+        if "delta" not in members:
+            return made
+        delta = truth(members["delta"])
+        return made._replace(delta=delta if not isinstance(delta, bool) else made.delta)
+
+
+def _is_isotropic(material: _ShaderFile) -> bool:
+    random = np.random.default_rng(1)
+
+    def directions() -> Any:
+        z, phi = random.uniform(0.05, 1.0, ROTATIONS), random.uniform(0.0, 2.0 * np.pi, ROTATIONS)
+        r = np.sqrt(1.0 - z * z)
+        return np.stack([r * np.cos(phi), r * np.sin(phi), z])
+
+    wo, wi, turn = directions(), directions(), random.uniform(0.3, 6.0, ROTATIONS)
+    graph = material.record("eval")
+    given: dict[str, Any] = {}
+    for leaf in tree.leaves(material):
+        if leaf.parameter.numeric:
+            value = np.asarray(leaf.value, float)
+            value = value if value.ndim < 2 else value[0]
+            given[f"self_{leaf.path}"] = np.broadcast_to(value, (3,)) if leaf.parameter.kind == "spectrum" else value
+
+    def values(by: Any) -> Any:
+        c, s = np.cos(by), np.sin(by)
+        turned = [np.stack([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]) for v in (wo, wi)]
+        every = {name: value[:, None] if np.ndim(value) else value for name, value in given.items()}
+        return np.asarray(graph.evaluate(wo=turned[0], wi=turned[1], **every))
+
+    first, second = values(0.0 * turn), values(turn)
+    size = np.maximum(np.abs(first), np.abs(second))
+    same = np.abs(first - second) <= ISOTROPIC * size + 1e-12
+    return bool(np.all(same | ~np.isfinite(size)))

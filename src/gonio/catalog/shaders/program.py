@@ -1,0 +1,241 @@
+"""A shader with its adapter: which parameters it has, and its functions on the values of a material."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from ...errors import InputError
+from ...spirv import Machine, Module
+from ...spirv.arithmetic import elementwise
+from ...spirv.images import Texture
+from ...spirv.module import Function
+from ...spirv.standard import normalize
+from ...spirv.values import Value, leaves, numeric
+from .adapter import Adapter, Uniform, meaning_of
+
+
+class Declared(NamedTuple):
+    """A parameter of a shader: where it is, its shape ("float", "vec3", ...), and what the adapter says."""
+
+    name: str
+    shape: str
+    uniform: Uniform
+
+
+class Program:
+    """A module with the meaning of its functions. Raises InputError if the meaning does not fit the functions."""
+
+    def __init__(self, module: Module, adapter: Adapter, textures: dict[str, Texture], where: str) -> None:
+        self.module, self.textures, self.where = module, textures, where
+        self.adapter = _completed(module, adapter, where)
+        self.eval = _one(module, self.adapter.function, where)
+        self.formulas = {"eval": (self.eval, self.adapter.arguments)}
+        for name, arguments in (("pdf", self.adapter.pdf_arguments), ("sample", self.adapter.sample_arguments)):
+            if function := getattr(self.adapter, name):
+                self.formulas[name] = _one(module, function, where), arguments
+        for name, (function, arguments) in self.formulas.items():
+            if len(arguments) != len(function.parameters):
+                what = f"{name}: {len(arguments)} meanings for the {len(function.parameters)} arguments of "
+                raise InputError(f"{what}'{_title(module, function)}'", where, "one meaning per argument")
+        declared = {one.name: one for one in self._declared()}
+        self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
+
+    # ------------------------------------------------------------------ parameters
+
+    def _declared(self) -> Iterator[Declared]:
+        seen: set[str] = set()
+        for name, type in (*self._uniforms(), *self._arguments()):
+            if name in seen:
+                continue
+            seen.add(name)
+            shape = self.module.shape(type)
+            if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
+                yield Declared(name, shape, self.adapter.parameters.get(name, Uniform()))
+        unknown = [name for name in self.adapter.parameters if name not in seen]
+        if unknown:
+            known = ", ".join(sorted(seen)) or "none"
+            raise InputError(f"no uniform '{unknown[0]}' in the shader", self.where, f"it has: {known}")
+
+    def _uniforms(self) -> Iterator[tuple[str, int]]:
+        module = self.module
+        for id, one in module.variables.items():
+            storage, inside = module.type(one.type).count, module.type(one.type).parts[0]
+            if storage not in (0, 2, 9, 12) or len(one.operands) > 1:  # uniform constant, uniform, push, storage
+                continue
+            name = module.names.get(id, "")
+            if module.type(inside).kind != "struct":
+                yield name, inside
+                continue
+            for place, part in enumerate(module.type(inside).parts):
+                yield module.members.get((inside, place), f"{name}_{place}"), part
+
+    def _arguments(self) -> Iterator[tuple[str, int]]:
+        """Arguments of the functions that are parameters; the members of structs."""
+        for function, meanings in self.formulas.values():
+            for (id, type), meaning in zip(function.parameters, meanings, strict=True):
+                if meaning == "parameter":
+                    yield from self._members(self.module.names.get(id, "argument"), type)
+
+    def _members(self, name: str, type: int) -> Iterator[tuple[str, int]]:
+        kind = self.module.type(type)
+        if kind.kind == "pointer":
+            yield from self._members(name, kind.parts[0])
+        elif kind.kind == "struct":
+            for place, part in enumerate(kind.parts):
+                yield from self._members(self.module.members.get((type, place), f"{name}_{place}"), part)
+        else:
+            yield name, type
+
+    # ------------------------------------------------------------------ running
+
+    def run(self, formula: str, values: dict[str, Value], directions: dict[str, Value]) -> Value:
+        """A formula's result, as tuples of scalars.
+
+        values      by parameter: a scalar, or a tuple of scalars
+        directions  "light", "view", "u": tuples of three scalars
+        """
+        machine = Machine(self.module, values, self.textures)
+        for start in self.module.function("main") or self.module.function("gonio_entry"):
+            if not start.parameters:  # it assigns the initial values of globals
+                machine.call(start, ())
+        function, meanings = self.formulas[formula]
+        arguments = [
+            self._argument(type, meaning, self.module.names.get(id, "argument"), values, directions)
+            for (id, type), meaning in zip(function.parameters, meanings, strict=True)
+        ]
+        return machine.call(function, arguments)
+
+    def _argument(
+        self, type: int, meaning: str, name: str, values: dict[str, Value], directions: dict[str, Value]
+    ) -> Value:
+        if meaning != "parameter":
+            value = _GIVEN[meaning](directions)
+            kind = self.module.type(type)
+            kind = self.module.type(kind.parts[0]) if kind.kind == "pointer" else kind
+            return value[: kind.count] if kind.kind == "vector" and isinstance(value, tuple) else value
+        kind = self.module.type(type)
+        if kind.kind == "pointer":
+            return self._argument(kind.parts[0], meaning, name, values, directions)
+        if kind.kind == "struct":
+            members = [self.module.members.get((type, p), f"{name}_{p}") for p in range(len(kind.parts))]
+            return tuple(
+                self._argument(part, meaning, member, values, directions)
+                for part, member in zip(kind.parts, members, strict=True)
+            )
+        return values[name] if name in values else self.module.zero(type)
+
+    def color(self, value: Value) -> Value:
+        """A result as a color: a number is gray."""
+        parts = leaves(value)
+        if len(parts) not in (1, 3, 4):
+            raise InputError(
+                f"'{self.adapter.function}' returns {len(parts)} numbers", self.where, "a color or a number"
+            )
+        red, green, blue = parts[:3] if len(parts) > 1 else parts * 3
+        return numeric(red), numeric(green), numeric(blue)
+
+    def members(self, formula: str) -> list[str]:
+        """The names of the members of a formula's result, empty if it is no struct."""
+        type = self.formulas[formula][0].type
+        count = len(self.module.type(type).parts) if self.module.type(type).kind == "struct" else 0
+        return [self.module.members.get((type, place), "") for place in range(count)]
+
+
+def _half(given: dict[str, Value]) -> Value:
+    return normalize(elementwise(lambda a, b: a + b, given["light"], given["view"]))
+
+
+def _cosine(a: Value, b: Value) -> Value:
+    return sum((x * y for x, y in zip(a[1:], b[1:], strict=True)), a[0] * b[0])
+
+
+_GIVEN: dict[str, Callable[[dict[str, Value]], Any]] = {
+    "light": lambda given: given["light"],
+    "view": lambda given: given["view"],
+    "incident": lambda given: tuple(-x for x in given["light"]),
+    "normal": lambda given: (0.0, 0.0, 1.0),
+    "tangent": lambda given: (1.0, 0.0, 0.0),
+    "bitangent": lambda given: (0.0, 1.0, 0.0),
+    "half": _half,
+    "n.l": lambda given: given["light"][2],
+    "n.v": lambda given: given["view"][2],
+    "n.h": lambda given: _half(given)[2],
+    "l.h": lambda given: _cosine(given["light"], _half(given)),
+    "l.v": lambda given: _cosine(given["light"], given["view"]),
+    "u": lambda given: given["u"],
+}
+
+
+# --------------------------------------------------------------------------- guesses
+
+
+def _title(module: Module, function: Function) -> str:
+    return module.names.get(function.id, str(function.id)).partition("(")[0]
+
+
+def _one(module: Module, name: str, where: str) -> Function:
+    functions = module.function(name)
+    if not functions:
+        known = sorted({_title(module, one) for one in module.functions.values()} - {"main", "gonio_entry"})
+        what = f"no function '{name}'" if name else "no function that looks like a BRDF"
+        hint = f"function = 'NAME' in the adapter; it has {', '.join(known[:12]) or 'none'}"
+        raise InputError(what, where, hint)
+    if len(functions) > 1:
+        raise InputError(f"{len(functions)} functions '{name}'", where, "rename one: an adapter names functions")
+    return functions[0]
+
+
+def _meanings(module: Module, function: Function) -> tuple[str, ...]:
+    """The meaning of each argument by its name, and by its type where the name says nothing."""
+    result = []
+    for id, type in function.parameters:
+        meaning, shape = meaning_of(module.names.get(id, "")), module.shape(type)
+        numbers = meaning in ("n.l", "n.v", "n.h", "l.h", "l.v")
+        fits = shape == "float" if numbers else shape in ("vec2", "vec3") if meaning == "u" else shape == "vec3"
+        result.append(meaning if fits else "parameter")
+    return tuple(result)
+
+
+def _rank(module: Module, function: Function) -> tuple[int, int]:
+    """How much a function looks like a BRDF: by its name, and by the directions among its arguments."""
+    name = _title(module, function).lower()
+    exact = {"brdf": 6, "bsdf": 6, "evalbrdf": 5, "evaluatebrdf": 5, "brdf_eval": 5, "evalbsdf": 5, "eval": 4}
+    near = 4 if name.endswith("_eval") else 3 if "brdf" in name or "bsdf" in name else 0
+    meanings = _meanings(module, function)
+    directions = sum(one in ("light", "view", "normal", "half", "n.l", "n.v", "incident") for one in meanings)
+    both = ("light" in meanings and "view" in meanings) or ("n.l" in meanings and "n.v" in meanings)
+    result = module.shape(function.type)
+    usable = both and result in ("vec3", "float", "vec4")
+    return (exact.get(name, near) if usable else -1), directions
+
+
+def _completed(module: Module, adapter: Adapter, where: str) -> Adapter:
+    """The adapter with guesses for what it leaves open."""
+    name = adapter.function
+    own = [one for one in module.functions.values() if not _title(module, one).startswith(("main", "gonio_"))]
+    if not name:
+        best = max(own, key=lambda one: _rank(module, one), default=None)
+        if best is not None and _rank(module, best)[0] > 0:
+            name = _title(module, best)
+    chosen = _one(module, name, where)
+    stem = name.removesuffix("_eval")
+    written = name != stem  # Gonio's own form: NAME_eval, NAME_pdf and NAME_sample, the cosine included
+    pdf, sample = adapter.pdf, adapter.sample
+    if written and not adapter.function and module.function(f"{stem}_pdf") and module.function(f"{stem}_sample"):
+        pdf, sample = pdf or f"{stem}_pdf", sample or f"{stem}_sample"
+
+    def meanings(given: Sequence[str], function: str) -> tuple[str, ...]:
+        return tuple(given) or (_meanings(module, _one(module, function, where)) if function else ())
+
+    return replace(
+        adapter,
+        function=name,
+        arguments=adapter.arguments or _meanings(module, chosen),
+        cosine=written if adapter.cosine is None else adapter.cosine,
+        pdf=pdf,
+        sample=sample,
+        pdf_arguments=meanings(adapter.pdf_arguments, pdf),
+        sample_arguments=meanings(adapter.sample_arguments, sample),
+    )

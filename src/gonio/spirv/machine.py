@@ -1,0 +1,317 @@
+"""A module's functions, run with the vocabulary of `gonio.ops`.
+
+All lanes run together: each block runs under the mask of the lanes that reach it, stores and results are selected by
+it. A loop runs until no lane is left in it; its counter is a plain number, so the loop unrolls. Loops that only values
+could end are refused, as are discard, atomics, barriers and everything else that has no meaning for a BSDF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..errors import InputError
+from . import composites
+from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
+from .composites import Cell, Pointer
+from .flow import Flow, flow_of
+from .images import Texture, sampled
+from .module import Block, Function, Instruction, Module
+from .opcodes import REFUSED
+from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
+from .values import UNDEFINED, Value, both, either, negated, refuse, select, static, truth, wrapped
+
+MAX_INSTRUCTIONS = 1_000_000  # per call from outside
+MAX_ITERATIONS = 4096  # of a loop whose counter is known
+MAX_VARYING = 256  # of a loop that only values can end
+MAX_DEPTH = 64  # of calls
+
+
+class Frame:
+    """One call of a function: its values by id, and the blocks that wait, label -> (mask, values of its phis)."""
+
+    def __init__(self, function: Function, flow: Flow, outer: Value) -> None:
+        self.function, self.flow, self.outer = function, flow, outer
+        self.values: dict[int, Value] = {}
+        self.own: set[int] = set()  # identities of this call's variables
+        self.waiting: dict[int, tuple[Value, dict[int, Value]]] = {}
+        self.rounds: dict[int, int] = {}  # label -> how often it ran
+        self.result: Value = UNDEFINED
+        self.returned: Value = False  # the lanes that have one
+
+
+class Machine:
+    """A module ready to run.
+
+    globals  name of a global -> its value; others are 0. Members of a block without a name are globals themselves.
+    textures name of a sampler -> its texture
+    """
+
+    def __init__(
+        self, module: Module, globals: Mapping[str, Value] | None = None, textures: Mapping[str, Texture] | None = None
+    ) -> None:
+        self.module = module
+        self._given, self._textures = dict(globals or {}), dict(textures or {})
+        self._globals = {id: Pointer(Cell(self._initial(one))) for id, one in module.variables.items()}
+        self._flows: dict[int, Flow] = {}
+        self._stack: list[int] = []
+        self._count = 0
+
+    def call(self, function: Function, arguments: Sequence[Value]) -> Value:
+        """The result of a function. Arguments that are pointers get a variable of their own.
+
+        Raises InputError, with the line of the file, for constructs that are not read and for damaged modules.
+        """
+        self._count, self._stack = 0, []
+        kinds = [self.module.type(kind).kind for _, kind in function.parameters]
+        if len(kinds) != len(arguments):
+            raise refuse(f"a function of {len(kinds)} arguments, {len(arguments)} given")
+        given = [
+            Pointer(Cell(value)) if kind == "pointer" and not isinstance(value, Pointer) else value
+            for kind, value in zip(kinds, arguments, strict=True)
+        ]
+        return self._run(function, given, True)
+
+    def variable(self, name: str) -> Value:
+        """The value of a global now."""
+        for id, one in self._globals.items():
+            if self.module.names.get(id) == name:
+                return one.cell.value
+        raise KeyError(name)
+
+    # ------------------------------------------------------------------ globals
+
+    def _initial(self, one: Instruction) -> Value:
+        kind = self.module.type(one.type)
+        inside = kind.parts[0]
+        name = self.module.names.get(one.result, "")
+        if len(one.operands) > 1:
+            return self.module.constants[one.operands[1]]
+        if name in self._textures:
+            return self._textures[name]
+        if name in self._given:
+            return self._given[name]
+        if self.module.type(inside).kind == "struct":
+            return self._struct(inside)
+        if self.module.type(inside).kind in ("sampled image", "image", "sampler"):
+            return Texture(name, None)
+        return self.module.zero(inside)
+
+    def _struct(self, id: int) -> Value:
+        """A uniform block, by the names of its members."""
+        parts = self.module.type(id).parts
+        names = [self.module.members.get((id, place), "") for place in range(len(parts))]
+        return tuple(
+            self._given[name] if name in self._given else self.module.zero(part)
+            for name, part in zip(names, parts, strict=True)
+        )
+
+    # ------------------------------------------------------------------ control flow
+
+    def _run(self, function: Function, arguments: Sequence[Value], outer: Value) -> Value:
+        if function.id in self._stack or len(self._stack) >= MAX_DEPTH:
+            raise refuse(f"recursion of '{self.module.names.get(function.id, function.id)}'", "a loop of known length")
+        if not function.blocks:
+            raise refuse(f"the function '{self.module.names.get(function.id, function.id)}' has no body")
+        if function.id not in self._flows:
+            self._flows[function.id] = flow_of(function)
+        frame = Frame(function, self._flows[function.id], outer)
+        frame.values.update({id: value for (id, _), value in zip(function.parameters, arguments, strict=True)})
+        frame.waiting[next(iter(function.blocks))] = True, {}
+        self._stack.append(function.id)
+        while frame.waiting:
+            label = min(frame.waiting, key=frame.flow.order.__getitem__)
+            mask, phis = frame.waiting.pop(label)
+            if not frame.waiting:
+                mask = negated(frame.returned)  # all lanes are here: a shorter expression of the same mask
+            for id, value in phis.items():
+                self._keep(frame, id, value, mask)
+            self._block(frame, function.blocks[label], mask)
+        self._stack.pop()
+        return frame.result
+
+    def _block(self, frame: Frame, block: Block, mask: Value) -> None:
+        one: Instruction | None = None
+        try:
+            for one in block.instructions:
+                self._count += 1
+                if self._count > MAX_INSTRUCTIONS:
+                    raise refuse(f"more than {MAX_INSTRUCTIONS} steps", "fewer iterations of its loops")
+                if one.name in _FLOW:
+                    if self._leave(frame, block, one, mask):
+                        return
+                elif one.name == "Store":
+                    self._store(frame, block.label, one, mask)
+                elif one.name == "FunctionCall":
+                    self._keep(frame, one.result, self._called(frame, one, mask), mask)
+                elif one.name not in ("Phi", "SelectionMerge"):
+                    self._keep(frame, one.result, self._value(frame, one), mask)
+            raise ValueError("a block without an end")
+        except InputError as error:
+            if error.where or one is None or not one.line:
+                raise
+            raise InputError(error.what, f"{one.file}:{one.line}", error.hint) from error
+        except (IndexError, KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+            place = f"{one.file}:{one.line}" if one is not None and one.line else "SPIR-V"
+            what = f"the SPIR-V is damaged: {one.name if one else ''}: {type(error).__name__} {error}"
+            raise InputError(what, place, "compile it again") from error
+
+    def _keep(self, frame: Frame, id: int, value: Value, mask: Value) -> None:
+        """A value of an id; lanes that left its loop keep theirs where it is used after the loop."""
+        if id in frame.flow.lasting and id in frame.values and not isinstance(value, Pointer):
+            value = select(mask, value, frame.values[id])
+        frame.values[id] = value
+
+    def _leave(self, frame: Frame, block: Block, one: Instruction, mask: Value) -> bool:
+        """Whether an instruction ends the block; the blocks that follow then wait."""
+        operands = one.operands
+        if one.name == "LoopMerge":
+            self._check_rounds(frame, block.label, mask)
+            return False
+        if one.name == "Branch":
+            self._edge(frame, block.label, operands[0], mask)
+        elif one.name == "BranchConditional":
+            condition = truth(self._get(frame, operands[0]))
+            self._edge(frame, block.label, operands[1], both(mask, condition))
+            self._edge(frame, block.label, operands[2], both(mask, negated(condition)))
+        elif one.name == "Switch":
+            selector, rest = self._get(frame, operands[0]), mask
+            for literal, target in zip(operands[2::2], operands[3::2], strict=True):
+                known = static(selector)
+                equal = wrapped(int(selector), False) == literal if known else selector == float(wrapped(literal, True))
+                self._edge(frame, block.label, target, both(rest, equal))
+                rest = both(rest, negated(equal))
+            self._edge(frame, block.label, operands[1], rest)
+        elif one.name == "ReturnValue":
+            # once every lane is here, those that returned before keep their results
+            frame.result = select(frame.returned, frame.result, self._get(frame, operands[0]))
+            frame.returned = either(frame.returned, mask)
+        elif one.name in ("Return", "Unreachable"):
+            frame.returned = either(frame.returned, mask)
+        elif one.name == "Kill":
+            raise refuse("discard", "return a value: a BSDF has no fragments to discard")
+        elif one.name == "refused":
+            what = REFUSED.get(operands[0], f"SPIR-V's instruction {operands[0]}")
+            raise refuse(what, "a BSDF is a function of directions and parameters alone")
+        return True
+
+    def _check_rounds(self, frame: Frame, label: int, mask: Value) -> None:
+        count = frame.rounds[label] = frame.rounds.get(label, 0) + 1
+        if count > MAX_ITERATIONS or (count > MAX_VARYING and not static(mask)):
+            limit = MAX_VARYING if not static(mask) else MAX_ITERATIONS
+            hint = "bound its counter by a constant"
+            raise refuse(f"a loop without a known end, more than {limit} iterations", hint)
+
+    def _edge(self, frame: Frame, source: int, target: int, mask: Value) -> None:
+        if mask is False:
+            return
+        before, phis = frame.waiting.get(target, (False, {}))
+        fresh = dict(phis)
+        for one in frame.function.blocks[target].instructions:
+            if one.name == "Phi":
+                pairs = dict(zip(one.operands[1::2], one.operands[0::2], strict=True))
+                value = self._get(frame, pairs[source])
+                fresh[one.result] = select(mask, value, phis.get(one.result, UNDEFINED))
+        frame.waiting[target] = either(before, mask), fresh
+
+    def _called(self, frame: Frame, one: Instruction, mask: Value) -> Value:
+        function = self.module.functions[one.operands[0]]
+        arguments = [self._get(frame, id) for id in one.operands[1:]]
+        return self._run(function, arguments, both(frame.outer, mask))
+
+    # ------------------------------------------------------------------ values
+
+    def _get(self, frame: Frame, id: int) -> Value:
+        for known in (frame.values, self.module.constants, self._globals):
+            if id in known:
+                return known[id]
+        raise KeyError(f"id {id} has no value")
+
+    def _store(self, frame: Frame, label: int, one: Instruction, mask: Value) -> None:
+        target, value = self._get(frame, one.operands[0]), self._get(frame, one.operands[1])
+        if not isinstance(target, Pointer):
+            raise TypeError("a store to no pointer")
+        own = id(target.cell) in frame.own
+        if not own:
+            mask = both(frame.outer, mask)
+        elif not static(mask) and self._unread_elsewhere(frame, label, target.cell):
+            mask = True
+        target.store(value, mask)
+
+    def _unread_elsewhere(self, frame: Frame, label: int, cell: Cell) -> bool:
+        """Whether lanes outside this block never read a variable's present value, so that its store needs no mask: all
+        lanes of a loop are here, and only the loop reads it. A counter so remains a plain number."""
+        reads = frame.flow.reads.get(cell.id, set())
+        for loop in (*frame.flow.loops[label], frozenset(frame.flow.order)):
+            if any(waiting in loop for waiting in frame.waiting):
+                return False
+            if reads <= loop:
+                return True
+        return False
+
+    def _value(self, frame: Frame, one: Instruction) -> Value:
+        name = one.name
+        if name == "Variable":
+            cell = Cell(UNDEFINED if len(one.operands) < 2 else self._get(frame, one.operands[1]), one.result)
+            if cell.value is UNDEFINED:
+                cell.value = composites.undefined(self.module, self.module.type(one.type).parts[0])
+            frame.own.add(id(cell))
+            frame.values[-one.result] = cell  # keeps it alive, so that its identity is its own
+            return Pointer(cell)
+        if name == "ExtInst":
+            return self._standard(frame, one)
+        if name in composites.LITERAL:
+            count = composites.LITERAL[name]
+            values = [self._get(frame, id) for id in one.operands[:count]]
+            return composites.literal(name, values, one.operands[count:])
+        arguments = one.operands[:2] if name == "ImageSample" else one.operands
+        values = [self._get(frame, id) for id in arguments]
+        if name in _IMAGES:
+            return sampled(name, values)
+        if name in composites.COMPOSED:
+            return composites.COMPOSED[name](self.module, one.type, *values)
+        return self._arithmetic(one, values)
+
+    def _arithmetic(self, one: Instruction, values: list[Value]) -> Value:
+        name = one.name
+        self._check_width(one.type)
+        for table in (FLOATS, COMPARED, LOGIC):
+            if name in table:
+                return elementwise(table[name], *values)
+        if name in INTEGERS:
+            kind = self.module.type(one.type)
+            signed = (self.module.type(kind.parts[0]) if kind.parts else kind).kind == "int"
+
+            def whole(*scalars: Value) -> Value:
+                value = INTEGERS[name](*scalars)
+                return wrapped(value, signed) if isinstance(value, int) else value
+
+            return elementwise(whole, *values)
+        if name in WHOLE:
+            return WHOLE[name](*values)
+        if name == "Bitcast" and all(isinstance(leaf, int) for leaf in composites.scalars(values[0])):
+            return values[0]
+        raise refuse(f"the bits of a number ({name})", "compute with floats")
+
+    def _check_width(self, id: int) -> None:
+        kind = self.module.type(id)
+        kind = self.module.type(kind.parts[0]) if kind.kind in ("vector", "matrix") else kind
+        if "-bit" in kind.kind:
+            raise refuse(
+                f"{kind.kind}s are not read", "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
+            )
+
+    def _standard(self, frame: Frame, one: Instruction) -> Value:
+        if self.module.sets.get(one.operands[0]) != "GLSL.std.450":
+            return UNDEFINED  # debug information
+        self._check_width(one.type)
+        number, values = one.operands[1], [self._get(frame, id) for id in one.operands[2:]]
+        if number in GEOMETRIC:
+            return GEOMETRIC[number](*values)
+        if number in ELEMENTWISE or number in WHOLE_NUMBERS:
+            return elementwise(ELEMENTWISE.get(number) or WHOLE_NUMBERS[number], *values)
+        raise refuse(f"the function {number} of SPIR-V's GLSL.std.450 (packing or bits)", "compute with floats")
+
+
+_FLOW = frozenset({"LoopMerge", "Branch", "BranchConditional", "Switch", "Return", "ReturnValue", "Kill",
+                   "Unreachable", "refused"})  # fmt: skip
+_IMAGES = frozenset({"SampledImage", "Image", "ImageSample", "ImageFetch", "ImageQuerySize"})
