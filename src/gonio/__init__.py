@@ -55,6 +55,7 @@ _PLACES = {
     "transport.integrators": ("Integrator",),
     "verify": ("verify",),
     "verify.laws": ("Law",),
+    "check": ("check",),
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from . import ops
     from .catalog import notation as _notation
     from .catalog.library import fits, materials
+    from .check import check
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError
     from .fitting.fit import fit
@@ -236,6 +238,7 @@ __all__ = [
     "bake",
     "bsdf",
     "capture",
+    "check",
     "choice",
     "cluster",
     "compare",
