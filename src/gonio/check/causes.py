@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..verify.forensics import fits
 from ..verify.forensics.ratio import COVER, Ratio, tolerance
 from ..verify.subject import Subject
 from .finding import Mistake
-from .mistakes import Values, Variant, f_of, variants
+from .mistakes import FAMILIES, Values, Variant, f_of
 
 TOP, BOTTOM = "your f", "the model's"
 
@@ -37,10 +37,12 @@ def named(both: Ratio) -> Mistake | None:
     """
     telling = referee.telling(both)
     wrong: list[Variant] = []
-    for variant in _different(telling):
-        if _equal(telling, variant):
-            return variant.mistake
-        wrong.append(variant)
+    for family in FAMILIES:
+        different = list(_different(telling, family.variants(telling.subject.model, telling.wo, telling.wi)))
+        equal = [variant.mistake for variant in different if _equal(telling, variant)]
+        if equal:
+            return _either(equal)
+        wrong += different
     fit = fits.fitted(telling)
     if fit is not None:
         return Mistake(_written(both, fit), _topic(fit))
@@ -53,9 +55,15 @@ def named(both: Ratio) -> Mistake | None:
     return Mistake(cause.words, "the region where the values differ") if cause is not None else None
 
 
-def _different(both: Ratio) -> Iterator[Variant]:
+def _either(mistakes: list[Mistake]) -> Mistake:
+    """Mistakes with the same values, such as a factor of 4 and of 1 / alpha = 4: the first three of them."""
+    texts = list(dict.fromkeys(mistake.words for mistake in mistakes))[:3]
+    return Mistake(", or ".join(texts), " or ".join(dict.fromkeys(mistake.topic for mistake in mistakes[:3])))
+
+
+def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
     """The mistakes whose values differ from the right ones over these rows."""
-    for variant in variants(both.subject.model, both.wo, both.wi):
+    for variant in variants:
         if variant.values.shape != both.below.shape:
             variant = Variant(variant.mistake, variant.values[:, : both.below.shape[1]])
         finite = np.all(np.isfinite(variant.values))

@@ -25,6 +25,8 @@ LEVELS = 255.0
 FITS = 3.0  # gray levels within which a form explains a table
 NOISY = 8.0  # the same for a table by random cosine-weighted directions
 CONVERGED = 0.55  # roughness from which cosine sampling with 1,024 directions has converged
+NOISY_WEIGHT = 0.05  # of the distance over all rows
+WHITE = 0.95  # share of white texels beyond which no factor can be told
 UNLIKE = 0.6  # correlation with the nearest form below which a picture is no table of E
 SIZES = (16, 4096)
 _LAYOUT = "the layout: roughness along rows, mu from left to right"
@@ -203,6 +205,9 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     if best.distance > (NOISY if right and not converged else FITS):
         facts.append("no form fits: the table is wrong in a way that is not known here")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
+    if np.mean(inside[~low] >= LEVELS - 1.0) > WHITE:
+        facts.append("nearly all is white: the values exceed 1, by a factor that cannot be told from white texels")
+        return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     _check_encoding(table, best.stored)
     mistake = best.mistake or _unexpected(best.form, expected)
     if sampled and not converged:
@@ -229,13 +234,15 @@ def _matches(picture: Values, forms: tuple[Form, ...], at: np.ndarray) -> list[_
     """Every form in every layout, the nearest first; among those that are as near, the simplest."""
     rows = (at + 0.5) / len(picture) >= CONVERGED
     matches: list[tuple[float, int, _Match]] = []
-    layouts = [(one, one.values[np.ix_(at, at)][rows]) for one in _layouts(picture)]
+    layouts = [(one, one.values[np.ix_(at, at)]) for one in _layouts(picture)]
     for order, form in enumerate(forms):
         for stored, (layout, values) in itertools.product(_stored(form.values, form.mistake is None), layouts):
             faults = sum(one.mistake is not None for one in (form, stored, layout))
-            distance = _rms(values - stored.values[rows]) * LEVELS
-            # one mistake more must bring the table nearer by half a gray level and a tenth
+            distance = _rms(values[rows] - stored.values[rows]) * LEVELS
+            # One mistake more must bring the table nearer by half a gray level and a tenth. The noisy rows count
+            # little, but where the others are white they alone tell forms apart.
             cost = (distance + 0.5) * (1.0 + 0.1 * faults) + 0.25 * faults
+            cost += NOISY_WEIGHT * _rms(values - stored.values) * LEVELS
             matches.append((cost, order, _Match(form, stored, layout, distance)))
     matches.sort(key=lambda one: one[:2])
     return [match for _, _, match in matches[:8]]
@@ -245,7 +252,8 @@ def _check_likeness(table: Table, best: _Match, at: np.ndarray) -> None:
     """Raise InputError for a picture of something else."""
     values = best.layout.values[np.ix_(at, at)]
     rows = (at + 0.5) / len(table.values) >= CONVERGED
-    alike = np.corrcoef(values[rows].ravel(), best.stored.values[rows].ravel())[0, 1]
+    with np.errstate(all="ignore"):  # white everywhere
+        alike = np.corrcoef(values[rows].ravel(), best.stored.values[rows].ravel())[0, 1]
     if best.distance > NOISY and not alike > UNLIKE:
         what = "this picture resembles no table of E: it is of something else"
         raise InputError(what, table.name, "give the table, roughness along rows and mu along columns")
@@ -309,7 +317,7 @@ def _average(table: Table, own: Table | None, expected: str) -> Finding:
     for (words, masking, E), flipped in itertools.product(sources, (True, False)):
         profile = (columns[::-1] if flipped else columns)[at]
         for way in table_forms.weightings(size, E.shape[1]):
-            for stored in _stored(np.mean(E * way.weights, axis=1), way.mistake is None):
+            for stored in _stored(np.mean(E * way.weights, axis=1), scales=False):
                 faults = (way.mistake is not None) + (stored.mistake is not None)
                 distance = _rms(profile - stored.values) * LEVELS
                 cost = (distance + 0.5) * (1.0 + 0.1 * faults) + 0.25 * faults

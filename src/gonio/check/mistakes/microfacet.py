@@ -15,7 +15,7 @@ from ...errors import GonioError
 from ...material import BSDF, tree
 from ...verify.forensics.factors import half_vector
 from ..finding import Mistake
-from .base import Values, Variant, above, f_of
+from .base import Values, Variant, above, color, f_of
 
 _D, _G, _F = "D", "the masking term G", "Fresnel's term F"
 _H = "the half vector"
@@ -31,7 +31,7 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
     if terms.alpha < 1e-3:
         return
     with np.errstate(all="ignore"):
-        for family in (_masking, _density, _half_vectors, _fresnel, _denominators):
+        for family in (_denominators, _masking, _density, _half_vectors, _fresnel):
             for words, topic, factor in family(terms):
                 values = terms.f * (factor[:, None] if factor.ndim == 1 else factor)
                 yield Variant(Mistake(words, topic), np.where(above(wo, wi), values, 0.0))
@@ -45,6 +45,8 @@ class _Terms:
         self.m = half_vector(wo, wi)
         self.cos_m, self.cos_o, self.cos_i = self.m[:, 2], wo[:, 2], wi[:, 2]
         self.o_m = np.sum(wo * self.m, axis=1)
+        self.eta, self.k = (color(getattr(material, name, 0.0)) for name in ("eta", "k"))
+        self.r0 = ((self.eta - 1.0) ** 2 + self.k**2) / ((self.eta + 1.0) ** 2 + self.k**2)
         self.f = f_of(material, wo, wi)
         self.D = density(ndf, self.cos_m, alpha)
         try:
@@ -56,6 +58,11 @@ class _Terms:
             tint = np.nanmax(np.asarray(getattr(material, "albedo", 1.0), float))
             self.G = white[:, int(np.argmax(np.broadcast_to(np.asarray(getattr(material, "albedo", 1.0)), (3,))))]
             self.G = self.G * 4.0 * self.cos_o * self.cos_i / (self.D * tint)
+
+
+def schlick(r0: Values, cosine: Values, power: float = 5.0) -> Values:
+    """R0 + (1 - R0) (1 - cos)^5, (N, 3)."""
+    return r0 + (1.0 - r0) * (1.0 - np.clip(cosine, 0.0, 1.0))[:, None] ** power
 
 
 Factors = Iterator[tuple[str, str, Values]]
@@ -129,7 +136,11 @@ def _half_vectors(t: _Terms) -> Factors:
         ("D is evaluated at n.i in place of n.h", t.cos_i),
         ("D is evaluated at o.h in place of n.h", t.o_m),
     ):
-        yield words, _H, density(t.ndf, np.clip(cosine, 1e-6, None), t.alpha) / t.D
+        D = density(t.ndf, np.clip(cosine, 1e-6, None), t.alpha) / t.D
+        yield words, _H, D
+        if "normalized" in words:  # F is at the same vector
+            o_h = np.sum(t.wo * both, axis=1) * (0.5 if "/ 2" in words else 1.0)
+            yield words, _H, D[:, None] * schlick(t.r0, o_h) / t.F
 
 
 def g1(name: str, cosine: Values, alpha: float) -> Values:
@@ -188,12 +199,7 @@ def _masking(t: _Terms) -> Factors:
 
 def _fresnel(t: _Terms) -> Factors:
     yield "F is missing", _F, 1.0 / t.F
-    eta, k = (np.asarray(getattr(t.material, name, 0.0), float) for name in ("eta", "k"))
-    eta, k = np.broadcast_to(eta, (3,))[None], np.broadcast_to(k, (3,))[None]
-    r0 = ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
-
-    def schlick(r0: Values, cosine: Values, power: float = 5.0) -> Values:
-        return r0 + (1.0 - r0) * (1.0 - np.clip(cosine, 0.0, 1.0))[:, None] ** power
+    eta, k, r0 = t.eta, t.k, t.r0
 
     yield "F is Schlick's", _F, schlick(r0, t.o_m) / t.F
     for name, cosine in (("n.o", t.cos_o), ("n.i", t.cos_i), ("n.h", t.cos_m), ("o.i", np.sum(t.wo * t.wi, axis=1))):

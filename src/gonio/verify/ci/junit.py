@@ -17,9 +17,7 @@ def text(report: Report) -> str:
     root = xml.Element("testsuites", {"name": "gonio verify", **_counts(report.cards), "time": f"{report.seconds:.3f}"})
     for card in report.cards:
         time = sum(verdict.seconds for verdict in card.verdicts)
-        suite = xml.SubElement(
-            root, "testsuite", {"name": clean(card.title), **_counts([card]), "time": f"{time:.3f}"}
-        )
+        suite = xml.SubElement(root, "testsuite", {"name": clean(card.title), **_counts([card]), "time": f"{time:.3f}"})
         for verdict in card.verdicts:
             _case(suite, card, verdict)
         lines = [*card.notes, *([card.quality.words] if card.quality else [])]
