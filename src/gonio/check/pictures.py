@@ -135,9 +135,9 @@ def _match(reading: _Reading, reference: Values, block: int, clip: float | None)
 
 
 def _mode(ratio: Values) -> float:
-    """The ratio with the most others within 2 % of it; 1 if no ratio is positive."""
+    """The ratio with the most others within 2 % of it; 1 if a quarter has it, or if no ratio is positive."""
     logs = np.sort(np.log(ratio[ratio > 0.0]))
-    if not len(logs):
+    if not len(logs) or np.mean(np.abs(logs) < 0.02) > 0.25:
         return 1.0
     counts = np.searchsorted(logs, logs + 0.04) - np.arange(len(logs))
     first = int(np.argmax(counts))
