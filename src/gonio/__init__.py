@@ -56,6 +56,7 @@ _PLACES = {
     "transport.integrators": ("Integrator",),
     "verify": ("verify",),
     "verify.laws": ("Law",),
+    "check": ("check",),
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from .catalog import notation as _notation
     from .catalog.library import fits, materials
     from .catalog.shaders import Shader
+    from .check import check
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError
     from .fitting.fit import fit
@@ -239,6 +241,7 @@ __all__ = [
     "bake",
     "bsdf",
     "capture",
+    "check",
     "choice",
     "cluster",
     "compare",

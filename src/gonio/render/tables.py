@@ -39,9 +39,10 @@ BAKED = frozenset({Kind.DISTRIBUTION, Kind.PICTURE, *operands.MATERIALS})
 @renamed(size="resolution", spp="samples", points="sampler")
 @public
 def bake(
-    target: str | Path | BSDF,
+    target: str | Path | BSDF = "ggx",
     output: str | Path | None = None,
     *,
+    preset: str | None = None,
     lut: Sequence[str] | None = None,
     resolution: int = 128,
     method: str = "quadrature",
@@ -54,6 +55,8 @@ def bake(
     azimuths: int = baking.AZIMUTHS,
     store: str = "E",
     flip: bool = True,
+    floor: float = 0.0,
+    wrap: bool = False,
     ndf: str | None = None,
     levels: int | None = None,
 ) -> Baked:
@@ -69,27 +72,32 @@ def bake(
     lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass
     resolution  texels along each axis, 1 to 4096
     method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
-              by the `sampler` "hammersley" or "independent" (of `seed`, 0 if None)
+              by the `sampler` "hammersley", "stratified" or "independent" (of `seed`, 0 if None)
     masking   masking of a distribution; a material has its own
     layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures as `store` and `flip` say)
     aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
+    floor     lower bound of the denominator of D, of method "cosine"
+    wrap      convert the homework's pictures to bytes as its program does: rounded down, and 256 becomes 0
+    preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
     ndf       of an environment: the distribution for its prefiltering (default ggx), into `levels` levels of roughness
               0 to 1 (default 6); the error of the split sum is measured with `masking`
     Tables baked before come from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
+    if preset is not None:
+        return _preset(target, output, preset, resolution, seed, store, flip)
     folder = None if output is None else files.check_folder(output)
     ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
     axes = {"resolution": resolution, "layout": layout, "aspect": aspect, "azimuths": azimuths}
-    sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed}
-    picture = {"store": store, "flip": flip}
+    sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed, "floor": floor}
+    picture = {"store": store, "flip": flip, "wrap": wrap}
     if _is_picture(target, lut):
         _check_default({**axes, **sampling, **picture}, "an environment takes --ndf, --levels and --masking")
         return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
     options = {"masking": masking, **axes, **sampling}
     if layout == "homework":
-        return _homework(_target(target), folder, lut, options, store, flip)
+        return _homework(_target(target), folder, lut, options, picture)
     baked = _baked(_target(target), lut, options)
     if folder is not None:
         _write(baked, folder, _pictures(baked))
@@ -104,9 +112,12 @@ def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, 
 
 
 def _homework(
-    target: str | BSDF, folder: Path | None, lut: Sequence[str] | None, options: Mapping[str, Any], store: str,
-    flip: bool,
-) -> Baked:  # fmt: skip
+    target: str | BSDF,
+    folder: Path | None,
+    lut: Sequence[str] | None,
+    options: Mapping[str, Any],
+    picture: Mapping[str, Any],
+) -> Baked:
     """Tables with linear axes, and the homework's pictures of them, written if a folder is given."""
     if not isinstance(target, str) or options["aspect"] not in (None, 1.0):
         problem = "a material, or two widths, in the homework's layout"
@@ -116,10 +127,47 @@ def _homework(
         raise InputError("table 'glass' in the homework's layout, which has no picture of it", "--lut", hint)
     baked = _baked(target, lut or ("E", "Eavg"), {**options, "layout": "linear"})
     if folder is not None:
-        contents = {f"{name}.png": images.png_bytes(p) for name, p in homework_pictures(baked, store, flip).items()}
-        baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
-        _write(baked, folder, contents)
+        _write(baked, folder, _homework_files(baked, **picture))
     return baked
+
+
+# The homework's two definitions of E: k of its text, without noise; and what its cosine-sampled picture shows.
+PRESETS: dict[str, dict[str, Any]] = {
+    "homework-text": {"masking": "schlick-direct"},
+    "homework-figure": {
+        "masking": "schlick-ibl", "method": "cosine", "samples": 1024, "sampler": "stratified", "floor": 1e-4
+    },
+}  # fmt: skip
+
+
+def _preset(
+    target: str | Path | BSDF, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
+    flip: bool,
+) -> Baked:  # fmt: skip
+    """E and E_avg as the homework's text, or its figures, have them. E_avg of the figures is free of noise, and their
+    bytes wrap."""
+    if preset not in PRESETS:
+        raise InputError(f"unknown preset '{preset}' of a table", "--preset", did_you_mean(preset, list(PRESETS)))
+    if target != "ggx":
+        raise InputError(f"preset '{preset}' of '{target}'", "--preset", "the homework's tables are those of ggx")
+    folder = None if output is None else files.check_folder(output)
+    options = PRESETS[preset]
+    made = bake("ggx", lut=["E"], resolution=resolution, seed=seed, **options)
+    average = bake("ggx", lut=["Eavg"], resolution=resolution, masking=options["masking"])
+    manifest = {**made.manifest, "preset": preset}
+    for key in ("dims", "tables", "error", "hash"):
+        manifest[key] = {**made.manifest[key], **average.manifest[key]}
+    both = Baked({**made.arrays, **average.arrays}, manifest)
+    if folder is not None:
+        _write(both, folder, _homework_files(both, store, flip, wrap=preset == "homework-figure"))
+    return both
+
+
+def _homework_files(baked: Baked, store: str, flip: bool, wrap: bool) -> dict[str, bytes]:
+    """The homework's pictures by their names, noted in the manifest."""
+    baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
+    pictures = homework_pictures(baked, store, flip, wrap)
+    return {f"{name}.png": images.png_bytes(pixels) for name, pixels in pictures.items()}
 
 
 def _check_default(options: dict[str, object], hint: str) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from ...errors import InputError
 from .. import completion
 from ..options import Executor, Json, Material, Seed, output_option, samples_option
 from ..output import print_tables
@@ -27,9 +28,9 @@ class Baking:
         str | None, Option(metavar="NAME", help="Masking term of a distribution: smith-correlated, ..., FILE.py:CLASS.")
     ] = None
     samples: Annotated[int, samples_option("Random samples per texel, of the methods that sample.")] = 1024
-    sampler: Annotated[str, Option(metavar="NAME", help="Random points of these: hammersley or independent.")] = (
-        "hammersley"
-    )
+    sampler: Annotated[
+        str, Option(metavar="NAME", help="Random points of these: hammersley, stratified, independent.")
+    ] = "hammersley"
     seed: Seed = None
     layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear"
     aspect: Annotated[
@@ -38,6 +39,10 @@ class Baking:
     azimuths: Annotated[int, Option(metavar="N", help="Values along phi, of anisotropic tables.")] = 24
     store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E"
     flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True
+    floor: Annotated[float, Option(metavar="X", help="Lower bound of D's denominator, of --method cosine.")] = 0.0
+    wrap: Annotated[
+        bool, Option("--wrap", help="Homework: bytes as its program has them, rounded down and wrapped at 256.")
+    ] = False
     ndf: Annotated[
         str | None, Option(metavar="NAME", help="Distribution that blurs an environment: ggx, ..., FILE.py:CLASS.")
     ] = None
@@ -46,16 +51,26 @@ class Baking:
     ] = None
 
 
+def _refuse(made: Material, options: dict[str, object]) -> None:
+    """Raise InputError for options that a preset of the homework sets by itself."""
+    given = [name for name, value in options.items() if value != getattr(Baking(), name) and value is not None]
+    given += ["param"] if made.param else []
+    if given:
+        raise InputError(
+            f"--{given[0]} given with a preset of the homework, which sets it", f"--{given[0]}", "leave it out"
+        )
+
+
 @verb(MATERIALS, place=6)
 def bake(
     target: Annotated[
-        str,
+        str | None,
         Argument(
             metavar="TARGET",
             help="A distribution (ggx, beckmann), a material, or an environment (.hdr, .exr).",
             autocompletion=completion.materials_and_distributions,
         ),
-    ],
+    ] = None,
     *,
     output: Annotated[Path, output_option("DIR", "Folder of the tables.")] = Path("tables"),
     made: Material,
@@ -65,6 +80,9 @@ def bake(
 ) -> None:
     """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
 
+    The homework's text has k = (roughness + 1)^2 / 8, its figures k = alpha / 2: --preset homework-text bakes the
+    first, --preset homework-figure the second, sampled as its picture is.
+
     Tables of an anisotropic distribution have a third axis, the azimuth. Of a material without roughness: E over the
     cosine. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
 
@@ -73,14 +91,22 @@ def bake(
       gonio bake ggx -o tables
       gonio bake ggx --aspect 0.25 --layout stretched -o brushed
       gonio bake ggx --lut glass --resolution 32 -o glass
-      gonio bake ggx --layout homework --masking schlick-ibl -o pictures
-      gonio bake ggx --layout homework --masking schlick-direct -o text
+      gonio bake --preset homework-text -o text
+      gonio bake --preset homework-figure -o figure
       gonio bake conductor --preset Au --lut E,Eavg -o gold
       gonio bake sky.hdr --lut prefiltered -o sky
     """
     from ...render import tables
 
     options = {**vars(how), "lut": how.lut.split(",") if how.lut else None}
+    preset = made.preset if target is None or made.preset in tables.PRESETS else ""
+    if target is None and not preset:
+        raise InputError("no target", "TARGET", "such as: gonio bake ggx -o tables")
     with executor.running():
-        baked = tables.bake(made.text(target, tables.BAKED), output, **options)
+        if preset:
+            named = {name: options.pop(name) for name in ("resolution", "seed", "store", "flip")}
+            _refuse(made, options)
+            baked = tables.bake(target or "ggx", output, preset=preset, **named)
+        else:
+            baked = tables.bake(made.text(str(target), tables.BAKED), output, **options)
     print_tables(baked.manifest, output, as_json)

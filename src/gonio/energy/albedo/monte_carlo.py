@@ -8,6 +8,7 @@ visible  visible normals; the weight is G / G1(o), at most 1 (Heitz2014b)
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...optics import frame, masking, warp
 from ...optics.ndf import NDF, distribution
 from .quadrature import Points, known_masking
 
-POINTS = ("hammersley", "independent")
+POINTS = ("hammersley", "independent", "stratified")
 
 
 class Estimate(NamedTuple):
@@ -56,10 +57,14 @@ def estimate(
     points: str = "hammersley",
     seed: int = 0,
     precision: Precision = "float32",
+    floor: float = 0.0,
 ) -> Estimate:
     """E at each point from `spp` samples.
 
-    points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each
+    points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each;
+            "stratified": new ones for each, one in each cell of a square grid; `spp` must be a square
+    floor   lower bound of the denominator of D by method "cosine", as the homework's program has it: D is then at most
+            alpha_x alpha_y / floor; 0 is none
     Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
     """
     known_masking(masking_name)
@@ -75,6 +80,8 @@ def estimate(
     chosen = distribution(ndf)
     first, second = [kind.float(c) for c in (hammersley(spp).T if points == "hammersley" else np.zeros((2, 1)))]
     generator = kind.module.PCG32(size=count, initstate=seed)
+    bound = widths.x * widths.y / dr.opaque(kind.float, floor) if floor > 0.0 else None
+    strata = dr.opaque(kind.module.UInt32, math.isqrt(spp))
 
     def body(i: Array, total: Array, squares: Array, rng: Array) -> tuple[Array, Array, Array, Array]:
         if points == "hammersley":
@@ -82,7 +89,10 @@ def estimate(
         else:
             double = precision == "float64"
             u1, u2 = [rng.next_float64() if double else rng.next_float32() for _ in range(2)]
-        w = _weight(chosen, masking_name, method, wo, widths, u1, u2)
+            if points == "stratified":
+                side = kind.float(strata)
+                u1, u2 = (kind.float(i % strata) + u1) / side, (kind.float(i // strata) + u2) / side
+        w = _weight(chosen, masking_name, method, wo, widths, u1, u2, bound)
         return i + 1, total + w, squares + w * w, rng
 
     zero = dr.zeros(kind.float, count)
@@ -105,16 +115,24 @@ def _check(ndf: str, method: str, points: str, spp: int) -> None:
         raise InputError(f"unknown points '{points}'", "points", did_you_mean(points, list(POINTS)))
     if spp < 1:
         raise InputError(f"{spp} samples given", "--spp", "give 1 or more")
+    if points == "stratified" and math.isqrt(spp) ** 2 != spp:
+        raise InputError(
+            f"{spp} stratified samples given", "--samples", "give the square of a whole number, such as 1024"
+        )
 
 
-def _weight(ndf: NDF, masking_name: str, method: str, wo: Array, widths: Array, u1: Array, u2: Array) -> Array:
-    """f cos / pdf of one sample at F = 1."""
+def _weight(
+    ndf: NDF, masking_name: str, method: str, wo: Array, widths: Array, u1: Array, u2: Array, bound: Array | None
+) -> Array:
+    """f cos / pdf of one sample at F = 1; `bound` is the largest D by method "cosine"."""
     dr = backend.drjit()
     if method == "cosine":
         wi = warp.square_to_cosine_hemisphere(u1, u2)
         m = frame.half_vector(wo, wi)
         g = masking.masking_shadowing(masking_name, ndf, wo, wi, m, widths)
-        return dr.select(wi.z > 0.0, ndf.D(m, widths) * g * ops.pi / (4.0 * wo.z * wi.z), 0.0)
+        D = ndf.D(m, widths)
+        D = D if bound is None else dr.minimum(D, bound)
+        return dr.select(wi.z > 0.0, D * g * ops.pi / (4.0 * wo.z * wi.z), 0.0)
     visible = method == "visible"
     m = ndf.sample_visible(wo, u1, u2, widths) if visible else ndf.sample(u1, u2, widths)
     wi = frame.reflect(wo, m)

@@ -59,6 +59,7 @@ def bake(
     layout: str = "linear",
     aspect: float | None = None,
     azimuths: int = AZIMUTHS,
+    floor: float = 0.0,
 ) -> Baked:
     """Tables of a distribution by name (F = 1), or of a material.
 
@@ -70,11 +71,15 @@ def bake(
     masking  for a distribution, by default smith-correlated; a material has its own
     aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1 it adds the axis phi, a
              quarter turn from x. A material has its own, the ratio of its two widths; its rotation is ignored
+    floor    lower bound of the denominator of D by method "cosine", as in the homework's program
     Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and tables that the target does not have.
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
     _check(lut, size, spp, points, layout)
+    if floor < 0.0 or (floor > 0.0 and method != "cosine"):
+        hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
+        raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
     for name, given in (("masking", masking), ("aspect", aspect)):
         if material and given is not None:
             raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
@@ -86,7 +91,7 @@ def bake(
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
     if {"E", "dfg"} & set(lut) or ("Eavg" in lut and method != "quadrature"):
-        tables, figures = _directional(asked, axes, method, spp, points, seed)
+        tables, figures = _directional(asked, axes, method, spp, points, seed, floor)
         arrays.update({k: v for k, v in tables.items() if k in lut})
         errors.update({k: v for k, v in figures.items() if k in lut})
         if "E" in arrays and size > 1:
@@ -103,7 +108,11 @@ def bake(
         arrays.update(glass)
         errors.update(figures)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
-    sampling = {} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}
+    sampling = (
+        {}
+        if method == "quadrature"
+        else {"spp": spp, "points": points, "seed": seed, **({"floor": floor} if floor else {})}
+    )
     manifest = {"target": describe(target), **_described(asked, axes, method, sampling), "axes": text}
     return _sealed(arrays, nodes, dims, errors, manifest)
 
@@ -231,7 +240,7 @@ def _figures(difference: np.ndarray) -> dict[str, float]:
 
 
 def _directional(
-    asked: Target, axes: Axes, method: str, spp: int, points: str, seed: int
+    asked: Target, axes: Axes, method: str, spp: int, points: str, seed: int, floor: float
 ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
     exact = asked.exact(axes.nodes())
     if method == "quadrature":
@@ -243,7 +252,7 @@ def _directional(
         judge = asked.exact(axes.at(*here), fine=True)
         return exact, {name: _figures(exact[name][here] - judge[name]) for name in exact}
     at = axes.nodes()
-    estimate = monte_carlo.estimate(axes.ndf, axes.masking, at, method, spp, points, seed).value
+    estimate = monte_carlo.estimate(axes.ndf, axes.masking, at, method, spp, points, seed, floor=floor).value
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 

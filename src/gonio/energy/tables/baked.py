@@ -108,12 +108,13 @@ def load(path: str | Path) -> Baked:
         raise InputError(str(error), str(file_path), "bake it again") from error
 
 
-def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict[str, np.ndarray]:
+def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: bool = False) -> dict[str, np.ndarray]:
     """E, E_avg and dfg in the homework's form: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels,
     E_avg is constant along a row; dfg has A in red and B in green.
 
     store  "E" or "1-E", for E and E_avg
     flip   True: the lowest roughness is the bottom row; False: the top row
+    wrap   convert to bytes as the homework's program does: rounded down, and 256 becomes 0
     """
     if store not in ("E", "1-E"):
         raise InputError(f"unknown '{store}'", "--store", "E or 1-E")
@@ -125,13 +126,15 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict
         value = baked.arrays[name]
         value = np.broadcast_to(value[:, None], (size, size)) if value.ndim == 1 else value
         value = 1.0 - value if store == "1-E" else value
-        pictures[name] = np.repeat(_bytes(value[::-1] if flip else value)[..., None], 3, axis=-1)
+        pictures[name] = np.repeat(_bytes(value[::-1] if flip else value, wrap)[..., None], 3, axis=-1)
     if "dfg" in baked.arrays:
         value = baked.arrays["dfg"][::-1] if flip else baked.arrays["dfg"]
-        pictures["dfg"] = _bytes(np.dstack([value, np.zeros((size, size))]))
+        pictures["dfg"] = _bytes(np.dstack([value, np.zeros((size, size))]), wrap)
     return pictures
 
 
-def _bytes(value: np.ndarray) -> np.ndarray:
-    """Values of 0 to 1 in 8 bits."""
+def _bytes(value: np.ndarray, wrap: bool) -> np.ndarray:
+    """Values of 0 to 1 in 8 bits; with `wrap`, modulo 256 in place of clipped."""
+    if wrap:
+        return (np.floor(value * 255.0).astype(np.int64) % 256).astype(np.uint8)
     return np.round(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)

@@ -23,7 +23,7 @@ ROWS = 4096  # pairs of directions at most
 def named(ratio: Ratio) -> Cause | None:
     """The cause that a ratio suggests, None if it fits no formula."""
     unsupported = nothing_below(ratio.top, ratio.bottom, ratio.wo, ratio.wi, ratio.above, ratio.below)
-    ratio = _telling(ratio)
+    ratio = telling(ratio)
     if len(ratio.wo) < FEWEST:
         return unsupported
     off = _off(ratio)
@@ -75,7 +75,7 @@ def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
     return Cause(f"{text}: {fit.guess}?" if fit.guess else text, f"{key} {place}".strip())
 
 
-def _telling(ratio: Ratio) -> Ratio:
+def telling(ratio: Ratio) -> Ratio:
     """The pairs at which both values are finite and the denominator is not negligible."""
     finite = np.isfinite(ratio.above).all(1) & np.isfinite(ratio.below).all(1)
     # within 0.06 degrees of the horizon a ratio of cosines is unreliable

@@ -25,6 +25,16 @@ def fitted(ratio: Ratio) -> Fit | None:
     return next((fit for fit in (candidate(ratio) for candidate in CANDIDATES) if fit is not None), None)
 
 
+def simple(ratio: Ratio) -> Fit | None:
+    """The fit by a known number, a color or powers of cosines, without any other material; None if there is none."""
+    if len(ratio.wo) < FEWEST:
+        return None
+    fit = _constant(ratio)
+    if fit is not None:
+        return fit if fit.number is None or written(abs(fit.number)) in NUMBERS else None
+    return _color(ratio) or _cosines(ratio)
+
+
 def _reflects(ratio: Ratio) -> bool:
     return bool(np.all(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0))
 

@@ -42,6 +42,7 @@ class Ratio:
     numbers        constants that this ratio may equal, besides the usual ones: "2 alpha"
     zero           the mistake that a ratio of 0 suggests
     antisymmetric  whether exchanging wo and wi inverts the ratio: factors of both directions cancel
+    accuracy       relative difference of two values that count as equal; None derives it from the precision
     """
 
     top: str
@@ -55,6 +56,7 @@ class Ratio:
     antisymmetric: bool = False
     numbers: dict[str, float] = dataclasses.field(default_factory=dict)
     zero: str = "a value that is never used"
+    accuracy: float | None = None
 
     @property
     def name(self) -> str:
@@ -109,6 +111,8 @@ def factor_key(number: float) -> str:
 
 def tolerance(ratio: Ratio) -> float:
     """The relative difference of two values that count as equal."""
+    if ratio.accuracy is not None:
+        return ratio.accuracy
     return 1e-5 if ratio.subject.best == "float64" else 5e-3
 
 

@@ -1,0 +1,13 @@
+"""A student's own work against the truth: tables, values of f, classes, pictures and folders of these.
+
+    go.check("E.png"); go.check("f.csv", "oren-nayar(sigma=0.3)", up="y"); go.check("submissions", sheet="hw4")
+
+`run` chooses the judge of each kind of work, `mistakes` and `table_forms` hold the mistakes that can be named, and
+`sheet` the tasks of the courses.
+"""
+
+from .finding import Finding, Mistake
+from .report import Report
+from .run import check
+
+__all__ = ["Finding", "Mistake", "Report", "check"]

@@ -1,0 +1,93 @@
+"""The probable mistake in values of f: a formula of `mistakes`, or what the referee's finder reads from the ratio."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..material import BSDF
+from ..verify.forensics import causes as referee
+from ..verify.forensics import fits
+from ..verify.forensics.ratio import COVER, Ratio, tolerance
+from ..verify.subject import Subject
+from .finding import Mistake
+from .mistakes import FAMILIES, Values, Variant, f_of
+
+TOP, BOTTOM = "your f", "the model's"
+
+
+def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expected: Values, accuracy: float) -> Ratio:
+    """The given values over the expected ones, (N, 3) both."""
+
+    def recompute(subject: Subject, wo: np.ndarray, wi: np.ndarray, mode: str) -> np.ndarray:
+        return f_of(subject.model, wo, wi)
+
+    subject = Subject(material, type(material).name)
+    return Ratio(TOP, BOTTOM, wo, wi, given, expected, subject, recompute, accuracy=accuracy)
+
+
+def named(both: Ratio) -> Mistake | None:
+    """The mistake that explains a ratio; None if no formula does.
+
+    A known wrong formula that gives all the values prevails over a factor that the referee reads from the ratio, both
+    over a wrong formula that needs a factor besides, and all over the region where the ratio is not 1.
+    """
+    telling = referee.telling(both)
+    wrong: list[Variant] = []
+    for family in FAMILIES:
+        different = list(_different(telling, family.variants(telling.subject.model, telling.wo, telling.wi)))
+        equal = [variant.mistake for variant in different if _equal(telling, variant)]
+        if equal:
+            return _either(equal)
+        wrong += different
+    fit = fits.fitted(telling)
+    if fit is not None:
+        return Mistake(_written(both, fit), _topic(fit))
+    for variant in wrong:
+        fit = fits.simple(dataclasses.replace(telling, below=variant.values))
+        if fit is not None:
+            words = f"{variant.mistake.words}; besides, a factor of {fit.formula}"
+            return Mistake(words, variant.mistake.topic)
+    cause = referee.named(both)
+    return Mistake(cause.words, "the region where the values differ") if cause is not None else None
+
+
+def _either(mistakes: list[Mistake]) -> Mistake:
+    """Mistakes with the same values, such as a factor of 4 and of 1 / alpha = 4: the first three of them."""
+    texts = list(dict.fromkeys(mistake.words for mistake in mistakes))[:3]
+    return Mistake(", or ".join(texts), " or ".join(dict.fromkeys(mistake.topic for mistake in mistakes[:3])))
+
+
+def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
+    """The mistakes whose values differ from the right ones over these rows."""
+    for variant in variants:
+        if variant.values.shape != both.below.shape:
+            variant = Variant(variant.mistake, variant.values[:, : both.below.shape[1]])
+        finite = np.all(np.isfinite(variant.values))
+        if finite and not close(variant.values, both.below, tolerance(both)).mean() > COVER:
+            yield variant
+
+
+def _equal(both: Ratio, variant: Variant) -> bool:
+    """Whether the given values are those of a mistake, where these are not negligible."""
+    return bool(close(both.above, variant.values, tolerance(both)).mean() > COVER)
+
+
+def close(a: Values, b: Values, accuracy: float) -> NDArray[np.bool_]:
+    """Whether two rows of values are equal up to a relative accuracy, (N,); far below the largest value they may
+    differ."""
+    size = np.maximum(np.abs(a), np.abs(b))
+    floor = 1e-5 * np.percentile(size, 99.0) if size.size else 0.0
+    return np.all(np.abs(a - b) <= accuracy * size + accuracy * floor, axis=1)
+
+
+def _written(both: Ratio, fit: fits.Fit) -> str:
+    text = f"{both.name} is {fit.formula}"
+    return f"{text}: {fit.guess}?" if fit.guess else text
+
+
+def _topic(fit: fits.Fit) -> str:
+    return "a constant factor" if fit.number is not None else "a factor that depends on the directions"

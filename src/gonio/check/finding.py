@@ -1,0 +1,91 @@
+"""The result of a check: right, wrong or unreadable, how far off, and the probable mistake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+RIGHT, WRONG, ERROR, MISSING, BY_HAND = "right", "wrong", "input error", "not handed in", "by hand"
+EXIT_CODES = {RIGHT: 0, BY_HAND: 0, WRONG: 1, MISSING: 1, ERROR: 2}
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake whose trace a formula reproduces.
+
+    words  the mistake with its formula: "k = (roughness + 1)^2 / 8 in place of alpha / 2"
+    topic  where it is, without the formula, for students who are to find it themselves: "the masking term G"
+    """
+
+    words: str
+    topic: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The judgment of one piece of work.
+
+    name     the file or class
+    kind     what it was judged as: "table of E", "values of f", ...
+    status   RIGHT, WRONG, ERROR (it could not be judged), MISSING or BY_HAND
+    facts    sentences: what it was compared with, how far off it is, and where
+    mistake  the probable mistake, None if no formula fits
+    figures  the numbers in `facts`
+    hidden   whether formulas and values of the solution are left out
+    """
+
+    name: str
+    kind: str
+    status: str
+    facts: tuple[str, ...] = ()
+    mistake: Mistake | None = None
+    figures: dict[str, float] = field(default_factory=dict)
+    hidden: bool = False
+
+    @property
+    def passed(self) -> bool:
+        return self.status in (RIGHT, BY_HAND)
+
+    @property
+    def exit_code(self) -> int:
+        """0 right, 1 wrong, 2 unreadable."""
+        return EXIT_CODES[self.status]
+
+    @property
+    def cause(self) -> str:
+        """The probable mistake in words, "" if unknown; its topic alone if the solution is hidden."""
+        if self.mistake is None:
+            return ""
+        return f"look at {self.mistake.topic}" if self.hidden else self.mistake.words
+
+    def without_solution(self) -> Finding:
+        """The same without the values and formulas of the solution."""
+        facts = self.facts if self.status == ERROR else ()
+        return replace(self, facts=facts, figures={}, hidden=True)
+
+    def lines(self) -> list[str]:
+        """The judgment as text, one line per fact."""
+        lines = [f"{self.name}: {self.status}" + (f" ({self.kind})" if self.kind else "")]
+        lines += [f"  {fact}" for fact in self.facts]
+        if self.cause:
+            lines.append(f"  probable mistake: {self.cause}")
+        elif self.status == WRONG:
+            lines.append("  no known mistake explains the difference")
+        return lines
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "status": self.status,
+            "passed": self.passed,
+            "facts": list(self.facts),
+            "cause": self.cause,
+            "topic": self.mistake.topic if self.mistake else "",
+            "figures": self.figures,
+        }
+
+
+def unreadable(name: str, why: str, hint: str = "") -> Finding:
+    """The finding about work that cannot be judged."""
+    return Finding(name, "", ERROR, (f"{why}: {hint}" if hint else why,))

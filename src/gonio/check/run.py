@@ -1,0 +1,155 @@
+"""`gonio check` and `go.check`: the kind of work that was handed in, and its judge."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..catalog import notation, operands, outside
+from ..errors import InputError
+from ..files import check_file, write_whole
+from ..material import BSDF
+from ..owner import public
+from . import classes, pictures, samples, sheet, tables
+from .finding import Finding
+from .report import Mark, Report, Submission, junit
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is judged and by what; the fields are the arguments of `check`."""
+
+    target: str | Path | BSDF
+    against: str | BSDF | None = None
+    scene: Path | None = None
+    up: str = "z"
+    tolerance: float | None = None
+    allow_outside: bool = False
+    allow_code: bool = False
+
+    @property
+    def path(self) -> Path:
+        return Path(os.path.expanduser(str(self.target)))
+
+    @property
+    def suffix(self) -> str:
+        return "" if isinstance(self.target, BSDF) else self.path.suffix.lower()
+
+    @property
+    def is_material(self) -> bool:
+        """Whether it is a material, or a class in a Python file."""
+        return isinstance(self.target, BSDF) or outside.names_code(notation.split(str(self.target))[0])
+
+    def model(self) -> BSDF:
+        """The material to judge by. Raises InputError if none was given."""
+        if isinstance(self.against, BSDF):
+            return self.against
+        if not self.against:
+            hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3"
+            raise InputError("no model to judge by", "MODEL", hint)
+        operands.kind_of(self.against, operands.MATERIALS, "MODEL")
+        return notation.named(self.against)[0]
+
+
+def _class(work: Work) -> Finding:
+    given = work.target if isinstance(work.target, BSDF) else notation.named(str(work.target))[0]
+    name = type(given).name if isinstance(work.target, BSDF) else notation.split(str(work.target))[0]
+    return classes.check(name, given, work.model(), work.tolerance)
+
+
+def _rows(work: Work) -> Finding:
+    return samples.check(work.path, work.model(), work.up, work.tolerance)
+
+
+def _picture(work: Work) -> Finding:
+    assert work.scene is not None
+    return pictures.check(work.path, work.scene, work.allow_outside, work.allow_code)
+
+
+def _table(work: Work) -> Finding:
+    if work.against is not None and not isinstance(work.against, str):
+        raise InputError(
+            "a table of E judged by a material", "MODEL", "give a masking term, such as schlick-ibl, or none"
+        )
+    return tables.check(tables.read(work.path), work.against or "")
+
+
+# Each kind of work: whether a target is of that kind, and its judge. The first that fits is chosen.
+JUDGES: tuple[tuple[Callable[[Work], bool], Callable[[Work], Finding]], ...] = (
+    (lambda work: work.is_material, _class),
+    (lambda work: work.suffix in sheet.ROWS, _rows),
+    (lambda work: work.suffix in sheet.PICTURES and work.scene is not None, _picture),
+    (lambda work: work.suffix in sheet.PICTURES, _table),
+)
+
+
+@public
+def check(
+    target: str | Path | BSDF,
+    against: str | BSDF | None = None,
+    *,
+    scene: str | Path | None = None,
+    sheet: str | None = None,
+    up: str = "z",
+    tolerance: float | None = None,
+    hide_solution: bool = False,
+    junit: str | Path | None = None,
+    allow_outside: bool = False,
+    allow_code: bool = False,
+) -> Finding | Report:
+    """Judge a student's own work, and name the probable mistake.
+
+        go.check("E.png").facts                                  # which k, flip, 1 - E, and how far off
+        go.check("f.csv", go.OrenNayar(sigma=0.3), up="y").cause
+        go.check(MyConductor(alpha=0.3), go.Conductor(alpha=0.3)).passed
+        go.check("submissions", sheet="hw4").rows()
+
+    target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
+               picture, with `scene`; a folder of these or of such folders, with `sheet`
+    against    the material to judge by, also as text; for a table, the masking term that it must have
+    scene      the scene that a picture shows; with `sheet`, a folder of scenes by the names of pictures
+    sheet      "hw4" or "lab2": the tasks and their points
+    up         the axis along the normal in rows of directions: "z", "y" or "x"
+    tolerance  relative difference of f that counts as equal; None is 2e-3 for rows, 1e-4 for a material
+    hide_solution  leave out formulas and values of the solution
+    junit      a file for the verdicts as JUnit XML
+    Returns a Finding, or for a folder a Report; both have `passed`, `exit_code` and `as_dict`.
+    Raises InputError for work that cannot be read; in a folder that is a finding, and the others are judged.
+    """
+    if junit is not None:
+        check_file(junit)
+    place = None if scene is None else Path(scene)
+    result = _judge(Work(target, against, place, up, tolerance, allow_outside, allow_code), sheet)
+    if hide_solution:
+        result = result.without_solution()
+    if junit is not None:
+        write_whole(junit, _junit(result).encode())
+    return result
+
+
+def _judge(work: Work, tasks: str | None) -> Finding | Report:
+    if not work.is_material and work.path.is_dir():
+        if not tasks:
+            raise InputError(
+                f"'{work.target}' is a folder", "TARGET", f"name its sheet: --sheet {' or '.join(sheet.SHEETS)}"
+            )
+        return sheet.check(work.path, tasks, work.scene, work.up)
+    if tasks:
+        raise InputError(f"'{work.target}' is no folder", "--sheet", "give the folder of a submission, or of several")
+    judge = next((judge for accepts, judge in JUDGES if accepts(work)), None)
+    if judge is None:
+        what = f"'{work.target}' is {'a PDF' if work.suffix == '.pdf' else 'nothing that can be judged'}"
+        raise InputError(
+            what, "TARGET", "give a table (.png), rows of f (.csv), FILE.py:CLASS, or a folder with --sheet"
+        )
+    if not work.is_material and not work.path.exists():
+        raise InputError(f"no file '{work.target}'", "TARGET", "check the path")
+    return judge(work)
+
+
+def _junit(result: Finding | Report) -> str:
+    if isinstance(result, Report):
+        return junit(result.submissions)
+    return junit([Submission(result.name, [Mark(result.kind, 0.0, result)])])

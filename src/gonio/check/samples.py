@@ -1,0 +1,155 @@
+"""Values of f from any program, as text: rows of wo, wi and f, judged pointwise against a material.
+
+    # wo.x wo.y wo.z   wi.x wi.y wi.z   f (one or three channels)
+    0.36, -0.48, 0.8,  0.0, 0.6, 0.8,   0.1507
+
+Commas, semicolons, tabs or spaces separate the numbers; empty lines and lines that start with # are skipped, and a
+first line of names may head the table. Five columns are theta_o, phi_o, theta_i, phi_i in degrees, and f.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..material import BSDF
+from ..measure.formats import text
+from ..verify import directions
+from . import causes
+from .finding import RIGHT, WRONG, Finding
+from .mistakes import Values, f_of
+from .mistakes.empirical import with_cosine
+
+ACCURACY = 2e-3  # relative: float32, printed with six digits, with angles by arc functions
+GRAZING = 1e-3  # cosine below which a quotient by it loses its digits
+UNIT = 1e-3  # largest deviation of a direction's length from 1
+COVER = 0.99  # share of the rows that must agree; the others by ten times the accuracy
+_UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z: rotations
+
+
+class Rows(NamedTuple):
+    """Directions (N, 3) with z up, values (N, 1 or 3), and the line of each row."""
+
+    wo: Values
+    wi: Values
+    f: Values
+    line: list[int]
+
+
+def check(path: Path, material: BSDF, up: str = "z", accuracy: float | None = None) -> Finding:
+    """Judge a file of values. Raises InputError for one that cannot be read."""
+    rows = read(path, up)
+    return judge(path.name, rows, material, ACCURACY if accuracy is None else accuracy)
+
+
+def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
+    """Compare values of f with a material's, row by row."""
+    expected = f_of(material, rows.wo, rows.wi)
+    if rows.f.shape[1] == 1:
+        if np.any(np.ptp(expected, axis=1) > accuracy * expected.max(axis=1)):
+            raise InputError(
+                "one column of f, and the material is colored", name, "give three columns: red, green, blue"
+            )
+        expected = expected[:, :1]
+    fine = np.minimum(np.abs(rows.wo[:, 2]), np.abs(rows.wi[:, 2])) > GRAZING
+    if not fine.any() or not (np.any(expected[fine]) or np.any(rows.f)):
+        raise InputError("every row is at or below the horizon", name, "give directions above the surface, or --up y")
+    figures = {"rows": float(len(rows.f)), "accuracy": accuracy}
+    facts: list[str] = []
+    if _agree(rows.f, expected, fine, accuracy):
+        pass
+    elif with_cosine(material) and _agree(rows.f, expected * np.abs(rows.wi[:, 2:]), fine, accuracy):
+        expected = expected * np.abs(rows.wi[:, 2:])
+        facts.append("the values are f cos theta_i, as in the sheet's equation 1")
+    else:
+        error, worst = _error(rows.f, expected, fine, accuracy)
+        good = causes.close(rows.f, expected, accuracy)[fine]
+        figures |= {"agree": float(good.mean()), "largest": float(error[worst]), "line": float(rows.line[worst])}
+        facts += [
+            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative",
+            f"furthest off: line {rows.line[worst]}, f {_numbers(rows.f[worst])}, expected {_numbers(expected[worst])}",
+        ]
+        both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
+        return Finding(name, kind, WRONG, tuple(facts), causes.named(both), figures)
+    error, worst = _error(rows.f, expected, fine, accuracy)
+    figures |= {"agree": 1.0, "largest": float(error[worst])}
+    facts.insert(0, f"{int(fine.sum())} rows agree; the largest relative difference is {error[worst]:.2g}")
+    return Finding(name, kind, RIGHT, tuple(facts), None, figures)
+
+
+def _agree(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
+    near = causes.close(given, expected, accuracy)[fine]
+    return bool(near.mean() >= COVER and np.all(causes.close(given, expected, 10.0 * accuracy)[fine]))
+
+
+def _error(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> tuple[Values, int]:
+    """The relative difference of each row, and the row that is furthest off among those that are bright enough."""
+    size = np.maximum(np.abs(given), np.abs(expected))
+    error = (np.abs(given - expected) / np.maximum(size, 1e-3 * np.percentile(size, 99.0) + 1e-30)).max(axis=1)
+    return error, int(np.argmax(np.where(fine, error, -1.0)))
+
+
+def _numbers(values: Values) -> str:
+    return ", ".join(f"{x:.6g}" for x in values)
+
+
+def read(path: Path, up: str = "z") -> Rows:
+    """The rows of a file, with z up. Raises InputError, with the line, for anything else."""
+    if up not in _UP:
+        raise InputError(f"unknown axis '{up}'", "--up", "give the axis along the normal: z, y or x")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", str(path), "check the path") from None
+    where = path.name
+    table = _split(text.lines(data, where))
+    if not table:
+        raise InputError("no rows of numbers", where, "write rows of wo.x wo.y wo.z wi.x wi.y wi.z f")
+    width = len(table[0][1])
+    if width not in (5, 7, 9):
+        hint = (
+            "7 columns are wo, wi and f; 9 have f in three channels; 5 are theta_o, phi_o, theta_i, phi_i, f in degrees"
+        )
+        raise InputError(f"{width} columns", where, hint)
+    values = text.table(table, width, where)
+    lines = [line for line, _ in table]
+    if width == 5:
+        wo, wi = directions.at(values[:, 0], values[:, 1]), directions.at(values[:, 2], values[:, 3])
+        return Rows(wo, wi, values[:, 4:], lines)
+    wo, wi = (_directions(values[:, k : k + 3], name, lines, where) for k, name in ((0, "wo"), (3, "wi")))
+    return Rows(wo[:, _UP[up]], wi[:, _UP[up]], values[:, 6:], lines)
+
+
+def _split(lines: list[str]) -> list[tuple[int, list[str]]]:
+    """The words of each row with its line; comments and a heading are skipped."""
+    table = []
+    for number, line in enumerate(lines, 1):
+        words = [word for word in re.split(r"[,;\s]+", line.strip()) if word]
+        if not words or words[0].startswith(("#", "//")):
+            continue
+        if not table and not _is_number(words[0]):
+            continue  # a line of names
+        table.append((number, words))
+    return table
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _directions(w: Values, name: str, lines: list[int], where: str) -> Values:
+    length = np.linalg.norm(w, axis=1)
+    off = np.abs(length - 1.0)
+    worst = int(np.argmax(off))
+    if off[worst] > UNIT:
+        what = f"{name} of length {length[worst]:.4g} given, a unit vector expected"
+        raise InputError(what, f"{where}:{lines[worst]}", "normalize the directions")
+    return w / length[:, None]

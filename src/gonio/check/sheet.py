@@ -1,0 +1,160 @@
+"""The sheets of the courses, as tasks with points, and the judgment of what was handed in.
+
+A file belongs to the first task whose pattern its name fits. A file of values may name its own material and frame in
+comments: `# model: oren-nayar(sigma=0.5)` and `# up: y`; the sheet's are used otherwise. Code in a folder is not run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..catalog import notation
+from ..errors import GonioError, InputError, did_you_mean
+from . import pictures, samples, tables
+from .finding import BY_HAND, MISSING, Finding, unreadable
+from .report import Mark, Report, Submission
+
+PICTURES = (".png", ".exr", ".hdr", ".npz")
+ROWS = (".csv", ".txt", ".tsv", ".dat")
+_COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One task of a sheet.
+
+    files  a pattern of names without suffix, in lower case
+    model  the material of files of values; "" if there are none
+    table  "E", "E_avg", or "E, sampled by importance"; "" for a task without a table
+    """
+
+    name: str
+    points: float
+    files: str
+    model: str = ""
+    table: str = ""
+
+
+_METAL = "preset=Ag,alpha=0.25,fresnel=schlick"
+HW4 = (
+    Task("E_avg", 5, r"(^|.*[_\- ])e_?avg.*|.*average.*", table="E_avg"),
+    Task("bonus 1: importance sampling", 10, r"ggx_e_lut|.*e.*(_is|importance).*", table="E, sampled by importance"),
+    Task("E(mu)", 5, r"(.*_)?e(_?mu)?(_mc)?(_lut)?(_\d+)?|.*(^|_)emu.*", table="E"),
+    Task("Kulla-Conty", 5, r".*kulla.*", f"kulla-conty(base=conductor({_METAL},masking=schlick-direct),color=sheet)"),
+    Task("PBR material", 10, r".*(pbr|conductor|ggx).*", f"conductor({_METAL},masking=schlick-direct)"),
+    Task("bonus 2: split sum", 5, r".*(split|dfg).*"),
+)
+LAB2 = (
+    Task("Phong", 5, r"(?!.*blinn).*phong.*", "phong"),
+    Task("Oren-Nayar", 4, r".*oren.*", "oren-nayar"),
+    Task(
+        "conductor, Beckmann",
+        6,
+        r"(?!.*dielectric).*beckmann.*",
+        f"conductor({_METAL},ndf=beckmann,masking=smith-separable)",
+    ),
+    Task(
+        "conductor, GGX",
+        6,
+        r"(?!.*dielectric).*(ggx|conductor).*",
+        f"conductor({_METAL},ndf=ggx,masking=smith-separable)",
+    ),
+    Task("report", 4, r".*(report|readme|lab2|\u62a5\u544a).*"),
+)
+SHEETS = {"hw4": HW4, "lab2": LAB2}
+
+
+def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -> Report:
+    """Judge a folder, or each folder of a class. Raises InputError for an unknown sheet and for a folder without files.
+
+    scenes  a folder of scenes, or one scene; a picture with a scene's name is judged by it
+    """
+    if sheet not in SHEETS:
+        raise InputError(f"unknown sheet '{sheet}'", "--sheet", did_you_mean(sheet, list(SHEETS)))
+    folders = _submissions(folder)
+    return Report([_submission(one, SHEETS[sheet], scenes, up) for one in folders], sheet)
+
+
+def _submissions(folder: Path) -> list[Path]:
+    """The folder itself if it has files, else the folders in it."""
+    entries = sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
+    if not entries:
+        raise InputError("an empty folder", str(folder), "give the folder of a submission, or of several")
+    folders = [entry for entry in entries if entry.is_dir()]
+    return [folder] if any(entry.is_file() for entry in entries) or not folders else folders
+
+
+def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: str) -> Submission:
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
+    if not files:
+        return Submission(folder.name, [Mark("", 0.0, unreadable(folder.name, "an empty folder"))])
+    taken: dict[str, list[Path]] = {task.name: [] for task in tasks}
+    others = []
+    for path in files:
+        task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
+        (others if task is None else taken[task.name]).append(path)
+    tables_of = {task.table: taken[task.name] for task in tasks if task.table}
+    if not tables_of.get("E", [0]) and tables_of.get("E, sampled by importance"):
+        taken["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it does what the first task asks for, and more
+    own = _own_table(taken.get("E(mu)", []))
+    marks = [
+        Mark(task.name, task.points, one) for task in tasks for one in _judged(task, taken[task.name], own, scenes, up)
+    ]
+    return Submission(folder.name, marks, tuple(str(path.relative_to(folder)) for path in others))
+
+
+def _own_table(files: list[Path]) -> tables.Table | None:
+    for path in files:
+        try:
+            return tables.read(path)
+        except GonioError:
+            continue
+    return None
+
+
+def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Path | None, up: str) -> Iterator[Finding]:
+    """A finding for each file of a task; for a task without files, one that says so."""
+    if not files:
+        yield Finding("", "", MISSING if task.table or task.model else BY_HAND)
+    for path in files:
+        try:
+            yield _one(task, path, own, scenes, up)
+        except GonioError as error:
+            yield unreadable(path.name, error.what, error.hint)
+
+
+def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, up: str) -> Finding:
+    """The judgment of one file of a task. Raises InputError for one that cannot be read."""
+    suffix = path.suffix.lower()
+    if task.table and suffix in PICTURES:
+        return _table(task, path, own)
+    if task.table:
+        raise InputError(f"a '{suffix}' given, a picture of the table expected", path.name, "give the .png")
+    if task.model and suffix in ROWS:
+        given = dict(_COMMENT.findall(path.read_text(encoding="utf-8", errors="replace")))
+        material, _ = notation.named(given.get("model", task.model))
+        return samples.check(path, material, given.get("up", up))
+    scene = _scene_of(path, scenes)
+    if suffix in PICTURES and scene is not None:
+        return pictures.check(path, scene)
+    note = "code is not run from a folder: gonio check FILE.py:CLASS MODEL judges it" if suffix == ".py" else ""
+    return Finding(path.name, "", BY_HAND, (note,) if note else ())
+
+
+def _table(task: Task, path: Path, own: tables.Table | None) -> Finding:
+    table = tables.read(path)
+    if task.table == "E_avg":
+        return tables.check_average(table, own)
+    return tables.check(table, sampled=task.table != "E")
+
+
+def _scene_of(path: Path, scenes: Path | None) -> Path | None:
+    """The scene that a picture is named after."""
+    if scenes is None:
+        return None
+    if (scenes / "scene.json").exists():
+        return scenes
+    return next((one for one in (scenes / path.stem, scenes / path.stem.lower()) if one.is_dir()), None)

@@ -1,0 +1,113 @@
+"""`gonio check`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Exit, Option
+
+from .. import completion
+from ..options import Code, Json, Material, Outside
+from ..output import listing, print_rich
+from .base import MATERIALS, verb
+
+if TYPE_CHECKING:
+    from ...check import Report
+
+
+@dataclass(frozen=True)
+class Judging:
+    """By what the work is judged, and how it is reported."""
+
+    scene: Annotated[
+        Path | None, Option(metavar="SCENE", help="The scene of a picture; with --sheet, a folder of scenes.")
+    ] = None
+    sheet: Annotated[
+        str | None, Option(metavar="hw4|lab2", help="The sheet of a folder of submissions: its tasks and points.")
+    ] = None
+    up: Annotated[str, Option(metavar="z|y|x", help="The axis along the normal, in rows of directions.")] = "z"
+    tolerance: Annotated[
+        float | None, Option(metavar="X", help="Relative difference of f that counts as equal; 0.002 for rows.")
+    ] = None
+    hide_solution: Annotated[
+        bool, Option("--hide-solution", help="Print where a mistake is, without formulas and values of the solution.")
+    ] = False
+    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
+
+
+@verb(MATERIALS, place=3)
+def check(
+    target: Annotated[
+        str, Argument(metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a picture, or a folder.")
+    ],
+    model: Annotated[
+        str | None,
+        Argument(
+            metavar="MODEL",
+            help="The material to judge by; for a table of E, the masking term that it must have.",
+            autocompletion=completion.materials,
+        ),
+    ] = None,
+    *,
+    how: Judging,
+    made: Material,
+    allow_outside: Outside = False,
+    allow_code: Code = False,
+    as_json: Json = False,
+) -> None:
+    """Judge a student's own work: right or wrong, how far off, and the probable mistake.
+
+    A table of E or E_avg is compared with all forms that the homework's text, its figures and the usual mistakes
+    give. Rows of wo, wi and f, from any program, are compared with MODEL pointwise; so is a class. A picture may be
+    moved by a row, have another exposure, and gamma or none. The exit code is 0 if all is right, 1 if something is
+    wrong or missing, 2 if something cannot be read.
+
+    \b
+    Examples:
+      gonio check E.png
+      gonio check E.png schlick-ibl
+      gonio check f.csv oren-nayar -p sigma=0.3 --up y
+      gonio check mine.py:MyConductor conductor --preset Au -p alpha=0.3
+      gonio check picture.png --scene examples/phong
+      gonio check submission --sheet hw4 --junit out.xml
+      gonio check class --sheet lab2 --scene examples --hide-solution
+    """
+    from ...check import Report
+    from ...check import check as judge
+
+    work, against = _with_parameters(target, model, made)
+    result = judge(work, against, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
+    if as_json:
+        print(json.dumps(result.as_dict()))
+    elif isinstance(result, Report):
+        _print_table(result)
+    else:
+        print("\n".join(result.lines()))
+    if result.exit_code:
+        raise Exit(result.exit_code)
+
+
+def _with_parameters(target: str, model: str | None, made: Material) -> tuple[str, str | None]:
+    """The work, and the material to judge it by, both with the parameters that they have; or the name of a masking
+    term."""
+    from ...catalog import outside
+    from ...optics.masking import Masking
+
+    if model is None or model in Masking.family.all():
+        made.refuse(target if model is None else model)
+        return target, model
+    if outside.names_code(target.partition("(")[0]):
+        work, model = made.texts([target, model])
+        return work, model
+    return target, made.text(model)
+
+
+def _print_table(report: Report) -> None:
+    """One row per file, and the suggested points of each submission."""
+    table = listing("submission", "task", "file", "judgment", "points", "probable mistake")
+    for row in report.rows():
+        table.add_row(*row)
+    print_rich(table)

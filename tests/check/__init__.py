@@ -1,0 +1,1 @@
+"""Right and wrong solutions of the courses' tasks, for `gonio check`."""
