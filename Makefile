@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs browser
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser
 
 install: .venv/installed
 
@@ -90,5 +90,16 @@ docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
 	$(BIN)/python docs/make_options.py
 
+# The book, in out/book/index.html, which opens from disk. Only pages whose sources changed are built again.
+.venv/book: pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[book]'
+	touch $@
+
+book: .venv/book
+	$(BIN)/python -m sphinx -q -b html -W --keep-going -d out/book-parts docs out/book
+	@echo 'out/book/index.html'
+
 clean:
-	rm -rf .venv out build dist
+	rm -rf .venv out build dist docs/reference docs/gallery docs/project

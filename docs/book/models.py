@@ -1,0 +1,163 @@
+"""A page for each model: formula, live figure, parameters, use, laws, shader code and sources, all from the code."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+from gonio.viewer import manual, page, stage
+
+from . import formulas
+from .bibliography import KEY, citation, known
+from .text import cell, escaped, fenced, markdown, table
+
+ROOT = Path(__file__).parents[2]
+GROUPS = {
+    "diffuse": "Diffuse",
+    "empirical": "Empirical",
+    "microfacet": "Microfacet models",
+    "compensated": "With multiple scattering",
+    "layered": "Layered",
+    "sheen": "Cloth",
+    "historic": "Models of published fits",
+    "combined": "Composed of materials",
+    "measured": "Measured",
+}
+SYMBOLS = (
+    "$n$ is the normal, $o$ the direction to the viewer (`wo`), $i$ the direction to the light (`wi`), "
+    "$h$ the half vector, $r$ the light mirrored at $n$, $v = o$. $f$ is in 1/sr, without the cosine of `eval`."
+)
+
+
+def pages() -> dict[str, str | bytes]:
+    """All pages of models and their index."""
+    return {f"reference/models/{name}.md": _page(model) for name, model in go.models().items()} | {
+        "reference/models/index.md": _index()
+    }
+
+
+def live() -> dict[str, str | bytes]:
+    """The page of `gonio view`, as one file without network, for each model that has shader code."""
+    made: dict[str, str | bytes] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in go.models():
+            if has_shader(name):
+                path = page.export(stage.of_targets([operand(name)]), Path(folder) / f"{name}.html")
+                made[f"reference/live/live/{name}.html"] = path.read_bytes()
+    return made
+
+
+def operand(name: str) -> str:
+    """A model on the command line, with inner materials where it requires some: "mix(a=lambert,b=conductor)"."""
+    required = [key for key, parameter in go.models()[name].parameters().items() if parameter.required]
+    inner = ["conductor"] if len(required) == 1 else ["lambert", "conductor"]
+    given = ",".join(f"{key}={one}" for key, one in zip(required, inner, strict=False))
+    return f"{name}({given})" if required else name
+
+
+def has_shader(name: str) -> bool:
+    """Whether a model can be emitted at its defaults."""
+    return _shader(name) is not None
+
+
+def first_line(model: type[go.BSDF]) -> str:
+    """The first sentence of a model's docstring, in one line."""
+    return re.split(r"\. |\.$|:", " ".join(manual.page(model).doc.split("\n\n")[0].split()))[0]
+
+
+def group(model: type[go.BSDF]) -> str:
+    return model.__module__.split(".")[2]
+
+
+def _index() -> str:
+    lines = ["# Models", "", f"{len(go.models())} models. {SYMBOLS}", ""]
+    for key, title in GROUPS.items():
+        members = {name: model for name, model in go.models().items() if group(model) == key}
+        rows = [(f"[{name}]({name}.md)", escaped(first_line(model))) for name, model in members.items()]
+        lines += [f"## {title}", "", table(("model", ""), rows), ""]
+        lines += [":::{toctree}", ":hidden:", "", *members, ":::", ""]
+    return "\n".join(lines)
+
+
+def _page(model: type[go.BSDF]) -> str:
+    name = model.name
+    found = manual.page(model)
+    parts = [f"# {name}", markdown(found.doc), "## Formula"]
+    parts += [f"$$\n{line}\n$$" for line in formulas.of_model(name)] + [SYMBOLS]
+    if name in formulas.RUN:
+        parts.append("The formula is set from an expression that a test evaluates against the model.")
+    parts += ["## Parameters", _parameters(found)]
+    shader = _shader(name)
+    if shader is not None:
+        frame = f'<iframe class="live" src="../../live/{name}.html" loading="lazy" title="{name}, live"></iframe>'
+        parts += [
+            "## Live",
+            "Turn the balls, open the lobe, move the sliders. The shader is the code below, run by your browser.",
+            f":::{{dropdown}} {name} in this page\n```{{raw}} html\n{frame}\n```\n:::",
+        ]
+    parts += ["## Use", _use(found), "## Laws", _laws(found)]
+    if shader is not None:
+        title = f'GLSL, `gonio emit "{operand(name)}" --lean`'
+        parts += ["## Shader code", f":::{{dropdown}} {title}\n{fenced(shader, 'glsl')}\n:::"]
+    if sources := _sources(found):
+        parts += ["## Sources", sources]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _parameters(found: manual.Page) -> str:
+    rows = []
+    for row in found.parameters:
+        allowed = "<br>".join(f"`{key}`: {escaped(text)}" for key, text in row.choices.items()) or escaped(row.range)
+        default = row.default if row.default == "required" else f"`{row.default}`"
+        rows.append([f"`{row.name}`", row.kind, allowed, row.unit or "-", default, escaped(row.doc)])
+    head = ("parameter", "kind", "range", "unit", "default", "meaning")
+    return table(head, [[cell(text) for text in row] for row in rows]) if rows else "None."
+
+
+def _use(found: manual.Page) -> str:
+    name = found.name
+    required = [row for row in found.parameters if row.default == "required"]
+    if required:  # another material, or a file
+        return f"Python: `go.{found.title}`. Scenes: the type `gonio-{name}`. Mitsuba: the plugin `{found.plugin}`."
+    verbs = ("view {}", "plot {} -o plot.png", "verify {}", "render {} -o ball.png")
+    commands = "\n".join(f"gonio {verb.format(name)}" for verb in verbs)
+    python = f"import gonio as go\n\nmaterial = go.{found.title}()\nvalue = material.eval(wo, wi)  # f cos, (N, 3)"
+    xml = f'<bsdf type="{found.plugin}"/>'
+    scene = json.dumps({"type": f"gonio-{name}"})
+    return "\n\n".join(
+        (
+            fenced(commands, "bash"),
+            fenced(python, "python"),
+            "In a scene, and in Mitsuba after `import gonio.mitsuba`:",
+            fenced(scene, "json"),
+            fenced(xml, "xml"),
+        )
+    )
+
+
+def _laws(found: manual.Page) -> str:
+    lines = [f"Breaks **{law}** by nature: {escaped(reason)}." for law, reason in found.breaks.items()]
+    card = ROOT / f"docs/report-cards/{found.name}.md"
+    if card.exists():
+        lines.append(f"Judged in full on its [report card](../../report-cards/{found.name}.md).")
+    else:
+        lines.append(f"`gonio verify {found.name} -o card` judges it and writes its report card.")
+    return "\n\n".join(lines)
+
+
+def _shader(name: str) -> str | None:
+    try:
+        return go.emit(operand(name), lean=True)
+    except go.InputError:  # needs a file, or is random
+        return None
+
+
+def _sources(found: manual.Page) -> str:
+    source: Any = ROOT / found.source
+    keys = KEY.findall(found.doc) + KEY.findall(source.read_text(encoding="utf-8"))
+    cited = [key for key in dict.fromkeys(keys) if key in known()]
+    return "\n".join([*(f"- {citation(key)}" for key in cited), f"- Source: `{found.source}`"])
