@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bridge.faults.denormal_numbers import denormals_rounded
 from ..bridge.types import Plugin, Scene
 from ..errors import InputError
 from ..work import garbage
@@ -77,7 +78,7 @@ class MitsubaRender:
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
-        with garbage.paused():
+        with garbage.paused(), denormals_rounded():
             tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
             return np.array(tensor, dtype=np.float32)
 

@@ -122,7 +122,7 @@ class SceneData:
         """A sample's camera ray, its weight, and its first hit."""
         ray, weight = self.camera.ray(pixel, key, index, wavelength)
         ray = self.mi.Ray3f(ray)
-        return ray, weight, self.surfaces.nearest(ray, active, coherent=True)
+        return ray, weight, self.surfaces.nearest(ray, active)
 
     def begins_path(self, hit: Hit) -> Mask:
         """Whether a camera ray that ends at `hit` begins a path: every one does, but in `foreground.py`."""

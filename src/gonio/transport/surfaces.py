@@ -26,11 +26,16 @@ class Surfaces:
             self.inline = Inline.of(mi, scene, placement_reader(mi))
             self.placements = Placements.of(mi, scene, MANY if self.inline is None else 1)
 
-    def nearest(self, ray: Ray, active: Mask = True, coherent: bool = False) -> Hit:
-        """The first surface that a ray hits; `coherent` if neighboring rays have similar directions."""
+    def nearest(self, ray: Ray, active: Mask = True) -> Hit:
+        """The first surface that a ray hits.
+
+        Where a ray hits two surfaces at the same distance, `coherent=True` lets the other rays of a packet decide:
+        they are traced together, in an order that suits them all. Which paths begin together depends on where a pass
+        ends, so the picture would depend on timing. Rays that are traced one by one cost about as much.
+        """
         if self.inline is not None:
             return self.inline.nearest(ray, active)
-        return self.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
+        return self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
 
     def blocked(self, ray: Ray, active: Mask = True) -> Mask:
         """Whether a ray hits anything."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...bridge import engine
 from ...bridge.faults.borrowed_memory import own
+from ...bridge.faults.denormal_numbers import denormals_rounded
 from ...bridge.faults.interrupted_recording import interruptible
 from ...bridge.faults.merged_mesh_bbox import with_valid_bbox
 from ...bridge.types import Float, Scene, Sensor, UInt
@@ -80,7 +81,7 @@ class Render:
         # A newly loaded camera and a moved one hold the same numbers in arrays of different order, which would give two
         # kernels; this call puts both into the second state.
         self.sensor.parameters_changed()
-        with dr.suspend_grad(), garbage.paused():
+        with dr.suspend_grad(), garbage.paused(), denormals_rounded():
             self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
@@ -112,7 +113,7 @@ class Render:
         mi = self.mi
         # Dr.Jit would record each loop again without its invariant variables: LLVM eliminates these anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
-        with dr.suspend_grad(), garbage.paused(), interruptible(), unchanged:
+        with dr.suspend_grad(), garbage.paused(), interruptible(), unchanged, denormals_rounded():
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
@@ -207,9 +208,10 @@ class Render:
         done = dr.opaque(mi.UInt32, self.done) if self._lanes is None else self._lanes
         done = mi.Float64(dr.maximum(done, 1))
         pixels = dr.empty(mi.Float, self.width * self.height * len(channels))
-        for number, total in enumerate(channels):
-            dr.scatter(pixels, mi.Float(total / done), self._pixel * len(channels) + number)
-        return np.array(pixels, np.float32).reshape(shape)
+        with denormals_rounded():
+            for number, total in enumerate(channels):
+                dr.scatter(pixels, mi.Float(total / done), self._pixel * len(channels) + number)
+            return np.array(pixels, np.float32).reshape(shape)
 
 
 def tiles(width: int, height: int) -> NDArray[np.uint32]:
