@@ -126,3 +126,11 @@ def test_python_functions_decide_alike(here: Path) -> None:
 def test_what_is_a_material_may_be_explained(here: Path) -> None:
     assert operands.is_material("conductor") and operands.is_material("fit.json")
     assert not operands.is_material("ggx") and not operands.is_material("scene") and not operands.is_material("lamberd")
+
+
+def test_a_folder_with_a_scene_is_one_without_a_search_for_other_kinds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "scene.json").touch()
+    monkeypatch.setattr(operands, "readings", lambda text: pytest.fail(f"reads {text}"))
+    assert kind_of(tmp_path, {Kind.SCENE, *MATERIALS}, "SCENE") is Kind.SCENE

@@ -25,6 +25,7 @@ from ..optics.ndf import distributions
 from . import documents, library, outside, texts
 
 PICTURE_SUFFIXES = (".exr", ".hdr", ".png", ".npz")
+SCENE_FILE = "scene.json"
 CALIBRATION = "calibration.json"  # in a folder of photographs
 _LONGEST = 80  # characters of a word in an error
 _LARGEST_CALIBRATION = 1 << 20  # bytes; a larger .json is a scene
@@ -66,6 +67,8 @@ def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str
     Raises InputError, with the actual and the expected kinds, if it has none of these kinds.
     """
     text = os.fspath(word)
+    if Kind.SCENE in accepted and _exists(Path(text.strip()) / SCENE_FILE):
+        return Kind.SCENE  # the first reading of such a folder; no other needs to be looked for
     kinds = readings(text)
     kind = next((one for one in kinds if one in accepted), None)
     if kind is not None:
@@ -174,7 +177,7 @@ def _resembles(name: str) -> bool:
 
 def _in_folder(path: Path, names: list[Kind]) -> list[Kind]:
     """The readings of a folder by its files; for one without known files the verb reports the error."""
-    marks = {"scene.json": Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
+    marks = {SCENE_FILE: Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
     kinds = [kind for name, kind in marks.items() if _exists(path / name)]
     return [*kinds, Kind.FOLDER, *names] if kinds else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
 

@@ -20,7 +20,7 @@ import gonio as go
 import numpy as np
 
 HERE = Path(__file__).parent
-FIGURES = HERE.parents[2] / "src/gonio/models/published"
+FIGURES = HERE.parents[2] / "src/gonio/catalog/published"
 # in the order in which published.cpp reads them
 ORDER = {
     "NganLafortune": ["albedo", "Cxy", "Cz", "sharpness"],
