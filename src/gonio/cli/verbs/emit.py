@@ -39,7 +39,14 @@ def emit(
     ],
     *,
     lang: Annotated[
-        str, Option(metavar="NAME", help="The shader language.", autocompletion=completion.languages)
+        str,
+        Option(
+            "--lang",
+            "--language",
+            metavar="NAME",
+            help="glsl, wgsl, hlsl; numpy, torch, jax: a Python file.",
+            autocompletion=completion.languages,
+        ),
     ] = "glsl",
     functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample",
     made: Material,
@@ -54,9 +61,12 @@ def emit(
         bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
     ] = False,
     place: Place,
+    check: Annotated[
+        int, Option(metavar="N", help="Instead of a shader write N pairs of directions with their 64-bit values, JSON.")
+    ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, or a language of yours.
+    """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, Python, or a language of yours.
 
     -o may be given twice: a name that ends in / is a folder, whose tables are raw float32.
 
@@ -68,6 +78,8 @@ def emit(
       gonio emit openpbr -p coat_weight=1 --lean
       gonio emit conductor dielectric --prefix g_ --lang wgsl --group 1 --first-binding 4
       gonio emit conductor --preset Au --constants
+      gonio emit conductor --preset Au --language torch -o gold.py
+      gonio emit conductor --preset Au --check 10000 -o vectors.json
     """
     from ... import files
     from ...shaders import Placement
@@ -79,6 +91,9 @@ def emit(
         files.check_file(path)
     for path in folders:
         files.check_folder(path, parents=True)
+    if check:
+        _write_pairs(made.texts(model), check, functions, single, folders)
+        return
     options = {
         "lean": lean,
         "constants": constants,
@@ -95,3 +110,20 @@ def emit(
         print("\n".join(written))
     else:
         sys.stdout.write(shader.text)
+
+
+def _write_pairs(models: list[str], count: int, functions: str, single: list[Path], folders: list[Path]) -> None:
+    """Write the pairs of `--check` to files, or print them."""
+    from ... import files
+    from ...errors import InputError
+    from ...shaders.vectors import vectors
+
+    if folders or len(models) != 1:
+        what = f"{len(models)} materials given" if len(models) != 1 else f"the folder '{folders[0]}' given"
+        raise InputError(f"{what}, one material and a file expected", "--check", "gonio emit M --check N -o M.json")
+    text = json.dumps(vectors(models[0], count, functions)) + "\n"
+    for path in single:
+        files.write_whole(path, text.encode())
+        print(path)
+    if not single:
+        sys.stdout.write(text)
