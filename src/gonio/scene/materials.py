@@ -46,8 +46,9 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ..catalog import documents, library, outside
+from ..catalog import documents, library, outside, shaders
 from ..catalog.documents import Document
+from ..catalog.texts import SHADER
 from ..errors import GonioError, GonioWarning, InputError
 from ..material import BSDF, Parameter, models
 from ..material.parameters import ChoiceParameter, IndexParameter
@@ -372,6 +373,8 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
     if model.presets():
         doc = f'Named values in place of the numbers, e.g. "{next(iter(model.presets()))}".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
+    if model.spelling:
+        fields[_attribute("file")] = (str | None, Field(None, alias="file", description="The shader."))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     doc = lab.doc if lab else _summary(model)
     # otherwise pydantic would search all loaded modules for the source of this class, which has none
@@ -443,8 +446,12 @@ def described(material: BSDF) -> MaterialPart:
     """The scene's representation of a material object."""
     cls: Any = type(material)
     name = f"gonio-{material.name}"
-    part = BY_TYPE[name] if name in BY_TYPE and BY_TYPE[name].model is cls else _own_part(material.name, cls)
-    fields: dict[str, Any] = {"type": name if part.model.__module__.startswith("gonio.") else material.name}
+    if cls.spelling:
+        part = _own_part(SHADER, cls)
+        fields: dict[str, Any] = {"type": SHADER, "file": cls.spelling}
+    else:
+        part = BY_TYPE[name] if name in BY_TYPE and BY_TYPE[name].model is cls else _own_part(material.name, cls)
+        fields = {"type": name if part.model.__module__.startswith("gonio.") else material.name}
     for key, parameter in part.declared.items():
         value = getattr(material, parameter.name)
         if parameter.inner:
@@ -530,6 +537,8 @@ def _own(value: object, info: ValidationInfo) -> MaterialPart:
         raise invalid(f"unknown type '{name}'", "known: " + ", ".join(sorted(BY_TYPE)), "type")
     if name not in BY_TYPE and not outside.names_code(name) and library.resembles(name):
         return _from_library(name, value, context)
+    if name == SHADER:
+        return _from_shader(value, context)
     part = part_of(name)
     if part is None:
         if not outside.names_code(name):
@@ -543,6 +552,22 @@ def _own(value: object, info: ValidationInfo) -> MaterialPart:
         except InputError as error:
             raise invalid(f"{error.where}: {error.what}", error.hint, "type") from None
     return part.model_validate(value, context=context)
+
+
+def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
+    """A shader in the scene's folder, which cannot run code on the machine."""
+    file = value.get("file")
+    if not isinstance(file, str) or not file:
+        raise invalid("a shader without a 'file'", 'such as {"type": "shader", "file": "my.glsl"}', "file")
+    folder, anywhere = context.get("folder", Path()), context.get("allow_outside", False)
+    try:
+        path = located(file, folder, "", anywhere)
+        if not shaders.names_shader(str(path)):
+            raise InputError(f"'{file}' is no shader by its name", "", ", ".join(shaders.SUFFIXES))
+        model: Any = shaders.class_of(str(path), None if anywhere else folder)
+    except GonioError as error:
+        raise invalid(f"{error.where}: {error.what}" if error.where else error.what, error.hint, "file") from None
+    return _own_part(SHADER, model).model_validate(value, context=context)
 
 
 def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
@@ -571,4 +596,6 @@ def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
     """The schema of any material, given references to those of Gonio's."""
     pattern = {"type": {"type": "string", "pattern": _CODE}}
     own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
-    return {"oneOf": [*references, own]}
+    properties = {"type": {"const": SHADER}, "file": {"type": "string", "minLength": 1}}
+    shader = {"type": "object", "properties": properties, "required": ["type", "file"], "description": "A shader."}
+    return {"oneOf": [*references, own, shader]}

@@ -300,18 +300,25 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     moved = {path: np.repeat(values, RAYS)}
     together = per_ray(subject, {**others, **moved}) or per_ray(subject, moved)
     shape = (count, RAYS)
+    # a guide has no jumps of its own, and one would be computed for every value, which takes seconds
+    guided = any(inner.guided for _, inner in tree.walk(subject.model))
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
-        density = together.pdf(many[0], many[1], "float32")
-        weight = together.sample(many[0], many[2], precision="float32").weight
     else:
         one = [subject.replace(**{path: float(v)}) for v in values]
         value = np.concatenate([s.eval(wo, wi, precision="float32") for s in one])
-        density = np.concatenate([s.pdf(wo, wi, "float32") for s in one])
-        weight = np.concatenate([s.sample(wo, u, precision="float32").weight for s in one])
     channels = [value[:, c].reshape(shape) for c in range(value.shape[1])]
     same = all(np.array_equal(channels[0], other) for other in channels[1:])
-    return [*(channels[:1] if same else channels), density.reshape(shape), weight.mean(1).reshape(shape)]
+    channels = channels[:1] if same else channels
+    if guided:
+        return channels
+    if together is not None:
+        density = together.pdf(many[0], many[1], "float32")
+        weight = together.sample(many[0], many[2], precision="float32").weight
+    else:
+        density = np.concatenate([s.pdf(wo, wi, "float32") for s in one])
+        weight = np.concatenate([s.sample(wo, u, precision="float32").weight for s in one])
+    return [*channels, density.reshape(shape), weight.mean(1).reshape(shape)]
 
 
 def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:

@@ -6,6 +6,8 @@
 A shader cannot run code on the machine: its instructions are carried out by `gonio.spirv`.
 """
 
+from .adoption import adopt as adopt
+from .files import SUFFIXES as SUFFIXES
 from .files import Shader as Shader
 from .files import class_of as class_of
 from .files import names_shader as names_shader

@@ -33,9 +33,7 @@ MAX_FILE = 4 << 20  # bytes of a shader
 MAX_TABLE = 1 << 28
 MAX_CLASSES = 64  # in memory
 # parameters whose names say that they lie in [0, 1]
-_UNIT = re.compile(
-    r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.IGNORECASE
-)
+_UNIT = re.compile(r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.I)
 
 
 def names_shader(text: str) -> bool:
@@ -53,7 +51,7 @@ def names_shader(text: str) -> bool:
         return False
 
 
-def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:  # noqa: N802: it makes a material, as a class does
+def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:
     """A material from a shader: GLSL, HLSL, SPIR-V, or a .brdf file of the BRDF Explorer.
 
         go.Shader("my.glsl", roughness=0.3)
@@ -89,7 +87,7 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
     known = _classes.pop(key, None)
     if known is None or known[0] != stamp:
         program = read(path, beside, inside)
-        known = stamp, _made(path, program)
+        known = stamp, _made(path, program, inside)
     _classes[key] = known
     while len(_classes) > MAX_CLASSES:
         _classes.pop(next(iter(_classes)))
@@ -155,7 +153,7 @@ class _ShaderType(type):
 
 def _pickled(cls: _ShaderType) -> object:
     text = getattr(cls, "spelling", "")
-    return (class_of, (text,)) if text else cls.__qualname__
+    return (class_of, (text, getattr(cls, "inside", None))) if text else cls.__qualname__
 
 
 copyreg.pickle(_ShaderType, _pickled)  # type: ignore[arg-type]
@@ -169,7 +167,7 @@ class _SampledShader(_SampledShaderFile, metaclass=_ShaderType):
     """Base of classes with one."""
 
 
-def _made(path: Path, program: Program) -> type[BSDF]:
+def _made(path: Path, program: Program, inside: Path | None) -> type[BSDF]:
     sampled = {"pdf", "sample"} <= set(program.formulas)
     fields: dict[str, tuple[str, ...]] = {}
     namespace: dict[str, Any] = {"__annotations__": {}}
@@ -185,6 +183,7 @@ def _made(path: Path, program: Program) -> type[BSDF]:
         "__doc__": f"{about.rstrip('.')}.",
         "__module__": __name__,
         "spelling": str(path),
+        "inside": inside,
         "name": re.sub(r"[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "shader",
         "program": program,
         "fields": fields,
@@ -200,18 +199,17 @@ def _probe(material: BSDF) -> None:
         material.record(formula)
 
 
-_RESERVED = {
-    *dir(BSDF),
-    *keyword.kwlist,
-    "file",
-    "type",
-    "preset",
-    "normalmap",
-    "bump",
-    "two_sided",
-    "program",
-    "fields",
-}
+_SCENES = ("file", "type", "preset", "normalmap", "bump", "two_sided")  # keys of materials in scenes
+_RESERVED = {*dir(_SampledShaderFile), *keyword.kwlist, *_SCENES, "program"}
+
+
+def bounds(declared: Declared) -> tuple[float, float, Any]:
+    """Range and default of a parameter; by its name where the adapter does not say."""
+    uniform = declared.uniform
+    guess = (0.0, 1.0) if _UNIT.search(declared.name) else (-np.inf, np.inf)
+    low = guess[0] if uniform.low is None else float(uniform.low)
+    high = guess[1] if uniform.high is None else float(uniform.high)
+    return low, high, 0.5 if uniform.default is None else uniform.default
 
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
@@ -219,10 +217,7 @@ def _fields(declared: Declared) -> list[tuple[str, Any]]:
     name = f"{declared.name}_" if declared.name in _RESERVED else declared.name.lstrip("_")
     uniform = declared.uniform
     doc = uniform.doc or f"{declared.shape} {declared.name} of the shader"
-    guess = (0.0, 1.0) if _UNIT.search(declared.name) else (-np.inf, np.inf)
-    low = guess[0] if uniform.low is None else uniform.low
-    high = guess[1] if uniform.high is None else uniform.high
-    default = 0.5 if uniform.default is None else uniform.default
+    low, high, default = bounds(declared)
     if declared.shape == "bool":
         return [(name, kinds.flag(bool(uniform.default), doc))]
     if declared.shape == "vec3":

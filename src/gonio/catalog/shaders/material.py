@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -26,10 +27,12 @@ class _ShaderFile(BSDF):
     """A shader's BRDF; a guide samples it.
 
     program  the shader, with the meaning of its functions
+    inside   the folder that its files may not leave, None for any
     fields   parameter of the shader -> the fields that hold it, one per component of vectors that are no colors
     """
 
     program: ClassVar[Program]
+    inside: ClassVar[Path | None] = None
     fields: ClassVar[dict[str, tuple[str, ...]]] = {}
     only_rgb: ClassVar[bool] = True
 

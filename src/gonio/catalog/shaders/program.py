@@ -136,6 +136,19 @@ class Program:
         red, green, blue = parts[:3] if len(parts) > 1 else parts * 3
         return numeric(red), numeric(green), numeric(blue)
 
+    def samplers(self) -> list[str]:
+        """The names of its textures."""
+        kinds = {id: self.module.type(one.type).parts[0] for id, one in self.module.variables.items()}
+        return [
+            self.module.names.get(id, "")
+            for id, kind in kinds.items()
+            if self.module.type(kind).kind in ("sampled image", "image")
+        ]
+
+    def argument_names(self, formula: str) -> list[str]:
+        """The names of a formula's arguments."""
+        return [self.module.names.get(id, f"argument {id}") for id, _ in self.formulas[formula][0].parameters]
+
     def members(self, formula: str) -> list[str]:
         """The names of the members of a formula's result, empty if it is no struct."""
         type = self.formulas[formula][0].type
