@@ -12,7 +12,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import cli
-from gonio.check import tables
+from gonio.check import reference, tables
 from gonio.pictures import images
 
 from . import solutions as of
@@ -246,6 +246,25 @@ def test_a_picture_of_something_else_or_of_another_shape_is_refused(scene: Path,
 def test_a_table_must_not_be_empty() -> None:
     with pytest.raises(go.InputError, match="every pixel"):
         tables.check(tables.Table("E.png", np.zeros((32, 32))))
+
+
+# --------------------------------------------------------------------------- reference values
+
+
+def test_reference_values_pass_their_own_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["-p", "sigma=0.5"]
+    assert cli.run(["check", "oren-nayar", *words, "--reference", str(tmp_path / "r")]) == 0
+    path = capsys.readouterr().out.strip()
+    assert "# model: oren-nayar(sigma=0.5)" in Path(path).read_text()
+    assert cli.run(["check", path, "oren-nayar", *words]) == 0
+
+
+@pytest.mark.slow
+def test_reference_values_of_the_courses_are_all_right(tmp_path: Path) -> None:
+    names = {path.name for path in reference.write(tmp_path)}
+    assert names >= {"E-text.csv", "E_avg-figure.csv", "dielectric-ggx.csv", "kulla-conty.csv"}
+    for name, model in reference.MODELS.items():
+        assert go.check(tmp_path / f"{name}.csv", model).passed, name
 
 
 # --------------------------------------------------------------------------- a program in C++

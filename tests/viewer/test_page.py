@@ -336,3 +336,18 @@ def test_the_export_opens_from_disk_and_asks_for_nothing(tmp_path: Path) -> None
     outside = [url for url in requests if not url.startswith(("file:", "blob:", "data:"))]
     assert outside == [] and problems == []
     assert len(picture) > 20_000  # a page that shows nothing is a few kilobytes
+
+
+def test_the_homework_by_its_text_has_its_terms_and_says_why_it_has_a_rim() -> None:
+    what = stage.homework_text()
+    base = what.materials["m1"].bsdf
+    assert (base.masking, base.fresnel, base.ndf) == ("schlick-direct", "schlick", "ggx")  # type: ignore[attr-defined]
+    assert what.materials["m0"].bsdf.color == "sheet"  # type: ignore[attr-defined]
+    assert [light["type"] for light in what.lights] == ["directional"]
+    assert what.rows[0].balls[0].label == "roughness 0.95"  # to the left
+    assert "false rim" in page.page_data(what)["notes"][0]
+
+
+def test_the_homework_takes_no_material(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["view", "lambert", "--homework"]) == 2
+    assert "--homework and lambert together" in capsys.readouterr().err

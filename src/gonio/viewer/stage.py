@@ -191,6 +191,31 @@ def homework(metal: str = "Ag") -> Stage:
     return Stage("Kulla-Conty and plain, side by side", materials, rows)
 
 
+RIM = (
+    "the low roughness of the upper row has a false rim: with k = (roughness + 1)^2 / 8 masking does not vanish on a "
+    "smooth surface (E_avg is 0.835 at roughness 0.05), and compensation returns what is not lost; schlick-ibl, "
+    "k = alpha / 2, has no such rim"
+)
+
+
+def homework_text(metal: str = "Ag") -> Stage:
+    """The homework's two rows by the terms of its text: GGX, Schlick's F, k = (roughness + 1)^2 / 8, f_add as on its
+    sheet with F_avg by the fit of Kulla2017; roughness rises to the left, as there."""
+    terms = {"masking": "schlick-direct", "fresnel": "schlick", "alpha": ROUGHNESS[0] ** 2}
+    base = model("conductor").preset(metal, **terms)
+    compensated = model("kulla-conty")(base=base, color="sheet", average="imageworks")  # type: ignore[call-arg]
+    maskings = ("schlick-direct", "schlick-ibl", "smith-correlated")
+    materials = {
+        "m0": Material("Kulla-Conty", compensated, {"base.masking": maskings}),
+        "m1": Material("Plain conductor", base, {"masking": maskings}),
+    }
+    rows = (
+        Row("Kulla-Conty", "m0", tuple(_rough("base.alpha", r) for r in reversed(ROUGHNESS))),
+        Row("Plain", "m1", tuple(_rough("alpha", r) for r in reversed(ROUGHNESS))),
+    )
+    return Stage("Homework 4: Kulla-Conty above, plain below", materials, rows, notes=(RIM,))
+
+
 def _rough(path: str, roughness: float) -> Ball:
     alpha = round(roughness**2, 6)
     return Ball(f"roughness {_short(roughness)}", {path: [alpha, alpha]})

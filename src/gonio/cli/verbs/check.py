@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Exit, Option
 
+from ...errors import InputError
 from .. import completion
 from ..options import Code, Json, Material, Outside
 from ..output import listing, print_rich
@@ -41,8 +42,9 @@ class Judging:
 @verb(MATERIALS, place=3)
 def check(
     target: Annotated[
-        str, Argument(metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a picture, or a folder.")
-    ],
+        str | None,
+        Argument(metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a picture, or a folder."),
+    ] = None,
     model: Annotated[
         str | None,
         Argument(
@@ -54,6 +56,13 @@ def check(
     *,
     how: Judging,
     made: Material,
+    reference: Annotated[
+        Path | None,
+        Option(
+            metavar="DIR",
+            help="Write right values there: of f at 200 pairs for WORK, a material, or all of the courses.",
+        ),
+    ] = None,
     allow_outside: Outside = False,
     allow_code: Code = False,
     as_json: Json = False,
@@ -73,11 +82,17 @@ def check(
       gonio check mine.py:MyConductor conductor --preset Au -p alpha=0.3
       gonio check picture.png --scene examples/phong
       gonio check submission --sheet hw4 --junit out.xml
+      gonio check --reference values
       gonio check class --sheet lab2 --scene examples --hide-solution
     """
     from ...check import Report
     from ...check import check as judge
 
+    if reference is not None:
+        _write_reference(reference, target, made, as_json)
+        return
+    if target is None:
+        raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
     work, against = _with_parameters(target, model, made)
     result = judge(work, against, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
     if as_json:
@@ -88,6 +103,16 @@ def check(
         print("\n".join(result.lines()))
     if result.exit_code:
         raise Exit(result.exit_code)
+
+
+def _write_reference(folder: Path, material: str | None, made: Material, as_json: bool) -> None:
+    """Write the right values, and print the names of the files."""
+    from ...check import reference
+
+    if material is None:
+        made.refuse("--reference without a material")
+    written = [str(path) for path in reference.write(folder, None if material is None else made.text(material))]
+    print(json.dumps({"files": written}) if as_json else "\n".join(written))
 
 
 def _with_parameters(target: str, model: str | None, made: Material) -> tuple[str, str | None]:

@@ -46,6 +46,9 @@ def view(
         Option("-o", "--output", "--export", metavar="FILE", help="Write the page as one .html and exit."),
     ] = None,
     address: Address,
+    homework: Annotated[
+        bool, Option("--homework", help="The two rows of homework 4 by the terms of its text, under one light.")
+    ] = False,
     device: Device = "cpu",
     allow_outside: Outside = False,
     allow_code: Code = False,
@@ -59,13 +62,14 @@ def view(
     \b
     Examples:
       gonio view
+      gonio view --homework
       gonio view conductor lambert --param alpha=0.3
       gonio view "conductor(preset=Au)" "conductor(preset=Cu)"
       gonio view ward.py:Ward
       gonio view examples/shading-balls
       gonio view -o page.html
     """
-    stage = _stage(target or (), made, allow_outside, allow_code)
+    stage = _homework(target, made) if homework else _stage(target or (), made, allow_outside, allow_code)
     print_warnings(stage.notes)
     if output is not None:
         from ...viewer import page
@@ -77,6 +81,16 @@ def view(
     from ...viewer import server
 
     server.serve(stage, address.host, address.port, address.browser, device, as_json)
+
+
+def _homework(target: Sequence[str] | None, made: Material) -> Stage:
+    """The homework's rows. Raises InputError for anything named besides."""
+    from ...viewer import stage
+
+    if target or made.settings():
+        what = f"--homework and {target[0]} together" if target else "--homework with parameters"
+        raise InputError(what, "--homework", "leave one of them out; the page's sliders change all values")
+    return stage.homework_text()
 
 
 def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_code: bool) -> Stage:
