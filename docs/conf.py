@@ -19,7 +19,7 @@ version = release = gonio.__version__
 
 extensions = ["myst_parser", "sphinx_design", "book.extension"]
 # the copies of these pages in the book are made from the code: docs/reference
-exclude_patterns = ["models", "published-fits/page.md", "reference/live", "images", "report-cards/programs"]
+exclude_patterns = ["models", "reference/live", "images", "report-cards/programs"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
 myst_dmath_allow_digits = False  # "$3" is no formula

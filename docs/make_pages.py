@@ -1,6 +1,7 @@
-"""Write docs/models/NAME.md for every model: the page that `gonio explain` prints, in Markdown.
+"""Write docs/models/NAME.md for every model, the page that `gonio explain` prints, and README's tables.
 
-python docs/make_pages.py [--check]      --check writes nothing and fails where a page is out of date
+python docs/make_pages.py [--check] [--tables]   --check writes nothing and fails where a page is out of date
+                                                 --tables leaves out docs/models, which take a minute
 """
 
 from __future__ import annotations
@@ -15,32 +16,92 @@ from gonio.verify import quality
 from gonio.viewer import manual
 
 FOLDER = Path(__file__).parent / "models"
+ROOT = Path(__file__).parents[1]
 NUMBER = re.compile(r"\d*\.?\d+")
+PICTURE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
+GROUPS = {  # folder of gonio.materials -> title, in English and Chinese
+    "diffuse": ("diffuse", "漫反射"),
+    "empirical": ("empirical", "经验模型"),
+    "microfacet": ("microfacet: metals, glass, thin films", "微表面:金属、玻璃、薄膜"),
+    "compensated": ("with multiple scattering", "多次散射补偿"),
+    "layered": ("layered", "多层材质"),
+    "sheen": ("cloth", "织物"),
+    "historic": ("models of published fits", "文献拟合所用模型"),
+    "combined": ("composed of materials", "由材质组合的材质"),
+    "measured": ("measured", "测量 BRDF"),
+}
 
 
 def main() -> int:
     """Write or check the pages; returns the exit code."""
     check = "--check" in sys.argv[1:]
+    stale = _tables(check)
+    if "--tables" in sys.argv[1:]:
+        return _told(stale) if check else 0
     same = _alike if check else str.__eq__
     sampling = quality.of_models()
     pages = {
         FOLDER / f"{name}.md": manual.page(model).markdown() + _sampling(*sampling[name])
         for name, model in go.models().items()
     }
-    stale = [path for path, text in pages.items() if not (path.exists() and same(path.read_text(), text))]
+    stale += [path for path, text in pages.items() if not (path.exists() and same(path.read_text(), text))]
     stale += [path for path in FOLDER.glob("*.md") if path not in pages]
     if check:
-        for path in stale:
-            print(f"out of date: {path}; run `make docs`")
-        return 1 if stale else 0
+        return _told(stale)
     FOLDER.mkdir(exist_ok=True)
     for path in stale:
         if path in pages:
             path.write_text(pages[path])
-        else:
+        elif path.parent == FOLDER:
             path.unlink()
     print(f"{len(pages)} pages, {len(stale)} written")
     return 0
+
+
+def _told(stale: list[Path]) -> int:
+    for path in stale:
+        print(f"out of date: {path}; run `make docs`")
+    return 1 if stale else 0
+
+
+def _tables(check: bool) -> list[Path]:
+    """Write the tables between the marks of README in both languages; the files in which they were out of date."""
+    stale = []
+    for name, language in (("README.md", 0), ("README.zh.md", 1)):
+        path = ROOT / name
+        text = new = path.read_text(encoding="utf-8")
+        for mark, table in (("models", _models(language)), ("gallery", _gallery())):
+            start, end = f"<!-- {mark} -->\n", f"<!-- /{mark} -->"
+            before, _, rest = new.partition(start)
+            new = before + start + table + end + rest.partition(end)[2]
+        if new != text:
+            stale.append(path)
+            if not check:
+                path.write_text(new, encoding="utf-8")
+    return stale
+
+
+def _models(language: int) -> str:
+    """All models by group, each with a link to its page."""
+    lines = [(f"| {len(go.models())} models | |", f"| {len(go.models())} 个模型 | |")[language], "|---|---|"]
+    for folder, titles in GROUPS.items():
+        members = [name for name, model in go.models().items() if model.__module__.split(".")[2] == folder]
+        links = ", ".join(f"[{name}](docs/models/{name}.md)" for name in members)
+        lines.append(f"| {titles[language]} | {links} |")
+    return "\n".join(lines) + "\n"
+
+
+def _gallery() -> str:
+    """A thumbnail of every example that has a picture, with a link to its page."""
+    shown = []
+    for page in sorted((ROOT / "examples").glob("*/README.md")):
+        text = page.read_text(encoding="utf-8")
+        if picture := PICTURE.search(text):
+            folder = page.parent.name
+            title = text.partition("\n")[0].removeprefix("# ")
+            source = f"examples/{folder}/{picture[1]}"
+            shown.append(f'<a href="examples/{folder}"><img src="{source}" height="90" alt="{title}"></a>')
+    return "\n".join(shown) + "\n"
 
 
 def _alike(old: str, new: str) -> bool:

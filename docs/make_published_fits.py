@@ -420,7 +420,7 @@ def main() -> None:
     figure_energy(cards)
     order = sorted((m for m in materials if "network" in m.values), key=lambda m: -m.spread)
     figure_spheres(order)
-    text = (HERE / "published-fits" / "page.md").read_text()
+    text = (HERE / "published-fits" / "template.txt").read_text()
     parts = {
         "COUNT": str(len(cards)),
         "SUMMARY": summary(cards),

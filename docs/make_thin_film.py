@@ -143,7 +143,9 @@ def balls() -> None:
         oxide = go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))
         skin = go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=2.0 * nm)
         for row, (material, thickness) in enumerate(((oxide, nm), (skin, 2 * nm))):
-            axes[row, column].imshow(encoded(go.render(material, size=(110, 110), spp=64)))
+            # a bubble is seen through, which takes a path of several segments
+            shown_ball = go.render(material, size=(160, 160), spp=64, integrator="path", max_depth=8, denoise=True)
+            axes[row, column].imshow(encoded(shown_ball))
             axes[row, column].set_title(f"{thickness} nm", fontsize=8)
             axes[row, column].axis("off")
     figure.savefig(HERE / "images" / "films.jpg", dpi=130)

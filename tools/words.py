@@ -70,7 +70,10 @@ PHRASES = {
 ALLOWED = re.compile(r"`[^`]*`|\"[^\"]*\"|https?://\S+|\b\w*[._/=]\w+\S*|\b[A-Z]\w*Colour\w*|--\S+")
 
 SOURCES = ("src/gonio",)
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/models/*.md", "examples/*/*.md")
+DOCUMENTS = (
+    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md"),
+    *("docs/*.md", "docs/models/*.md", "docs/course/*.md", "examples/*/*.md"),
+)
 
 
 def names(tree: ast.AST) -> Iterator[tuple[int, str]]:

@@ -13,9 +13,11 @@ from .text import escaped, fenced, markdown, table
 
 HEAD = """# Python API
 
-All names of `import gonio as go`. Arrays are NumPy's or Dr.Jit's; `(N, 3)` is N directions or spectra. A list of
-length 3 is broadcast. Directions are unit vectors of the local frame, +z the normal. Values are linear; angles are in
-radians and wavelengths in nanometers ([Conventions](../../conventions.md)).
+All names of `import gonio as go`.
+Arrays are NumPy's or Dr.Jit's; `(N, 3)` is N directions or spectra. A list of
+length 3 is broadcast.
+Directions are unit vectors of the local frame, +z the normal. Values are linear; angles are in radians and
+wavelengths in nanometers ([Conventions](../../conventions.md)).
 Every model is a class too: see [Models](../models/index.md).
 """
 TOPICS = {

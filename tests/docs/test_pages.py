@@ -12,7 +12,12 @@ import gonio as go
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+PAGES = [
+    *ROOT.glob("*.md"),
+    *(ROOT / "docs").glob("*.md"),
+    *(ROOT / "docs/course").glob("*.md"),
+    *(ROOT / "examples").glob("*/*.md"),
+]
 
 
 def _quoted(page: Path) -> Iterator[str]:
@@ -20,7 +25,7 @@ def _quoted(page: Path) -> Iterator[str]:
 
 
 def _name(page: Path) -> str:
-    return page.stem
+    return page.parent.name if page.parent.parent.name == "examples" else page.stem
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)

@@ -9,6 +9,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import sysconfig
 import time
 import tomllib
@@ -35,8 +36,8 @@ EXTRAS = (
 
 
 def _steps() -> Iterator[tuple[str, str, str]]:
-    """In README's order: ("shell", "", line) of indented blocks and of text, ("python", file or "", program)."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    """In the order of README and its tour: ("shell", "", line) of blocks and of text, ("python", file, program)."""
+    text = "".join((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/tour.md"))
     at = 0
     for block in [*FENCED.finditer(text), None]:
         for line in text[at : block.start() if block else len(text)].splitlines():
@@ -127,7 +128,7 @@ def _checkout(tmp_path: Path) -> Path:
     """A copy as `make demo` leaves it: with a .venv that has what Gonio needs and none of its extras."""
     copy = tmp_path / "gonio"
     copy.mkdir()
-    for name in ("Makefile", "pyproject.toml", "README.md"):
+    for name in ("Makefile", "pyproject.toml", "README.md"):  # no docs: no line needs them
         shutil.copy2(ROOT / name, copy)
     shutil.copytree(ROOT / "examples", copy / "examples")
     venv.create(copy / ".venv", symlinks=os.name != "nt")
@@ -240,3 +241,48 @@ def test_every_line_runs_as_printed(newcomer: _Newcomer) -> None:
         else:
             _type(newcomer, text)
         print(f"{time.monotonic() - start:7.1f} s  {text.partition(chr(10))[0]}")
+
+
+# ---------------------------------------------------------------------- both languages, and what the first page claims
+
+
+def _commands(name: str) -> list[str]:
+    return [
+        " ".join(_words(line))
+        for line in (ROOT / name).read_text(encoding="utf-8").splitlines()
+        if line.startswith("    ")
+    ]
+
+
+def test_both_languages_have_the_same_commands() -> None:
+    assert _commands("README.zh.md") == _commands("README.md")
+
+
+@pytest.mark.parametrize("name", ["README.md", "README.zh.md"])
+def test_it_is_short(name: str) -> None:
+    lines = (ROOT / name).read_text(encoding="utf-8").partition("<!-- gallery -->")[0].splitlines()
+    assert len(lines) <= 75
+
+
+@pytest.mark.parametrize("name", ["README.md", "README.zh.md"])
+@pytest.mark.parametrize(
+    ("figure", "page", "sentence"),
+    [
+        ("52 %", "docs/report-cards/README.md", "[principledthin](mitsuba-principledthin.md) | reciprocity | wrong by"),
+        ("37 %", "docs/report-cards/README.md", "pdf claims 37 % of samples"),
+        ("2.8", "docs/published-fits.md", "| white-paint | `bagher2012/sgd` | 2.8 at 89.5"),
+        ("1.4e-7", "docs/energy.md", "| GGX, Smith (all) | 1.4e-7 |"),
+        ("0.027", "docs/energy.md", "error is 0.027"),
+    ],
+)
+def test_its_figures_are_those_of_the_pages(name: str, figure: str, page: str, sentence: str) -> None:
+    assert figure in (ROOT / name).read_text(encoding="utf-8")
+    text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+    assert sentence in text
+    assert figure in text[text.index(sentence) :][: len(sentence) + 80]
+
+
+def test_its_tables_are_up_to_date() -> None:
+    command = [sys.executable, ROOT / "docs/make_pages.py", "--check", "--tables"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
