@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
 import tempfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -50,6 +51,19 @@ def check_file(path: str | Path) -> Path:
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"no permission to write in '{folder}'", str(path), "choose another folder with -o")
     return target
+
+
+def changeable_by_others(path: Path) -> bool:
+    """Whether a user other than this one and root may change a file or folder. False where files have no such owners.
+
+    Root is not warned of a user's files: in a container they are often its own, from outside.
+    """
+    if not hasattr(os, "getuid"):
+        return False
+    status = path.stat()
+    shared = stat.S_IWOTH if status.st_gid == os.getgid() else stat.S_IWOTH | stat.S_IWGRP
+    foreign = os.getuid() not in (0, status.st_uid) and status.st_uid != 0
+    return foreign or bool(status.st_mode & shared)
 
 
 def check_folder(folder: str | Path, parents: bool = False) -> Path:

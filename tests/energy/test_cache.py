@@ -168,3 +168,14 @@ def test_tables_of_compensation_come_from_the_cache(folder):
     assert len(list(folder.glob("curves-*.npz"))) == 1
     again = curves.isotropic.__wrapped__("ggx", "schlick-ibl")
     assert np.array_equal(fresh.values, again.values)
+
+
+def test_a_table_that_others_may_change_is_rebuilt_with_a_warning(folder: Path) -> None:
+    cache.remember(("a",), lambda: np.ones(3))
+    assert np.array_equal(cache.remember(("a",), never), np.ones(3))
+    for place in (folder, *folder.glob("a-*")):
+        before = place.stat().st_mode
+        place.chmod(before | 0o002)
+        with pytest.warns(go.GonioWarning, match="other users may have changed it; it is rebuilt"):
+            assert np.array_equal(cache.remember(("a",), lambda: np.zeros(3)), np.zeros(3))
+        place.chmod(before)

@@ -11,6 +11,7 @@ from types import ModuleType
 
 from .. import files, llvm
 from ..errors import InputError, MachineError
+from ..ops import backend
 from ..owner import COMPUTING, exclusive
 from . import plugin_search
 
@@ -60,10 +61,12 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
     """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else `variant_for`.
 
     threads  how many cores to use; None leaves Dr.Jit's default (all)
-    Raises MachineError where no usable LLVM or no GPU is found, InputError where the current folder has been deleted.
+    Raises MachineError where no usable LLVM or no GPU is found, or other users may change the kernels; InputError where
+    the current folder has been deleted.
     """
     if "mitsuba" not in sys.modules:
         files.check_current_folder()  # without one, importing Mitsuba ends the process
+        backend.check_kernels()
     import mitsuba as mi
 
     _own(mi)

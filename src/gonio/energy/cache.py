@@ -2,7 +2,7 @@
 
 The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of the
 request and of the formulas behind it; the file contains the hash of its content. A truncated, altered or foreign file
-is rebuilt, with a warning; a folder that cannot be written is ignored.
+is rebuilt, with a warning, and so is one that another user may change; a folder that cannot be written is ignored.
 """
 
 from __future__ import annotations
@@ -135,6 +135,8 @@ def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], 
     path, _ = _path(key)
     if path.is_file():
         try:
+            if files.changeable_by_others(path) or files.changeable_by_others(path.parent):
+                raise ValueError("other users may have changed it")
             return read(path)
         except ValueError as error:
             warnings.warn(f"{path}: {error}; it is rebuilt", GonioWarning, stacklevel=3)

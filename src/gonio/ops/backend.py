@@ -6,17 +6,19 @@ Dr.Jit is imported here and, outside `render`, nowhere else.
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from collections.abc import Iterator
 from contextvars import ContextVar
 from functools import lru_cache
+from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple, TypeAlias, TypeGuard, get_args
 
 import numpy as np
 
-from .. import llvm
-from ..errors import InputError
+from .. import files, llvm
+from ..errors import InputError, MachineError
 from .types import Precision, Value
 
 # A Dr.Jit array. Dr.Jit's stubs describe one device and precision; Gonio's code serves all.
@@ -57,10 +59,22 @@ def drjit() -> ModuleType:
     return dr
 
 
+def check_kernels() -> None:
+    """Raise MachineError if other users may change the folder of compiled kernels, which Dr.Jit runs."""
+    named, home = os.environ.get("DRJIT_CACHE_DIR"), os.environ.get("HOME")
+    if not (named or home):
+        return  # Dr.Jit keeps no kernels then
+    folder = Path(named) if named else Path(str(home), ".drjit")
+    if folder.is_dir() and files.changeable_by_others(folder):
+        hint = f"chmod go-w '{folder}', or set DRJIT_CACHE_DIR to a folder of your own"
+        raise MachineError("other users may change the kernels that Dr.Jit keeps and runs", str(folder), hint)
+
+
 @lru_cache
 def _types(backend: str, double: bool) -> Types:
     dr = drjit()
     if backend == "llvm":
+        check_kernels()
         llvm.use()  # raises if no usable libLLVM exists
     module: ModuleType = getattr(dr, backend).ad
     end = "64" if double else ""

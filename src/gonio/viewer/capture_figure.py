@@ -25,7 +25,7 @@ MAX_PERCENT = 50.0  # upper limit of the scales of differences and of errors
 def draw(capture: Capture) -> Drawing:
     """The first photograph of a sample with the fit to it and the difference, the fate of its pixels, and over theta_h
     and theta_d the samples' values and their standard errors; gray without samples."""
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     shot = next(one for one in capture.photographs if one.shot.sample != "reference")

@@ -36,7 +36,7 @@ def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDAr
 
 def draw(name_a: str, name_b: str, a: BSDF, b: BSDF, compared: Difference) -> Drawing:
     """The map in the plane of incidence, red where A is brighter, and the albedos over the angle of view."""
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
 
     title = f"{_short(name_a)} (A) and {_short(name_b)} (B)"
     subtitle = f"mean difference {100.0 * compared.mean:.3g} % of B's light, largest {100.0 * compared.largest:.3g} %"

@@ -33,7 +33,7 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
 
     Slices of a third axis are placed side by side; E_avg, and anything that depends on the cosine alone, is a curve.
     """
-    import matplotlib as mpl
+    mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     baked = load(folder)
@@ -61,7 +61,7 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
 
 def _levels(baked: Baked) -> Figure:
     """The levels of an environment encoded for a screen, with an exposure at which a twentieth of the map is white."""
-    import matplotlib as mpl
+    mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     names = list(baked.manifest["dims"])
@@ -143,7 +143,7 @@ def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
 
 def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
     """Write compensation.png and compensation.json to a folder: albedo against roughness, and distance to the walk."""
-    import matplotlib as mpl
+    mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     with mpl.rc_context(figures.STYLE):

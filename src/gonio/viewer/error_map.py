@@ -124,7 +124,7 @@ def error_of(test: images.Picture, reference: images.Picture, metric: str) -> ND
 def draw(test: images.Picture, reference: images.Picture, metric: str) -> figures.Drawing:
     """Draw the map. The range is 0 to 1 for FLIP, otherwise 0 to the 99.5th percentile, so that a few fireflies do
     not darken the rest; an arrow on the color bar shows that there are larger values."""
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import math
+import os
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
@@ -41,6 +45,17 @@ STYLE: Any = {  # Matplotlib types its keys one by one
 }
 
 
+def load_matplotlib() -> ModuleType:
+    """Matplotlib, with the user's settings and not those of the current folder.
+
+    On import it reads a file `matplotlibrc` there before any other; such a file may name modules and programs to run.
+    """
+    hidden = "matplotlib" not in sys.modules and os.path.exists("matplotlibrc")
+    with contextlib.chdir(os.sep) if hidden else contextlib.nullcontext():
+        import matplotlib
+    return matplotlib
+
+
 @dataclass(frozen=True)
 class Drawing:
     """A figure: a notebook shows it, `save` writes it.
@@ -64,7 +79,7 @@ class Drawing:
         return stream.getvalue()
 
     def _fill(self, file: Path | BinaryIO, kind: str) -> None:
-        import matplotlib
+        matplotlib = load_matplotlib()
         from matplotlib.text import Text
 
         for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse

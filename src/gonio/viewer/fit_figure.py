@@ -40,7 +40,7 @@ def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
     def fitted(wo: Floats, wi: Floats) -> Floats:
         return np.asarray(fit.material.eval(wo, wi), np.float64)
 
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
 
     with matplotlib.rc_context(figures.STYLE):
         figure = Figure(figsize=(10.0, 8.2), layout="constrained")

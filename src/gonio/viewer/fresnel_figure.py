@@ -42,7 +42,7 @@ def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> 
 
     Raises InputError for an impossible index, and for an unknown metal.
     """
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
 
     if metal is not None:
         if eta is not None or k:

@@ -14,7 +14,7 @@ MAX_PERCENT = 50.0  # upper limit of the scale of differences
 
 def draw(fit: PictureFit) -> Drawing:
     """The picture | the fit | the difference, and the loss after each step."""
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     height, width = fit.wanted.shape[:2]

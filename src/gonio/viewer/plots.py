@@ -99,7 +99,7 @@ def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) ->
 
 
 def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[float]) -> Drawing:
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
 
     if kind not in KINDS:
         raise InputError(f"unknown kind of plot '{kind}'", "--kind", did_you_mean(kind, KINDS))

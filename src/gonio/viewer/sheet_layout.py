@@ -43,7 +43,7 @@ def draw(pictures: Sequence[Pixels], variations: Sequence[Variation], title: str
     One variation: a row, wrapped if it is long. Two: rows by the first, columns by the second. More: a grid of the
     last two for every combination of the others.
     """
-    import matplotlib
+    matplotlib = figures.load_matplotlib()
 
     with matplotlib.rc_context(figures.STYLE):
         layout = _Layout.of(_blocks(pictures, variations), title, subtitle)
