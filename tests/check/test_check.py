@@ -92,6 +92,13 @@ def test_the_pictures_of_the_homework_are_recognized(shared: Path) -> None:
     assert go.check(folder / "homework_Eavg.png").passed
 
 
+def test_noise_that_is_alike_everywhere_is_not_taken_for_cosine_sampling(tmp_path: Path) -> None:
+    values = Table(size=64, k="text").picture() + np.random.default_rng(1).normal(0.0, 5.0, (64, 64))
+    finding = go.check(_picture(tmp_path / "E.png", np.clip(values, 0, 255).astype(np.uint8)))
+    assert finding.passed and "noise of random directions" in finding.facts[-1]
+    assert not any("cosine" in fact for fact in finding.facts)
+
+
 def test_a_table_that_no_form_explains_is_wrong_without_a_cause(tmp_path: Path) -> None:
     values = Table().picture().astype(float)
     ramp = 25.0 * np.sin(np.arange(len(values)) / 3.0)[:, None]

@@ -25,6 +25,7 @@ LEVELS = 255.0
 FITS = 3.0  # gray levels within which a form explains a table
 NOISY = 8.0  # the same for a table by random cosine-weighted directions
 CONVERGED = 0.55  # roughness from which cosine sampling with 1,024 directions has converged
+GRAIN = 0.3  # correlation of neighboring texels' errors below which they are noise
 NOISY_WEIGHT = 0.05  # of the distance over all rows
 WHITE = 0.95  # share of white texels beyond which no factor can be told
 UNLIKE = 0.6  # correlation with the nearest form below which a picture is no table of E
@@ -190,10 +191,12 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     _check_likeness(table, best, at)
     inside = best.layout.values[np.ix_(at, at)] * LEVELS
     low = (at + 0.5) / size < CONVERGED
-    all_rows = _rms(inside - best.stored.values * LEVELS)
+    residual = inside - best.stored.values * LEVELS
+    all_rows = _rms(residual)
     figures = {"converged": best.distance, "all": all_rows}
     right = best.mistake is None
-    converged = all_rows <= FITS or not low.any()
+    noise = right and all_rows <= best.distance and _is_noise(residual)  # as much at low roughness as at high
+    converged = all_rows <= FITS or noise or not low.any()
     facts = [
         f"nearest: {best.form.words}; {best.layout.words}" + (f"; {best.stored.words}" if best.stored.words else "")
     ]
@@ -202,7 +205,9 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     )
     if best.distance <= (NOISY if right else FITS) and not converged:
         facts += _sampling(best, at, size, low, figures)
-    if best.distance > (NOISY if right and not converged else FITS):
+    if noise and best.distance > FITS:
+        facts.append("the rest is noise of random directions: more of them would show how near the mean is")
+    if best.distance > (NOISY if right and (noise or not converged) else FITS):
         facts.append("no form fits: the table is wrong in a way that is not known here")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     if np.mean(inside[~low] >= LEVELS - 1.0) > WHITE:
@@ -214,6 +219,11 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
         words = "low roughness is noisy and too dark: the directions are not sampled by the normals of GGX"
         mistake = mistake or Mistake(words, "how directions are sampled, and their pdf")
     return Finding(table.name, "table of E", WRONG if mistake else RIGHT, tuple(facts), mistake, figures)
+
+
+def _is_noise(residual: np.ndarray) -> bool:
+    """Whether differences of neighboring texels are those of independent random numbers."""
+    return float(np.corrcoef(residual[:, 1:].ravel(), residual[:, :-1].ravel())[0, 1]) < GRAIN
 
 
 def _check_encoding(table: Table, stored: _Stored) -> None:
