@@ -5,6 +5,7 @@ Nothing on a page comes from the network: formulas are MathML, fonts are the sys
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -29,7 +30,7 @@ html_theme = "furo"
 html_title = "Gonio"
 html_static_path = ["book/static"]
 html_css_files = ["book.css"]
-html_extra_path = ["reference/live"]
+html_extra_path = [] if os.environ.get("GONIO_BOOK") == "quick" else ["reference/live"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
