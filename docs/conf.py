@@ -36,6 +36,7 @@ html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # summaries are fetched, which browsers refuse to pages opened from disk
 html_theme_options = {"navigation_with_keys": True}
+smartquotes = False  # "--option" would become a dash
 highlight_language = "text"
 pygments_style = "friendly"
 pygments_dark_style = "monokai"
