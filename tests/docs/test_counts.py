@@ -10,11 +10,8 @@ import pytest
 from gonio.viewer import families
 
 ROOT = Path(__file__).parents[2]
-WORDS = dict(
-    enumerate(
-        ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
-    )
-)
+NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+WORDS = dict(enumerate(NUMBERS))
 CHINESE = {11: "十一"}
 
 
