@@ -5,6 +5,7 @@ Nothing on a page comes from the network: formulas are MathML, fonts are the sys
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -29,12 +30,13 @@ html_theme = "furo"
 html_title = "Gonio"
 html_static_path = ["book/static"]
 html_css_files = ["book.css"]
-html_extra_path = ["reference/live"]
+html_extra_path = [] if os.environ.get("GONIO_BOOK") == "quick" else ["reference/live"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # summaries are fetched, which browsers refuse to pages opened from disk
 html_theme_options = {"navigation_with_keys": True}
+smartquotes = False  # "--option" would become a dash
 highlight_language = "text"
 pygments_style = "friendly"
 pygments_dark_style = "monokai"

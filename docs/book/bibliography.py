@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import cache
 from pathlib import Path
 
@@ -12,13 +13,12 @@ ROOT = Path(__file__).parents[2]
 KEY = re.compile(r"\b(?:[A-Z][A-Za-z]+(?:19|20)\d{2}[a-z]?|PBRT4|SchottBK7)\b")
 ENTRY = re.compile(r"@(\w+)\{(\w+), (.*)\}$", re.MULTILINE)
 FIELD = re.compile(r"(\w+) = (?:\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}|(\d+))")
-ACCENTS = {
-    **{'"' + a: b for a, b in zip("aouAOU", "äöüÄÖÜ", strict=True)},
-    **{"'" + a: b for a, b in zip("aeiouc", "áéíóúć", strict=True)},
-    **{"`" + a: b for a, b in zip("aeo", "àèò", strict=True)},
-    "r{A}": "Å", "AA ": "Å", "AA": "Å", "aa": "å", "v s": "š", "v{s}": "š", "v{c}": "č", "vs": "š",
-    "^i": "î", "^o": "ô", "~n": "ñ",
-}  # fmt: skip
+ACCENT = re.compile(r"\\(?:([\"'`^~=.])\s*\{?\\?([A-Za-z])\}?|([uvHcr])(?:\s+|\{)([A-Za-z])\}?)")
+COMBINING = dict(
+    zip("\"'`^~=.uvHcr", "\u0308\u0301\u0300\u0302\u0303\u0304\u0307\u0306\u030c\u030b\u0327\u030a", strict=True)
+)
+LETTERS = {"AA": "Å", "aa": "å", "O": "Ø", "o": "ø", "L": "Ł", "l": "ł", "ss": "ß", "ae": "æ"}
+LETTER = re.compile(r"\\(AA|aa|ae|ss|O|o|L|l)(?![A-Za-z])\s*")
 
 
 @cache
@@ -33,8 +33,13 @@ def known() -> dict[str, dict[str, str]]:
 
 def plain(text: str) -> str:
     """BibTeX's text in Unicode."""
-    for spelled, letter in ACCENTS.items():
-        text = text.replace("{\\" + spelled + "}", letter).replace("\\" + spelled, letter)
+
+    def accented(found: re.Match[str]) -> str:
+        mark, letter = (found[1], found[2]) if found[1] else (found[3], found[4])
+        return unicodedata.normalize("NFC", letter + COMBINING[mark])
+
+    text = text.replace("$\\mu$", "\N{GREEK SMALL LETTER MU}")
+    text = LETTER.sub(lambda found: LETTERS[found[1]], ACCENT.sub(accented, text))
     return re.sub(r"[{}]|\\(?=[%&_])", "", text).replace("--", "\N{EN DASH}")
 
 

@@ -1,0 +1,85 @@
+"""The book: what it is made of is complete, and it builds without a warning."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import gonio as go
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+from book import api, bibliography, errors, families, gallery, links, text  # noqa: E402
+
+
+def test_every_page_is_a_chapter() -> None:
+    index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    listed = {line for block in re.findall(r":::\{toctree\}\n(.*?):::", index, re.DOTALL) for line in block.split()}
+    pages = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs/course").glob("*.md")]
+    names = {page.relative_to(ROOT / "docs").with_suffix("").as_posix() for page in pages}
+    assert names - listed == {"index"}
+
+
+def test_every_public_name_has_its_place() -> None:
+    listed = {name for names in api.TOPICS.values() for name in names.split()}
+    classes = {model.__name__ for model in go.models().values()}
+    assert set(go.__all__) - listed - classes == set()
+    assert "go.render" in str(api.pages()["reference/api/render-and-look.md"])
+
+
+def test_every_family_and_member_has_its_place() -> None:
+    pages = families.pages()
+    assert "## smith-correlated" in str(pages["reference/families/masking-term.md"])
+    assert "## reciprocity" in str(pages["reference/families/law.md"])
+
+
+def test_errors_are_listed_with_their_remedies() -> None:
+    messages = list(errors.messages())
+    assert len(messages) > 300
+    assert any(message.what.startswith("unknown fit") and "nearest known name" in message.hint for message in messages)
+
+
+def test_the_bibliography_is_plain_text() -> None:
+    """No braces and no commands of BibTeX are left."""
+    for key in bibliography.known():
+        assert not re.search(r"[{}]|\\[\"'`^~a-zA-Z]", bibliography.citation(key)), key
+
+
+@pytest.mark.parametrize(
+    ("path", "page"),
+    [
+        ("docs/models/conductor.md", "reference/models/conductor.md"),
+        ("examples/prism", "gallery/prism.md"),
+        ("examples/prism/README.md", "gallery/prism.md"),
+        ("CONTRIBUTING.md", "project/contributing.md"),
+        ("src/gonio/__init__.py", None),
+    ],
+)
+def test_links_out_of_the_docs_lead_to_pages_of_the_book(path: str, page: str | None) -> None:
+    assert links.target(ROOT / path) == page
+
+
+def test_the_gallery_has_every_example() -> None:
+    folders = {path.name for path in (ROOT / "examples").iterdir() if path.is_dir() and path.name[0] not in "._"}
+    assert {example.folder for example in gallery.examples()} == folders
+
+
+def test_docstrings_become_markdown() -> None:
+    doc = "One line with a|b.\n\n    code = 1\n\nname   its meaning\n       goes on\nother  another"
+    shown = text.markdown(doc)
+    assert "One line with a\\|b." in shown and "```text\ncode = 1\n```" in shown
+    assert "| `name` | its meaning goes on |" in shown and "| `other` | another |" in shown
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="NOT BUILT: the extra `book` is not installed")
+def test_the_book_builds_without_a_warning(tmp_path: Path) -> None:
+    """All pages, without the live ones: links, formulas, headings, pictures."""
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "dummy", ROOT / "docs", tmp_path]
+    done = subprocess.run(command, env={**os.environ, "GONIO_BOOK": "quick"}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,52 @@
+"""Counts that pages state in words are those of the code."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import gonio as go
+import pytest
+from gonio.viewer import families
+
+ROOT = Path(__file__).parents[2]
+NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+WORDS = dict(enumerate(NUMBERS))
+CHINESE = {11: "十一"}
+
+
+def count(kind: str) -> int:
+    return len(families.families()[kind][0].all())
+
+
+LAWS = count("law") - 1  # `shader` needs a browser and is judged only if it is named
+PHONG = len(re.findall(r"^## \d\.", (ROOT / "docs/phong-limits.md").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("page", "sentence"),
+    [
+        ("README.md", f"{WORDS[LAWS]} laws judge"),
+        ("README.zh.md", f"{CHINESE[LAWS]}条定律"),
+        ("docs/index.md", f"by {WORDS[LAWS]} laws"),
+        ("docs/tour.md", f"# {WORDS[LAWS]} laws"),
+        ("docs/verify.md", f"{WORDS[LAWS]} laws judge"),
+        ("docs/phong-limits.md", f"none of the {WORDS[PHONG]}"),
+        ("examples/lab-sheet.ipynb", f"{WORDS[PHONG]} times over"),
+        ("README.md", f"| {len(go.models())} models |"),
+        ("README.zh.md", f"| {len(go.models())} 个模型 |"),
+    ],
+)
+def test_a_count_is_that_of_the_code(page: str, sentence: str) -> None:
+    text = " ".join((ROOT / page).read_text(encoding="utf-8").lower().split())
+    assert sentence in text
+
+
+def test_every_masking_term_is_in_the_conventions() -> None:
+    text = (ROOT / "docs/conventions.md").read_text(encoding="utf-8")
+    assert [name for name in families.families()["masking term"][0].all() if f"`{name}`" not in text] == []
+
+
+def test_every_law_has_its_row() -> None:
+    text = (ROOT / "docs/verify.md").read_text(encoding="utf-8")
+    assert [name for name in families.families()["law"][0].all() if f"| `{name}` |" not in text] == []
