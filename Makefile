@@ -52,7 +52,7 @@ browser: .venv/installed
 PARALLEL := -n 2 --dist loadfile
 
 # formulas, tables, shader text, files and scenes, two cases of each test: what one runs while editing
-UNIT := tests/bridge tests/documents tests/emit tests/energy tests/measure tests/models tests/ops tests/optics \
+UNIT := tests/bridge tests/catalog tests/energy tests/materials tests/measure tests/ops tests/optics tests/shaders \
 	tests/render/test_scene_build.py tests/render/test_scene_read.py tests/test_errors.py tests/test_imports.py
 check: .venv/installed
 	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow and not browser' --cases 2 $(UNIT)

@@ -12,7 +12,7 @@ With F = 1 the albedo of a microfacet BRDF is an integral over normals (dwi = 4 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,17 +40,17 @@ _LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 
 
 class Points(NamedTuple):
-    """Points at which E is evaluated; the arrays broadcast.
+    """Points at which E is evaluated: numbers or arrays, which broadcast.
 
     mu              cosine of wo, in [0, 1]
     alpha, alpha_y  widths along x and y; alpha_y None is isotropic
     phi             azimuth of wo, radians
     """
 
-    mu: ArrayLike
-    alpha: ArrayLike
-    alpha_y: ArrayLike | None = None
-    phi: ArrayLike = 0.0
+    mu: Any
+    alpha: Any
+    alpha_y: Any = None
+    phi: Any = 0.0
 
 
 class Moments(NamedTuple):

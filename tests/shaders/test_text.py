@@ -270,7 +270,7 @@ def test_every_constant_that_is_no_multiple_of_pi_says_what_it_is() -> None:
 def test_the_text_is_the_same_in_every_process_and_for_every_value() -> None:
     names = ["kulla-conty-glass", "mix-compensated", "glass-turned"]
     code = (
-        "import sys; sys.path[:0] = ['tests', 'tests/emit']; import gonio as go; from variants import EVERY;"
+        "import sys; sys.path[:0] = ['tests', 'tests/shaders']; import gonio as go; from variants import EVERY;"
         f"sys.stdout.write(''.join(go.emit(EVERY[n], lang) for n in {names} for lang in ('glsl', 'wgsl', 'hlsl')))"
     )
     texts = {

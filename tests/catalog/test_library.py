@@ -19,7 +19,7 @@ NAMES = [(fit, name) for fit, one in library.published().items() for name in one
 
 
 def oracle() -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], np.ndarray]]:
-    """(wo, wi, f of each fit and material), as tests/models/oracle/make_published.py has stored them."""
+    """(wo, wi, f of each fit and material), as tests/catalog/oracle/make_published.py has stored them."""
     with np.load(ORACLE) as data:
         return data["wo"], data["wi"], dict(zip(NAMES, data["f"].astype(float), strict=True))
 

@@ -1,7 +1,7 @@
 """Shaders in a browser give the values of float64 Python, at random directions and parameters, extremes included.
 
 Bar: relative error <= max(1e-5, 8 times the change of the float64 value when the inputs move by one float32), where the
-value is over 1e-6. `tests/emit/parity.py` says how each result is judged.
+value is over 1e-6. `tests/shaders/parity.py` says how each result is judged.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from materials import ALL, COMPENSATED, EACH, SMALL, each
 from sphere import random_directions, random_numbers
 
 MATERIALS = {**ALL, **COMPENSATED}
-# tables of two widths are long in the making; the shaders' values are compared with them on (tests/emit)
+# tables of two widths are long in the making; the shaders' values are compared with them on (tests/shaders)
 QUICK = {*EACH, *COMPENSATED} - {"kulla-conty-turned", "kulla-conty-bubble", "turquin-turned"}
 COUNT = 3000
 WO, WI, U = random_directions(COUNT, 41), random_directions(COUNT, 42), random_numbers(COUNT, 41)

@@ -1,7 +1,7 @@
 """Store what the collection's own C++ says of the published fits, and compare the models with it.
 
-    python tests/models/oracle/make_published.py PROGRAM          # published.cpp, compiled as README.md says
-    python tests/models/oracle/make_published.py PROGRAM --compare 1024
+    python tests/catalog/oracle/make_published.py PROGRAM          # published.cpp, compiled as README.md says
+    python tests/catalog/oracle/make_published.py PROGRAM --compare 1024
 
 Without --compare it writes published.npz: f of every fit at 8 pairs of directions, float32. With it nothing is written:
 the models are held against the program at as many pairs.
