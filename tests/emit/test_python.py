@@ -42,7 +42,8 @@ def _moved(draws: Draws, seed: int) -> Draws:
     rng = np.random.default_rng(seed)
 
     def near(x: np.ndarray) -> np.ndarray:
-        return x * (1.0 + ROUNDING * rng.choice([-1.0, 1.0], x.shape))
+        signs = rng.choice([-1.0, 1.0], x.shape)
+        return np.where(x == 0.0, 1e-30 * signs, x * (1.0 + ROUNDING * signs))  # a pole has any azimuth
 
     return Draws(near(draws.wo), near(draws.wi), near(draws.u), {p: near(x) for p, x in draws.fields.items()})
 
