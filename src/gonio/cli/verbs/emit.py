@@ -94,12 +94,8 @@ def emit(
     if check:
         _write_pairs(made.texts(model), check, functions, single, folders)
         return
-    options = {
-        "lean": lean,
-        "constants": constants,
-        "placement": Placement(place.prefix, place.group, place.first_binding),
-    }
-    shader = make_bundle(made.texts(model), lang, functions, **options)
+    at = Placement(place.prefix, place.group, place.first_binding)
+    shader = make_bundle(made.texts(model), lang, functions, lean=lean, constants=constants, placement=at)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())
