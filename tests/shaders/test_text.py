@@ -98,7 +98,7 @@ def test_manifest_tells_what_a_program_must_know(lang: str) -> None:
     ]
     # eta, k, alpha, rotation, albedo
     assert [f["offset"] for f in m["fields"]] == [0, 16, 32, 40, 48]
-    assert m["size"] == 64 and m["shader"] == f"kulla-conty.{lang}"
+    assert m["size"] == 64 and m["shader"] == "kulla-conty" + languages()[lang].suffix
     assert fields["base.rotation"]["value"] == pytest.approx([np.cos(0.5), np.sin(0.5)])
     assert [t["name"] for t in m["terms"]] == ["D", "G", "F", "single", "multi"] and all(t["doc"] for t in m["terms"])
     kinds = {p["path"]: p["kind"] for p in m["parameters"]}
@@ -166,6 +166,20 @@ def test_what_cannot_be_a_shader_is_refused_with_one_clear_error() -> None:
     ]:
         with pytest.raises(go.InputError, match=words):
             refused()
+
+
+def test_a_power_is_refused_with_the_function_to_use() -> None:
+    class Powered(go.BSDF):
+        """A lobe by Python's operator."""
+
+        p: float = go.number(3.0, "exponent")
+
+        def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
+            """cos^p."""
+            return ops.where(wi.z > 0.0, wi.z**self.p, 0.0)
+
+    with pytest.raises(go.InputError, match=r"`\*\*` on a value(?s:.*)ops\.pow"):
+        bundle(Powered(), functions=["eval"])
 
 
 def test_functions_are_named_in_any_spelling_of_a_list() -> None:

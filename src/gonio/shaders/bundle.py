@@ -106,11 +106,11 @@ def bundle(
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
-    if language.standalone:
-        return _file(model, language, functions, lean, place)
     models = [model] if isinstance(model, BSDF | str) or not isinstance(model, Sequence) else list(model)
     if not models:
         raise InputError("no material given", "emit", "name at least one, such as conductor")
+    if language.standalone:
+        return _file(models, language, functions, lean, place)
     sources = [_recorded(one, functions, lean, on) for one in models]
     module = Module(language, place, constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
@@ -119,12 +119,13 @@ def bundle(
     return Bundle(text, whole, {name: pixels(table) for name, table in module.tables.items()})
 
 
-def _file(model: object, language: Language, functions: Sequence[str], lean: bool, place: Placement) -> Bundle:
+def _file(
+    models: Sequence[BSDF | str], language: Language, functions: Sequence[str], lean: bool, place: Placement
+) -> Bundle:
     """A file that runs by itself, which holds its tables."""
     if place.prefix or place.first_binding:
         what = f"a prefix or a binding given, and {language.name} is a file of its own"
         raise InputError(what, "emit: lang", "import it under a name")
-    models = list(model) if isinstance(model, list | tuple) else [model]
     if len(models) != 1:
         what = f"{len(models)} materials given, and a file in {language.name} holds one"
         raise InputError(what, "emit: lang", "write a file for each")

@@ -14,6 +14,7 @@ from ..ops.types import Value
 from . import program as programs
 from .languages import Language
 from .names import Names
+from .operations import operations
 from .program import Program
 from .textures import axes, width
 from .values import SIZES
@@ -73,6 +74,7 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
             "fields": [{"name": language.word(name), "type": type_} for name, type_ in derived.record.fields],
         },
         "functions": {method: names.routines[routine] for method, routine in made.entries.items()},
+        "operations": {method: operations(routine) for method, routine in made.entries.items()},
         "terms": [
             {"name": name, "type": type_, "doc": TERMS.get(name, "")}
             for name, type_ in (terms.record.fields if terms and terms.record else [])

@@ -16,7 +16,7 @@ class Placement:
     """The place of a shader in a module.
 
     prefix         begins all global names: functions, structs, constants, tables
-    group          of the tables' bindings: WGSL's `@group`, HLSL's register space
+    group          of the tables' bindings: WGSL's `@group`, HLSL's register space, a descriptor set
     first_binding  number of the first table's binding
     """
 
@@ -35,4 +35,4 @@ class Placement:
                 raise InputError(f"{number!r} given, a whole number >= 0 expected", f"{LOCATION}: {name}")
         if self.group and not language.groups:
             what = f"group {self.group} given, and {language.title or language.name} has no groups of bindings"
-            raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl or hlsl")
+            raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl or glsl-vulkan")

@@ -15,6 +15,7 @@ from .languages import Language
 from .layout import COLUMNS, INDENT, comment, wrap
 from .manifest import TERMS
 from .names import Names
+from .operations import operations
 from .program import ENTRIES, Program, choices
 from .routine import RoutineWriter
 from .syntax import literal
@@ -121,12 +122,24 @@ def head(made: Program, names: Names) -> list[str]:
     ]
     for call, (method, _) in zip(calls, entries, strict=True):
         lines.append(f"// {call:{max(map(len, calls))}}  {ENTRIES[method]}")
+    lines += ["//", *_costs(made, names)]
     lines += [
         "//",
         "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
         f"// the shading normal. Colors are linear RGB. {language.precision}",
     ]
     return lines
+
+
+def _costs(made: Program, names: Names) -> list[str]:
+    """The operations of each function, in lines of a comment."""
+    counts = {names.routines[routine]: operations(routine) for routine in made.entries.values()}
+    parts = []
+    for name, kinds in counts.items():
+        listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
+        parts.append(f"{name} {sum(kinds.values())} ({listed})")
+    text = "Operations on numbers, one per component of a vector: " + "; ".join(parts) + "."
+    return [f"// {line}" for line in textwrap.wrap(text, 105)]
 
 
 def _arguments(made: Program, method: str, language: Language) -> list[str]:

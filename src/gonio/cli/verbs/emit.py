@@ -23,7 +23,7 @@ class Place:
     """The place of a shader in a module with other code."""
 
     prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
-    group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, in WGSL and HLSL.")] = 0
+    group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, not in GLSL ES.")] = 0
     first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
 
 
@@ -44,7 +44,7 @@ def emit(
             "--lang",
             "--language",
             metavar="NAME",
-            help="glsl, wgsl, hlsl; numpy, torch, jax: a Python file.",
+            help="glsl, glsl-vulkan, wgsl, hlsl; numpy, torch, jax: a Python file.",
             autocompletion=completion.languages,
         ),
     ] = "glsl",
@@ -94,12 +94,8 @@ def emit(
     if check:
         _write_pairs(made.texts(model), check, functions, single, folders)
         return
-    options = {
-        "lean": lean,
-        "constants": constants,
-        "placement": Placement(place.prefix, place.group, place.first_binding),
-    }
-    shader = make_bundle(made.texts(model), lang, functions, **options)
+    at = Placement(place.prefix, place.group, place.first_binding)
+    shader = make_bundle(made.texts(model), lang, functions, lean=lean, constants=constants, placement=at)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())
