@@ -113,7 +113,7 @@ class Machine:
         if not function.blocks:
             raise refuse(f"the function '{self.module.names.get(function.id, function.id)}' has no body")
         if function.id not in self._flows:
-            self._flows[function.id] = flow_of(function)
+            self._flows[function.id] = self._flow(function)
         frame = Frame(function, self._flows[function.id], outer)
         frame.values.update({id: value for (id, _), value in zip(function.parameters, arguments, strict=True)})
         frame.waiting[next(iter(function.blocks))] = True, {}
@@ -128,6 +128,15 @@ class Machine:
             self._block(frame, function.blocks[label], mask)
         self._stack.pop()
         return frame.result
+
+    def _flow(self, function: Function) -> Flow:
+        try:
+            return flow_of(function)
+        except InputError:
+            raise
+        except (IndexError, KeyError, ValueError) as error:
+            what = f"the SPIR-V is damaged: {type(error).__name__} {error}"
+            raise InputError(what, "SPIR-V", "compile it again") from error
 
     def _block(self, frame: Frame, block: Block, mask: Value) -> None:
         one: Instruction | None = None
