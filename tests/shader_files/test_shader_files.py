@@ -4,10 +4,9 @@ import json
 import pickle
 from pathlib import Path
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 from gonio.catalog import notation, operands, shaders
 from gonio.errors import InputError
 from gonio.scene.materials import described
@@ -122,9 +121,8 @@ def test_shader_survives_pickles_json_and_scenes(tmp_path: Path) -> None:
 
 
 def test_scene_takes_a_shader_from_its_folder_only(tmp_path: Path) -> None:
-    from pydantic import TypeAdapter, ValidationError
-
     from gonio.scene.materials import Material
+    from pydantic import TypeAdapter, ValidationError
 
     folder = tmp_path / "scene"
     folder.mkdir()

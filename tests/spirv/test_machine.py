@@ -1,8 +1,7 @@
-"""Shader text against closed forms, on symbols evaluated in 64 bits; and each construct that is refused, with its line."""
+"""Shader text against closed forms, on symbols evaluated in 64 bits, and constructs that are refused, with their lines."""
 
 import numpy as np
 import pytest
-
 from gonio import ops
 from gonio.errors import InputError
 from gonio.spirv import Machine, compile_text, parse
@@ -39,7 +38,7 @@ CASES = {
     "float f(float x) { return asin(x) + acos(x) * atan(x, 2.0) + tanh(x) + sinh(x) - tan(x); }": lambda x: (
         np.arcsin(x) + np.arccos(x) * np.arctan2(x, 2) + np.tanh(x) + np.sinh(x) - np.tan(x)
     ),
-    "float f(float x) { return mix(x, 2.0, smoothstep(0.0, 1.0, x)) + fract(7.0 * x) + mod(-x, 0.3) + step(0.5, x); }": (
+    "float f(float x) { return mix(x, 2.0, smoothstep(0.0, 1.0, x)) + fract(7.0 * x) + mod(-x, 0.3) + step(0.5, x); }": (  # noqa: E501
         lambda x: x + (2 - x) * (3 - 2 * x) * x * x + (7 * x) % 1 + (-x) % 0.3 + (x >= 0.5)
     ),
     # an early return, a loop with a break that depends on values, a nested loop, and a table of constants
@@ -85,7 +84,7 @@ REFUSED = {
     "doubles": "float f(float x) {\n return float(double(x) * 2.0lf); }",
     "an array of": "float a[100000000];\nfloat f(float x) { return a[0] + x; }",
     "recursion": "float f(float x) {\n return f(x); }",
-    "atomic": "layout(std430, binding = 0) buffer B { int n; };\nfloat f(float x) { return float(atomicAdd(n, 1)) * x; }",
+    "atomic": "layout(std430, binding = 0) buffer B { int n; };\nfloat f(float x) { return x * atomicAdd(n, 1); }",
     "write to an image": (
         "layout(r32f, binding = 0) uniform image2D i;\nfloat f(float x) { imageStore(i, ivec2(0), vec4(x)); return x; }"
     ),

@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 import pytest
-
 from gonio.errors import InputError
 from gonio.spirv import Machine, compile_text, parse
 from gonio.spirv.compiler import compiler

@@ -1,0 +1,83 @@
+"""Emit, read back, compare: GLSL written by Gonio, read as a shader, has the values of the material it came from.
+
+Constants of a shader have 32 bits, and sines are polynomials, so the reference is the material's own recording for
+shaders, with its constants rounded likewise.
+"""
+
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio import ops
+from gonio.material import recording, tree
+from gonio.ops import graph
+from gonio.shaders.polyfills import POLYFILLS
+from gonio.spirv.compiler import compiler
+
+MODELS = ["lambert", "conductor", "phong", "blinn-phong", "eon", "dielectric", "ward", "ashikhmin-shirley", "lafortune"]
+METHODS = {"eval": "wi", "pdf": "wi", "sample": "u"}
+
+
+def _rounded(recorded: graph.Graph) -> graph.Graph:
+    """The recording with constants in 32 bits."""
+
+    def single(value: object) -> object:
+        return float(np.float32(value)) if isinstance(value, float) else value
+
+    for function in recorded.functions:
+        for node in function.nodes:
+            node.args = tuple(map(single, node.args))
+            if node.op == "constant":
+                node.static = single(node.static)
+    return recorded
+
+
+def _values(material: go.BSDF, method: str, arguments: dict[str, np.ndarray]) -> list[np.ndarray]:
+    """A method's results in NumPy, component first."""
+    into = graph.Graph(POLYFILLS, single=True)
+    inner = type(material).__dict__.get(method) or getattr(type(material), method)
+    inner = inner.__wrapped__ if hasattr(inner, "__wrapped__") else inner
+    more = {} if method == "pdf" else {"mode": "radiance"}
+    kinds = {"wo": "vec3", METHODS[method]: "vec3"}
+    recorded = _rounded(
+        ops.record(inner, types=kinds, name=method, into=into, self=recording.symbols(material), **more)
+    )
+    given = {}
+    for leaf in tree.leaves(material):
+        if leaf.parameter.numeric:
+            value = np.asarray(leaf.value, float)
+            size = {"spectrum": 3, "alpha": 2}.get(leaf.parameter.kind, 0)
+            given[f"self_{leaf.path}"] = np.broadcast_to(value, (size,))[:, None] if size else value
+    result = recorded.evaluate(**given, **arguments)
+    parts = result[:3] if method == "sample" else [result]
+    return [np.asarray(part) for part in parts]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_glsl_read_back_has_the_values_of_its_material(name: str, tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    material = go.material(name) if name not in go.models() else go.models()[name]()
+    file = tmp_path / f"{name}.glsl"
+    file.write_text(go.emit(material, "glsl"))
+    (tmp_path / f"{name}.toml").write_text(f"transmits = {str(material.transmits).lower()}\n")
+    cls = type(go.Shader(file))
+    values = {}
+    for field in cls.parameters():
+        path, _, letter = field.rpartition("_") if field.endswith(("_x", "_y")) else (field, "", "")
+        value = getattr(material, path)
+        values[field] = value if not letter or np.ndim(value) == 0 else value["xy".index(letter)]
+    read_back = cls(**values)
+    random = np.random.default_rng(5)
+    wo, wi = (v / np.linalg.norm(v, axis=0) for v in random.normal(size=(2, 3, 500)))
+    if not material.transmits:
+        wo, wi = (v * [[1.0], [1.0], [1.0]] * np.where(v[2] < 0, -1.0, 1.0) for v in (wo, wi))
+    for method, other in METHODS.items():
+        arguments = {"wo": wo, other: wi if other == "wi" else random.random((3, 500))}
+        for ours, theirs in zip(
+            _values(read_back, method, arguments), _values(material, method, arguments), strict=True
+        ):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-13)
