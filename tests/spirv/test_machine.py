@@ -1,4 +1,4 @@
-"""Shader text against closed forms, on symbols evaluated in 64 bits, and constructs that are refused, with their lines."""
+"""Shader text against closed forms, on symbols in 64 bits, and constructs that are refused, with their lines."""
 
 import numpy as np
 import pytest

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from ..errors import InputError
 from . import composites
 from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
+from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
@@ -297,8 +298,10 @@ class Machine:
             return elementwise(whole, *values)
         if name in WHOLE:
             return WHOLE[name](*values)
-        if name == "Bitcast" and all(isinstance(leaf, int) for leaf in composites.scalars(values[0])):
-            return values[0]
+        if name == "Bitcast":
+            kind = self.module.type(one.type)
+            scalar = (self.module.type(kind.parts[0]) if kind.parts else kind).kind
+            return elementwise(lambda part: cast(part, scalar), *values)
         raise refuse(f"the bits of a number ({name})", "compute with floats")
 
     def _check_width(self, id: int) -> None:
