@@ -12,7 +12,8 @@ from functools import reduce
 import numpy as np
 
 from .. import ops
-from .values import Value, both, either, folded, negated, numeric, refuse, select, static, truth
+from .bits import shifted_left, shifted_right
+from .values import UNDEFINED, Bits, Value, both, either, folded, negated, numeric, refuse, select, static, truth
 
 
 def elementwise(function: Callable[..., Value], *values: Value) -> Value:
@@ -96,11 +97,7 @@ def is_infinite(x: Value) -> Value:
 
 def _whole(x: Value) -> Value:
     """An integer: a plain one, or a float with a whole value."""
-    return int(x) if static(x) else (0 if not _varies(x) else x)
-
-
-def _varies(x: Value) -> bool:
-    return not isinstance(x, tuple) and hasattr(x, "__add__")
+    return 0 if x is UNDEFINED else int(x) if static(x) else x
 
 
 def _integer(plain: Callable[..., int], on_values: Callable[..., Value] | None) -> Callable[..., Value]:
@@ -131,6 +128,8 @@ def _shift(a: int, b: int, left: bool) -> int:
     return (a << (b & 31)) if left else (a >> (b & 31))
 
 
+_shift_left = _integer(lambda a, b: _shift(a, b, True), None)
+_shift_right = _integer(lambda a, b: _shift(a, b, False), None)
 INTEGERS: dict[str, Callable[..., Value]] = {
     "SNegate": _integer(operator.neg, operator.neg),
     "IAdd": _integer(operator.add, operator.add),
@@ -141,9 +140,11 @@ INTEGERS: dict[str, Callable[..., Value]] = {
     "UMod": _integer(lambda a, b: a % b if b else 0, floor_modulo),
     "SMod": _integer(lambda a, b: a % b if b else 0, floor_modulo),
     "SRem": _integer(lambda a, b: a - b * _quotient(a, b), remainder),
-    "ShiftLeft": _integer(lambda a, b: _shift(a, b, True), None),
-    "ShiftRightArithmetic": _integer(lambda a, b: _shift(a, b, False), None),
-    "ShiftRightLogical": _integer(lambda a, b: _shift(a & 0xFFFFFFFF, b, False), None),
+    "ShiftLeft": lambda a, b: shifted_left(a, b) if not static(a) and static(b) else _shift_left(a, b),
+    "ShiftRightArithmetic": lambda a, b: shifted_right(a, b) if isinstance(a, Bits) else _shift_right(a, b),
+    "ShiftRightLogical": lambda a, b: (
+        shifted_right(a, b) if isinstance(a, Bits) else _shift_right(a & 0xFFFFFFFF if static(a) else a, b)
+    ),
     "BitwiseOr": _integer(operator.or_, None),
     "BitwiseXor": _integer(operator.xor, None),
     "BitwiseAnd": _integer(operator.and_, None),

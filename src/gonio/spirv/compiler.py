@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError, MachineError
+from .module import SOURCE
 
 SECONDS = 20  # of the compiler
 MEMORY = 2 << 30  # bytes
@@ -76,8 +77,25 @@ def compile_text(
         entry = "\n#undef main\nvoid main() {}\n"
         head = f"#version 450\n{head}{old}"
     else:
-        entry = "\nfloat4 gonio_entry() : SV_Target { return 0; }\n"
+        entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(whole)} return 0; }}\n"
     return _run(f"{head}#line 1\n{whole}{entry}", name, language, sources)
+
+
+_DEFINITION = re.compile(r"^[ \t]*(?:static[ \t]+)?(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
+_KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
+
+
+def _calls(text: str) -> str:
+    """Calls of every function of an HLSL text, since glslang drops those that nothing calls."""
+    calls = []
+    for kind, name, arguments in _DEFINITION.findall(re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)):
+        declared = [part.partition(":")[0].split() for part in arguments.split(",") if part.strip()]
+        types = [words[-2] for words in declared if len(words) > 1]
+        if kind in _KEYWORDS or name in _KEYWORDS or any(re.match("Texture|Sampler", one) for one in types):
+            continue
+        variables = " ".join(f"{one} a{place} = ({one})0;" for place, one in enumerate(types))
+        calls.append(f"{{ {variables} {name}({', '.join(f'a{place}' for place in range(len(types)))}); }}")
+    return " ".join(calls)
 
 
 class _Sources:
@@ -127,10 +145,11 @@ def _limit() -> None:
 
 def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
     with tempfile.TemporaryDirectory(prefix="gonio-shader-") as folder:
-        source, output = Path(folder, "shader.frag"), Path(folder, "shader.spv")
+        source, output = Path(folder, SOURCE), Path(folder, "shader.spv")
         source.write_text(text, encoding="utf-8")
-        options = ["-G", "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
-        options += ["-D", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
+        target = "-G" if language == "glsl" else "-V"  # HLSL has no form for OpenGL
+        options = [target, "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
+        options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
         try:
             done = subprocess.run(
                 [compiler(), *options, str(source)],

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from ..errors import InputError
 from . import composites
 from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
+from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
@@ -113,7 +114,7 @@ class Machine:
         if not function.blocks:
             raise refuse(f"the function '{self.module.names.get(function.id, function.id)}' has no body")
         if function.id not in self._flows:
-            self._flows[function.id] = flow_of(function)
+            self._flows[function.id] = self._flow(function)
         frame = Frame(function, self._flows[function.id], outer)
         frame.values.update({id: value for (id, _), value in zip(function.parameters, arguments, strict=True)})
         frame.waiting[next(iter(function.blocks))] = True, {}
@@ -128,6 +129,15 @@ class Machine:
             self._block(frame, function.blocks[label], mask)
         self._stack.pop()
         return frame.result
+
+    def _flow(self, function: Function) -> Flow:
+        try:
+            return flow_of(function)
+        except InputError:
+            raise
+        except (IndexError, KeyError, ValueError) as error:
+            what = f"the SPIR-V is damaged: {type(error).__name__} {error}"
+            raise InputError(what, "SPIR-V", "compile it again") from error
 
     def _block(self, frame: Frame, block: Block, mask: Value) -> None:
         one: Instruction | None = None
@@ -288,8 +298,10 @@ class Machine:
             return elementwise(whole, *values)
         if name in WHOLE:
             return WHOLE[name](*values)
-        if name == "Bitcast" and all(isinstance(leaf, int) for leaf in composites.scalars(values[0])):
-            return values[0]
+        if name == "Bitcast":
+            kind = self.module.type(one.type)
+            scalar = (self.module.type(kind.parts[0]) if kind.parts else kind).kind
+            return elementwise(lambda part: cast(part, scalar), *values)
         raise refuse(f"the bits of a number ({name})", "compute with floats")
 
     def _check_width(self, id: int) -> None:

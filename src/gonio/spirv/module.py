@@ -14,6 +14,7 @@ from ..errors import InputError
 from .opcodes import NAMES, REFUSED, TYPES
 from .values import UNDEFINED, Value, refuse, wrapped
 
+SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
 MAGIC = 0x07230203
 MAX_BYTES = 1 << 26
 MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
@@ -120,6 +121,8 @@ def parse(data: bytes, where: str = "SPIR-V") -> Module:
     """The module in the bytes of a .spv. Raises InputError if it is none, or for types that are not read."""
     try:
         return _Parser(data, where).module
+    except InputError:
+        raise
     except (IndexError, KeyError, struct.error, OverflowError, ValueError, RecursionError) as error:
         raise InputError(f"the SPIR-V is damaged: {type(error).__name__} {error}", where, "compile it again") from None
 
@@ -141,7 +144,8 @@ class _Parser:
         module = self.module
         if opcode in (5, 7):  # OpName, OpString
             target = module.names if opcode == 5 else module.strings
-            target[words[0]] = _text(words[1:])
+            text = _text(words[1:])
+            target[words[0]] = self.where if opcode == 7 and text.endswith(SOURCE) else text
         elif opcode == 6:  # OpMemberName
             module.members[words[0], words[1]] = _text(words[2:])
         elif opcode == 8:  # OpLine

@@ -25,6 +25,15 @@ class Undefined:
         return "undefined"
 
 
+class Bits:
+    """The bits of a float that varies as an integer: of `number`, or of the power of two with a biased exponent."""
+
+    __slots__ = ("exponent", "number")
+
+    def __init__(self, number: Value, exponent: Value) -> None:
+        self.number, self.exponent = number, exponent
+
+
 UNDEFINED: Final = Undefined()
 
 
@@ -42,6 +51,8 @@ def numeric(value: Value) -> Value:
     """A scalar for arithmetic on floats: whole numbers that are known become floats, undefined ones 0."""
     if value is UNDEFINED:
         return 0.0
+    if isinstance(value, Bits):
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
     return float(value) if isinstance(value, int) else value
 
 

@@ -1,0 +1,53 @@
+"""The bits of numbers that vary, as far as logarithms and powers of two need them: the exponent, read and written.
+
+(floatBitsToInt(x) >> 23) - 127        floor(log2 |x|)
+intBitsToFloat((e + 127) << 23)        2^e
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+
+from .. import ops
+from .values import UNDEFINED, Bits, Value, numeric, refuse, static, wrapped
+
+MANTISSA = 23  # bits
+BIAS = 127
+
+
+def cast(value: Value, kind: str) -> Value:
+    """The bits of a scalar as another type, "float", "int" or "uint"."""
+    if value is UNDEFINED:
+        return 0.0 if kind == "float" else 0
+    if static(value):
+        words = struct.pack("<f", value) if isinstance(value, float) else struct.pack("<I", wrapped(int(value), False))
+        if kind == "float":
+            return float(struct.unpack("<f", words)[0])
+        return int(struct.unpack("<i" if kind == "int" else "<I", words)[0])
+    if isinstance(value, Bits):
+        if kind != "float" or value.number is not None:
+            return value.number if kind == "float" else value
+        return ops.exp((value.exponent - float(BIAS)) * math.log(2.0))
+    if kind == "float":
+        raise refuse("a float from the bits of an integer that varies", "compute with floats")
+    return Bits(value, None)
+
+
+def shifted_right(value: Bits, count: Value) -> Value:
+    """Sign and exponent, of the bits of a float shifted by 23."""
+    if value.number is None or count != MANTISSA:
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
+    size = ops.abs(value.number)
+    guess = ops.floor(ops.log(size) * (1.0 / math.log(2.0)))
+    # the logarithm of a power of two may round to either side
+    mantissa = size * ops.exp(-guess * math.log(2.0))
+    exponent = ops.where(mantissa < 1.0 - 1e-12, guess - 1.0, ops.where(mantissa > 2.0 - 1e-12, guess + 1.0, guess))
+    return exponent + float(BIAS)
+
+
+def shifted_left(value: Value, count: Value) -> Value:
+    """The bits of a power of two, from its biased exponent."""
+    if isinstance(value, Bits) or count != MANTISSA:
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
+    return Bits(None, numeric(value))

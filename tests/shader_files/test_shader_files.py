@@ -1,0 +1,202 @@
+"""Shaders as materials: our own shaders against Gonio's materials, adapters, texts, scenes and pickles."""
+
+import json
+import pickle
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.catalog import notation, operands, shaders
+from gonio.errors import InputError
+from gonio.scene.materials import described
+from gonio.spirv.compiler import compiler
+
+
+@pytest.fixture(autouse=True)
+def _needs_compiler() -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+
+
+def directions(seed: int, count: int = 200) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    w = random.normal(size=(count, 3))
+    w[:, 2] = np.abs(w[:, 2]) + 0.01
+    return w / np.linalg.norm(w, axis=1, keepdims=True)
+
+
+WO, WI = directions(1), directions(2)
+
+LAMBERT = """#version 300 es
+precision highp float;
+uniform vec3 albedo;
+vec3 brdf(vec3 light, vec3 view) { return albedo / 3.14159265358979; }
+"""
+BLINN_PHONG = """
+cbuffer Parameters { float exponent; };
+float3 evalBRDF(float3 N, float3 V, float3 L) {
+    float3 H = normalize(L + V);
+    return (exponent + 2.0) / 6.283185307 * pow(max(dot(N, H), 0.0), exponent) * max(dot(N, L), 0.0);
+}
+"""
+GGX = """analytic
+::begin parameters
+float alpha 0.01 1 0.3
+bool lit 1
+::end parameters
+::begin shader
+float D(float c) { float t = 1.0 + (alpha * alpha - 1.0) * c * c; return alpha * alpha / (3.14159265358979 * t * t); }
+float Lambda(float c) { return 0.5 * (sqrt(1.0 + alpha * alpha * (1.0 / (c * c) - 1.0)) - 1.0); }
+vec3 BRDF( vec3 L, vec3 V, vec3 N, vec3 X, vec3 Y )
+{
+    if (dot(N, L) < 0 || !lit) return vec3(0);
+    float lambda = 0.0;
+    vec3 w[2] = vec3[](L, V);
+    for (int i = 0; i < 2; ++i) lambda += Lambda(dot(N, w[i]));
+    return vec3(D(dot(N, normalize(L + V))) / (1.0 + lambda) / (4.0 * dot(N, L) * dot(N, V)));
+}
+::end shader
+"""
+
+
+def written(folder: Path, name: str, text: str) -> str:
+    (folder / name).write_text(text)
+    return str(folder / name)
+
+
+def test_lambert_equals_gonios(tmp_path: Path) -> None:
+    material = go.Shader(written(tmp_path, "matte.glsl", LAMBERT), albedo=(0.2, 0.5, 0.8))
+    expected = go.Lambert(albedo=(0.2, 0.5, 0.8)).eval(WO, WI, precision="float64")
+    np.testing.assert_allclose(material.eval(WO, WI, precision="float64"), expected, rtol=1e-6)
+    assert material.isotropic
+    assert not np.any(material.eval(WO, -WI))
+
+
+def test_hlsl_with_its_cosine_equals_the_closed_form(tmp_path: Path) -> None:
+    file = written(tmp_path, "glossy.hlsl", BLINN_PHONG)
+    written(tmp_path, "glossy.hlsl.toml", "cosine = true\n[parameters.exponent]\ndefault = 20\nlow = 0.0\n")
+    half = (WO + WI) / np.linalg.norm(WO + WI, axis=1, keepdims=True)
+    expected = 22.0 / (2.0 * np.pi) * half[:, 2] ** 20 * WI[:, 2]
+    value = go.Shader(file).eval(WO, WI, precision="float64")
+    np.testing.assert_allclose(value[:, 0], expected, rtol=1e-6)
+
+
+def test_file_of_the_brdf_explorer_equals_gonios_ggx(tmp_path: Path) -> None:
+    file = written(tmp_path, "ggx.brdf", GGX)
+    expected = go.Conductor(eta=1.0, k=1e9, alpha=0.3).eval(WO, WI, precision="float64")
+    np.testing.assert_allclose(go.Shader(file).eval(WO, WI, precision="float64"), expected, rtol=1e-6)
+    assert not np.any(go.Shader(file, lit=False).eval(WO, WI))
+    assert operands.kind_of(file, operands.MATERIALS, "MODEL") is operands.Kind.TABLE
+    material, _ = notation.named(f"{file}(alpha=0.5)")
+    assert material.alpha == 0.5
+    with pytest.raises(InputError, match=r"2 given|<= 1"):
+        notation.named(file, ["alpha=2"])
+
+
+def test_texture_is_looked_up_between_texel_centers(tmp_path: Path) -> None:
+    table = np.random.default_rng(3).random((4, 8, 1))
+    np.save(tmp_path / "table.npy", table)
+    text = "uniform sampler2D table;\nvec3 BRDF(vec3 L, vec3 V) { return texture(table, vec2(L.z, V.z)).rrr; }\n"
+    file = written(tmp_path, "table.glsl", text)
+    with pytest.raises(InputError, match="no file"):
+        go.Shader(file)
+    written(tmp_path, "table.toml", "[textures.table]\nfile = 'table.npy'\n")
+    from gonio.ops.table import Table, read_in_numpy
+
+    expected = read_in_numpy(Table("t", table), WO[:, 2], WI[:, 2])[0] * WI[:, 2]
+    np.testing.assert_allclose(go.Shader(file).eval(WO, WI, precision="float64")[:, 1], expected, rtol=1e-12)
+
+
+def test_shader_survives_pickles_json_and_scenes(tmp_path: Path) -> None:
+    file = written(tmp_path, "matte.glsl", LAMBERT)
+    material = go.Shader(file, albedo=0.25)
+    assert pickle.loads(pickle.dumps(material)) == material
+    assert notation.from_json(json.loads(json.dumps(notation.as_json(material)))) == material
+    part = described(material)
+    assert part.instance() == material
+    assert pickle.loads(pickle.dumps(part)).instance() == material
+
+
+def test_scene_takes_a_shader_from_its_folder_only(tmp_path: Path) -> None:
+    from gonio.scene.materials import Material
+    from pydantic import TypeAdapter, ValidationError
+
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    written(tmp_path, "outside.glsl", LAMBERT)
+    written(folder, "inside.glsl", LAMBERT)
+    adapter = TypeAdapter(Material)
+    context = {"folder": folder}
+    inside = adapter.validate_python({"type": "shader", "file": "inside.glsl", "albedo": 0.3}, context=context)
+    assert inside.instance().albedo == 0.3
+    with pytest.raises(ValidationError, match="outside"):
+        adapter.validate_python({"type": "shader", "file": "../outside.glsl"}, context=context)
+    written(folder, "inside.toml", "[textures.t]\nfile = '../outside.npy'\n")
+    with pytest.raises(ValidationError, match="outside"):
+        adapter.validate_python({"type": "shader", "file": "inside.glsl"}, context=context)
+
+
+def test_adopted_shader_reads_as_before(tmp_path: Path) -> None:
+    file = written(tmp_path, "matte.glsl", LAMBERT)
+    before = go.Shader(file).eval(WO, WI)
+    adopted = shaders.adopt(file)
+    assert any("albedo" in guess for guess in adopted.guesses)
+    written(tmp_path, "matte.glsl.toml", adopted.text)
+    np.testing.assert_array_equal(go.Shader(file).eval(WO, WI), before)
+
+
+BAD = {
+    "::begin parameters\nfloat a 0 1\n::end parameters": "declares no parameter",
+    "::begin parameters\nfloat a 0 1 x\n::end parameters": "no numbers",
+    "::begin parameters\nfloat a 0 nan 1\n::end parameters": "not finite",
+    "::begin shader\nvec3 F() { return vec3(0); }\n::end shader": "no function 'BRDF'",
+    "::begin shader\nvec3 BRDF(vec3 L) { return vec3(0); }\n::end shader": "5 meanings for the 1",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_broken_file_of_the_brdf_explorer_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match=BAD[text]):
+        go.Shader(written(tmp_path, "bad.brdf", f"analytic\n{text}\n"))
+
+
+BAD_ADAPTERS = {
+    "functoin = 'f'": "unknown key 'functoin'",
+    "cosine = 1": "a bool expected",
+    "arguments = ['lihgt']": "unknown meaning",
+    "[parameters.a]\ndefault = 1": "no uniform 'a'",
+    "[parameters.albedo]\ndefault = 'x'": "wrong type",
+    "a = [": "no adapter",
+    "function = 'g'": "no function 'g'",
+}
+
+
+@pytest.mark.parametrize("text", BAD_ADAPTERS)
+def test_broken_adapter_is_refused(tmp_path: Path, text: str) -> None:
+    file = written(tmp_path, "matte.glsl", LAMBERT)
+    written(tmp_path, "matte.glsl.toml", text)
+    with pytest.raises(InputError, match=BAD_ADAPTERS[text]):
+        go.Shader(file)
+
+
+def test_compilers_message_has_the_users_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as error:
+        go.Shader(written(tmp_path, "bad.glsl", LAMBERT + "float f() { return missing; }\n"))
+    assert error.value.where == "bad.glsl:5"
+
+
+def test_missing_compiler_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gonio.spirv import compiler as module
+
+    monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(module.sys, "path", [])
+    monkeypatch.setattr(module.shutil, "which", lambda *args, **options: None)
+    module.compiler.cache_clear()
+    try:
+        with pytest.raises(go.MachineError, match="pip install"):
+            go.Shader(written(tmp_path, "matte.glsl", LAMBERT))
+    finally:
+        module.compiler.cache_clear()

@@ -1,0 +1,113 @@
+"""Shader text against closed forms, on symbols in 64 bits, and constructs that are refused, with their lines."""
+
+import numpy as np
+import pytest
+from gonio import ops
+from gonio.errors import InputError
+from gonio.spirv import Machine, compile_text, parse
+from gonio.spirv.compiler import compiler
+
+X = np.linspace(0.05, 0.95, 7)
+
+
+@pytest.fixture(autouse=True)
+def _needs_compiler() -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+
+
+def value(text: str, name: str = "f", language: str = "glsl", x: np.ndarray = X) -> np.ndarray:
+    """f(x) of a shader, in 64 bits."""
+    module = parse(compile_text(text, "test", language=language), "test")
+
+    def formula(x: ops.Scalar) -> ops.Scalar:
+        machine = Machine(module)
+        for start in module.function("main"):
+            machine.call(start, ())
+        return machine.call(module.function(name)[0], [x])
+
+    return np.asarray(ops.record(formula, x="float").evaluate(x=x))
+
+
+CASES = {
+    "float f(float x) { return pow(x, 3.0) + sqrt(x) * exp(-x) / log2(1.0 + x); }": lambda x: (
+        x**3 + np.sqrt(x) * np.exp(-x) / np.log2(1 + x)
+    ),
+    "float f(float x) { return asin(x) + acos(x) * atan(x, 2.0) + tanh(x) + sinh(x) - tan(x); }": lambda x: (
+        np.arcsin(x) + np.arccos(x) * np.arctan2(x, 2) + np.tanh(x) + np.sinh(x) - np.tan(x)
+    ),
+    "float f(float x) { return mix(x, 2.0, smoothstep(0.0, 1.0, x)) + fract(7.0 * x) + mod(-x, 0.3) + step(0.5, x); }": (  # noqa: E501
+        lambda x: x + (2 - x) * (3 - 2 * x) * x * x + (7 * x) % 1 + (-x) % 0.3 + (x >= 0.5)
+    ),
+    # an early return, a loop with a break that depends on values, a nested loop, and a table of constants
+    "float f(float x) { if (x > 0.5) return 1.0; float s = 0.0; for (int i = 0; i < 9; ++i) { s += x; if (s > 1.0) break; } return s; }": (  # noqa: E501
+        lambda x: np.where(x > 0.5, 1.0, [next((k * v for k in range(1, 10) if k * v > 1), 9 * v) for v in x])
+    ),
+    "float f(float x) { float s = 0.0; for (int i = 0; i < 3; ++i) for (int j = 0; j < i; ++j) { if (x > 0.3) continue; s += x; } return s; }": (  # noqa: E501
+        lambda x: np.where(x > 0.3, 0.0, 3 * x)
+    ),
+    "const float t[4] = float[](1.0, 3.0, 2.0, 5.0); float f(float x) { return t[int(4.0 * x)]; }": lambda x: np.array(
+        [1.0, 3.0, 2.0, 5.0]
+    )[(4 * x).astype(int)],
+    "float g(inout float y) { y *= 2.0; return y; } float f(float x) { float y = x; if (x > 0.5) g(y); return y; }": (
+        lambda x: np.where(x > 0.5, 2 * x, x)
+    ),
+    "float f(float x) { mat3 m = mat3(2.0, x, 0.0, 0.0, 1.0, x, x, 0.0, 3.0); return determinant(inverse(m)) + (m * vec3(x, 1.0, 2.0)).y; }": (  # noqa: E501
+        lambda x: 1 / (6 + x**3) + x * x + 1
+    ),
+    "float scale = 2.0; float f(float x) { switch (int(3.0 * x)) { case 0: return scale; case 1: scale = x; break; default: scale = 5.0; } return scale; }": (  # noqa: E501
+        lambda x: np.select([x < 1 / 3, x < 2 / 3], [2.0 + 0 * x, x], 5.0)
+    ),
+    "struct S { float a; vec2 b; }; float f(float x) { S s = S(x, vec2(1.0, x)); s.b.y += s.a; return dot(s.b, s.b.yx); }": (  # noqa: E501
+        lambda x: 4 * x
+    ),
+}
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_shader_equals_its_closed_form(text: str) -> None:
+    np.testing.assert_allclose(value(text), CASES[text](X), rtol=1e-6)
+
+
+def test_hlsl_equals_its_closed_form() -> None:
+    text = "float f(float x) { float3 v = float3(x, 1, 2); return dot(saturate(2 * v), v) + lerp(x, 1, rsqrt(4.0)); }"
+    np.testing.assert_allclose(value(text, language="hlsl"), np.minimum(2 * X, 1) * X + 3 + (X + 1) / 2, rtol=1e-6)
+
+
+REFUSED = {
+    "discard": "float f(float x) {\n if (x > 0.5) discard;\n return x; }",
+    "derivative": "float f(float x) {\n return dFdx(x); }",
+    "bit": "float f(float x) {\n return float(floatBitsToInt(x) & 255); }",
+    "without a known end": "float f(float x) {\n while (x < 9.0) x *= 1.001;\n return x; }",
+    "doubles": "float f(float x) {\n return float(double(x) * 2.0lf); }",
+    "an array of": "float a[100000000];\nfloat f(float x) { return a[0] + x; }",
+    "recursion": "float f(float x) {\n return f(x); }",
+    "atomic": "layout(std430, binding = 0) buffer B { int n; };\nfloat f(float x) { return x * atomicAdd(n, 1); }",
+    "write to an image": (
+        "layout(r32f, binding = 0) uniform image2D i;\nfloat f(float x) { imageStore(i, ivec2(0), vec4(x)); return x; }"
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_construct_without_meaning_is_refused_by_name_and_line(what: str) -> None:
+    with pytest.raises(InputError) as error:
+        value(REFUSED[what])
+    assert what in error.value.what.lower()
+    # types and the linker's messages have no line
+    assert error.value.where.startswith("test" if what in ("an array of", "recursion") else "test:2")
+
+
+def test_include_reads_named_folders_only(tmp_path) -> None:
+    (tmp_path / "a.glsl").write_text("float twice(float x) { return 2.0 * x; }\n")
+    text = '#include "a.glsl"\nfloat f(float x) { return twice(x) + missing; }'
+    with pytest.raises(InputError, match="no folder"):
+        compile_text(text, "test")
+    with pytest.raises(InputError) as error:
+        compile_text(text, "test", folders=[tmp_path])
+    assert error.value.where == "test:2"
+    (tmp_path / "a.glsl").write_text('#include "a.glsl"\n#include "a.glsl"\n')
+    with pytest.raises(InputError, match="includes"):
+        compile_text(text, "test", folders=[tmp_path])
