@@ -137,7 +137,10 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
         raise InputError(f"a '{suffix}' given, a picture of the table expected", path.name, "give the .png")
     if task.model and suffix in ROWS:
         given = dict(_COMMENT.findall(path.read_text(encoding="utf-8", errors="replace")))
-        material, _ = notation.named(given.get("model", task.model))
+        named = given.get("model", task.model)
+        if ".py" in named.lower():  # a file that somebody handed in must not choose what runs
+            raise InputError(f"'{named}' is code, which is not run from a folder", path.name, "name a model of Gonio's")
+        material, _ = notation.named(named)
         return samples.check(path, material, given.get("up", up))
     scene = _scene_of(path, scenes)
     if suffix in PICTURES and scene is not None:
