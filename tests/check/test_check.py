@@ -196,6 +196,14 @@ def test_rows_in_a_folder_name_their_own_material(tmp_path: Path) -> None:
     assert status["Phong"] == "not handed in" and status["report"] == "by hand"
 
 
+def test_rows_in_a_folder_run_no_code(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text("raise SystemExit('it ran')")
+    _rows(tmp_path / "oren-nayar.csv", OrenNayar()(of.WO, of.WI), comment="model: own.py:Mine")
+    report = go.check(tmp_path, sheet="lab2")
+    finding = next(mark.finding for mark in report.submissions[0].marks if mark.task == "Oren-Nayar")
+    assert finding.status == "input error" and "is not run" in finding.facts[0]
+
+
 def test_work_that_cannot_be_read_leaves_the_others_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _picture(tmp_path / "E.png", Table().picture())
     (tmp_path / "E_avg.pdf").write_bytes(b"%PDF-1.4")

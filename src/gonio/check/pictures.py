@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GonioError, InputError
-from ..material import models
+from ..material import BSDF, models
 from ..pictures import images
 from ..pictures.exposures import RGB
 from ..render import render
@@ -51,7 +51,8 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
     """Judge a picture of a scene. Raises InputError for a picture of another shape, or of something else."""
     picture = images.read(path)
     height, width = picture.pixels.shape[:2]
-    film_width, film_height = _film(scene)
+    outside = {"allow_outside": allow_outside, "allow_code": allow_code}
+    film_width, film_height = _film(scene, outside)
     if width * film_height != height * film_width:
         what = f"a picture of {width} x {height} pixels, and the scene's film has {film_width} x {film_height}"
         raise InputError(what, path.name, "render the scene at its own size")
@@ -59,16 +60,15 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
         bad = int(np.sum(~np.isfinite(picture.pixels).all(axis=2)))
         raise InputError(f"{bad} pixels are NaN or infinite", path.name, "a division by 0 in a formula?")
     block = max(1, max(width, height) // BLOCKS)
-    outside = {"allow_outside": allow_outside, "allow_code": allow_code}
-    reference = np.asarray(render(scene, size=(width, height), spp=SPP, **outside), float)  # type: ignore[arg-type]
-    dark = _blocks(reference, block)
+    reference = _rendered(scene, (width, height), SPP, outside)
+    expected = _blocks(reference, block)
     clipped = 1.0 if picture.hdr else None
     matches = sorted(
-        (_match(one, dark, block, clipped) for one in _readings(path, picture)), key=lambda one: one.distance
+        (_match(one, expected, block, clipped) for one in _readings(path, picture)), key=lambda one: one.distance
     )
     best = next(one for one in matches if one.distance <= 1.1 * matches[0].distance + 1e-3)
     blocks = _blocks(best.reading.pixels, block)
-    alike = np.corrcoef(np.log(blocks + 1e-3).ravel(), np.log(dark + 1e-3).ravel())[0, 1]
+    alike = np.corrcoef(np.log(blocks + 1e-3).ravel(), np.log(expected + 1e-3).ravel())[0, 1]
     if best.distance > 0.3 and not alike > UNLIKE:
         raise InputError(
             "this picture does not resemble the scene: it is of something else", path.name, "check --scene"
@@ -82,20 +82,20 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
         return Finding(path.name, "picture", WRONG, tuple(facts), best.reading.mistake, figures)
     if best.distance <= FITS:
         return Finding(path.name, "picture", RIGHT, tuple(facts), None, figures)
-    objects = list(_objects(scene, (width // block, height // block), outside, blocks / best.scale, dark))
+    objects = list(_objects(scene, (width // block, height // block), outside, blocks / best.scale, expected))
     facts += [words for words, _ in objects]
     mistake = next((one for _, one in objects if one is not None), None)
     return Finding(path.name, "picture", WRONG, tuple(facts), mistake, figures)
 
 
-def _film(scene: Path) -> tuple[int, int]:
+def _film(scene: Path, outside: dict[str, bool]) -> tuple[int, int]:
     """Width and height of the scene's film, pixels."""
-    size = _read(scene).camera.film.size
+    size = _read(scene, outside).camera.film.size
     return int(size[0]), int(size[1])
 
 
-def _read(scene: Path) -> SceneDescription:
-    return reader.read(scene, names_output=False, allow_outside=True, allow_code=True)
+def _read(scene: Path, outside: dict[str, bool]) -> SceneDescription:
+    return reader.read(scene, names_output=False, **outside)  # type: ignore[arg-type]
 
 
 def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
@@ -117,8 +117,8 @@ def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
             moved = f"moved by {along_x} columns and {along_y} rows" if along_x or along_y else ""
             both = "; ".join(filter(None, (words, moved)))
             yield _Reading(both, None, np.roll(pixels, (-along_y, -along_x), (0, 1)))
-        for turned, turn in turns.items():
-            yield _Reading(words, Mistake(turned, "the order of rows, columns and channels"), turn(pixels))
+        for words_of_turn, turn in turns.items():
+            yield _Reading(words, Mistake(words_of_turn, "the order of rows, columns and channels"), turn(pixels))
 
 
 def _match(reading: _Reading, reference: Values, block: int, clip: float | None) -> _Match:
@@ -151,16 +151,28 @@ def _blocks(pixels: Values | RGB, block: int) -> Values:
     return cut.reshape(height, block, width, block, 3).mean(axis=(1, 3))
 
 
+def _rendered(
+    scene: Path,
+    size: tuple[int, int],
+    spp: int,
+    outside: dict[str, bool],
+    overrides: dict[str, BSDF] | None = None,
+) -> Values:
+    """A picture by Gonio, (H, W, 3) linear."""
+    picture = render(scene, size=size, spp=spp, overrides=overrides, **outside)  # type: ignore[arg-type]
+    return np.asarray(picture, np.float64)
+
+
 def _objects(
     scene: Path, size: tuple[int, int], outside: dict[str, bool], given: Values, reference: Values
 ) -> Iterator[tuple[str, Mistake | None]]:
     """What differs on each object: it is where the picture changes if the object is black."""
-    shapes = _read(scene).shapes
+    shapes = _read(scene, outside).shapes
     for number, shape in enumerate(shapes):
         name = str(getattr(getattr(shape, "material", None), "type", ""))
         try:
             black = {f"shapes.{number}.material": models()["lambert"](albedo=0.0)}  # type: ignore[call-arg]
-            dark = np.asarray(render(scene, size=size, spp=16, overrides=black, **outside), float)  # type: ignore[arg-type]
+            dark = _rendered(scene, size, 16, outside, black)
         except GonioError:
             continue
         height, width = (min(a, b) for a, b in zip(dark.shape[:2], reference.shape[:2], strict=True))

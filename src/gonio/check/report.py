@@ -85,7 +85,7 @@ class Report:
 
     def rows(self) -> list[tuple[str, ...]]:
         """One row per file: submission, task, file, judgment, points, probable mistake."""
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for one in self.submissions:
             for mark in one.marks:
                 finding = mark.finding

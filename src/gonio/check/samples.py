@@ -126,7 +126,7 @@ def read(path: Path, up: str = "z") -> Rows:
 
 def _split(lines: list[str]) -> list[tuple[int, list[str]]]:
     """The words of each row with its line; comments and a heading are skipped."""
-    table = []
+    table: list[tuple[int, list[str]]] = []
     for number, line in enumerate(lines, 1):
         words = [word for word in re.split(r"[,;\s]+", line.strip()) if word]
         if not words or words[0].startswith(("#", "//")):

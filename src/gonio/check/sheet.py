@@ -91,17 +91,19 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
     if not files:
         return Submission(folder.name, [Mark("", 0.0, unreadable(folder.name, "an empty folder"))])
-    taken: dict[str, list[Path]] = {task.name: [] for task in tasks}
-    others = []
+    files_of: dict[str, list[Path]] = {task.name: [] for task in tasks}
+    others: list[Path] = []
     for path in files:
         task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
-        (others if task is None else taken[task.name]).append(path)
-    tables_of = {task.table: taken[task.name] for task in tasks if task.table}
+        (others if task is None else files_of[task.name]).append(path)
+    tables_of = {task.table: files_of[task.name] for task in tasks if task.table}
     if not tables_of.get("E", [0]) and tables_of.get("E, sampled by importance"):
-        taken["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it does what the first task asks for, and more
-    own = _own_table(taken.get("E(mu)", []))
+        files_of["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it does what the first task asks for, and more
+    own = _own_table(files_of.get("E(mu)", []))
     marks = [
-        Mark(task.name, task.points, one) for task in tasks for one in _judged(task, taken[task.name], own, scenes, up)
+        Mark(task.name, task.points, one)
+        for task in tasks
+        for one in _judged(task, files_of[task.name], own, scenes, up)
     ]
     return Submission(folder.name, marks, tuple(str(path.relative_to(folder)) for path in others))
 
@@ -135,7 +137,10 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
         raise InputError(f"a '{suffix}' given, a picture of the table expected", path.name, "give the .png")
     if task.model and suffix in ROWS:
         given = dict(_COMMENT.findall(path.read_text(encoding="utf-8", errors="replace")))
-        material, _ = notation.named(given.get("model", task.model))
+        named = given.get("model", task.model)
+        if ".py" in named.lower():  # a file that somebody handed in must not choose what runs
+            raise InputError(f"'{named}' is code, which is not run from a folder", path.name, "name a model of Gonio's")
+        material, _ = notation.named(named)
         return samples.check(path, material, given.get("up", up))
     scene = _scene_of(path, scenes)
     if suffix in PICTURES and scene is not None:

@@ -298,8 +298,8 @@ def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures:
 
 def _wraps(E: Values) -> bool:
     """Whether bytes wrap: single dark texels among bright ones."""
-    around = np.stack([np.roll(E, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
-    middle = np.median(around, axis=0)
+    neighbors = np.stack([np.roll(E, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
+    middle = np.median(neighbors, axis=0)
     bright = middle > 0.8
     return bool(bright.any() and np.mean(E[bright] < 0.2) > 0.002)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -81,7 +82,7 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
             yield Variant(Mistake(words, topic), replace(form, **changes).values(wo, wi))
 
 
-def _changes(sigma: float) -> Iterator[tuple[str, str, dict[str, object]]]:
+def _changes(sigma: float) -> Iterator[tuple[str, str, dict[str, Any]]]:
     yield "min and max exchanged: sin(min) tan(max) in place of sin(max) tan(min)", _ANGLES, {"angles": "exchanged"}
     yield "alpha and beta are both the larger angle", _ANGLES, {"angles": "both larger"}
     yield "alpha and beta are both the smaller angle", _ANGLES, {"angles": "both smaller"}

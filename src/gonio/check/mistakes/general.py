@@ -80,8 +80,8 @@ def _units(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
 
 
 def _directions(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    turned = [w[:, [2, 0, 1]] for w in (wo, wi)]
-    yield Variant(Mistake("the rows have y up: give --up y", _DIRECTIONS), f_of(material, *turned))
+    rotated = [w[:, [2, 0, 1]] for w in (wo, wi)]
+    yield Variant(Mistake("the rows have y up: give --up y", _DIRECTIONS), f_of(material, *rotated))
     back = [w[:, [1, 2, 0]] for w in (wo, wi)]
     yield Variant(Mistake("the rows have z up: leave --up y out", _DIRECTIONS), f_of(material, *back))
     yield Variant(Mistake("wi points from the light to the surface", _DIRECTIONS), f_of(material, wo, -wi))

@@ -25,7 +25,7 @@ _DENOMINATOR = "the denominator 4 (n.o)(n.i)"
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
     """Wrong forms of an isotropic microfacet reflection; nothing for other materials."""
     surface = material.microsurface
-    if surface is None or np.size(surface.alpha) != 1 or surface.ndf not in _DENSITIES:
+    if surface is None or np.size(np.asarray(surface.alpha)) != 1 or surface.ndf not in _DENSITIES:
         return
     terms = _Terms(material, float(np.max(np.asarray(surface.alpha))), surface.ndf, wo, wi)
     if terms.alpha < 1e-3:

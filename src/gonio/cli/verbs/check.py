@@ -24,7 +24,7 @@ class Judging:
     """By what the work is judged, and how it is reported."""
 
     scene: Annotated[
-        Path | None, Option(metavar="SCENE", help="The scene of a picture; with --sheet, a folder of scenes.")
+        Path | None, Option(metavar="FILE", help="The scene of a picture; with --sheet, a folder of scenes.")
     ] = None
     sheet: Annotated[
         str | None, Option(metavar="hw4|lab2", help="The sheet of a folder of submissions: its tasks and points.")
