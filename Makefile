@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs browser
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs browser wheel
 
 install: .venv/installed
 
@@ -32,7 +32,7 @@ demo: .venv/rendering
 	@printf '%s\n' '' 'The pictures and the page are in out. Next, in this shell:' '    . .venv/bin/activate' '    gonio view'
 
 # the files of a reader who tries README here are the reader's own
-OURS := benchmarks docs examples src tests
+OURS := benchmarks docs examples src tests tools
 lint: .venv/installed
 	$(BIN)/ruff check $(OURS)
 	$(BIN)/ruff format --check $(OURS)
@@ -89,6 +89,10 @@ bench: .venv/installed
 docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
 	$(BIN)/python docs/make_options.py
+
+# a wheel and a source archive, tried in empty environments outside the repository, and a bill of materials
+wheel:
+	$(PYTHON) tools/wheel.py
 
 clean:
 	rm -rf .venv out build dist
