@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 DIST = ROOT / "dist"
 # Verbs that read what the package must bring along: models, tables, indices, templates, the page, schemas, a sample.
 TRIED = (
-    "models conductor",
+    "models",
     "explain ggx",
     "schema scene -o scene.schema.json",
     "new material -o mine",
