@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel
 
 install: .venv/installed
 
@@ -32,7 +32,7 @@ demo: .venv/rendering
 	@printf '%s\n' '' 'The pictures and the page are in out. Next, in this shell:' '    . .venv/bin/activate' '    gonio view'
 
 # the files of a reader who tries README here are the reader's own
-OURS := benchmarks docs examples src tests
+OURS := benchmarks docs examples src tests tools
 lint: .venv/installed
 	$(BIN)/ruff check $(OURS)
 	$(BIN)/ruff format --check $(OURS)
@@ -100,6 +100,10 @@ docs: .venv/installed
 book: .venv/book
 	$(BIN)/python -m sphinx -q -b html -W --keep-going -d out/book-parts docs out/book
 	@echo 'out/book/index.html'
+
+# a wheel and a source archive, tried in empty environments outside the repository, and a bill of materials
+wheel:
+	$(PYTHON) tools/wheel.py
 
 clean:
 	rm -rf .venv out build dist docs/reference docs/gallery docs/project
