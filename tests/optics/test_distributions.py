@@ -21,7 +21,7 @@ KIND = backend.types("float64")
 WIDTHS = [(0.1, 0.1), (0.5, 0.5), (1.0, 1.0), (0.15, 0.6)]
 DIRECTIONS, WEIGHTS = hemisphere(1000, 240)
 NAMES = list(distributions())
-OWN_VISIBLE = [name for name in NAMES if not distribution(name).tabulated]
+OWN_VISIBLE = [name for name in NAMES if "visible_normal" in vars(type(distribution(name)))]
 
 
 def vector(rows: np.ndarray) -> Any:

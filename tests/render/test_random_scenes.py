@@ -166,4 +166,6 @@ def test_caustics_make_the_picture_of_paths(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_particles_make_the_picture_of_paths(seed: int) -> None:
     scene = Scene(200 + seed, ROUGH, SURFACES + POINTS)
-    agree(scene.pictures("light", 1024), scene.pictures("path", 256))
+    agree(
+        scene.pictures("light", 1024), scene.pictures("path", 256), 0.02
+    )  # few bright splats: heavier tails than Student's
