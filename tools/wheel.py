@@ -27,7 +27,7 @@ TRIED = (
     "emit conductor -o conductor.glsl",
     "render conductor --preset Au --spp 2 --size 16x16 -o gold.exr",
     "render alum-bronze --spp 2 --size 16x16 -o bronze.png",
-    "convert gold.exr gold.png",
+    "convert gold.exr -o gold.png",
     "view lambert --export page.html",
     "verify lambert --quick",
 )
