@@ -130,7 +130,8 @@ def trusted() -> list[Path]:
     """The packages, the system's folders, and the user's caches and settings."""
     packages = [*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, str(Path(gonio.__file__).parent)]
     packages += [path for path in sys.path if Path(path).name == "site-packages"]
-    system = ["/usr", "/lib", "/lib64", "/bin", "/sbin", "/etc", "/opt", "/proc", "/sys", "/dev"]
+    system = ["/usr", "/lib", "/lib64", "/bin", "/sbin", "/etc", "/opt", "/proc", "/sys", "/dev", "/var/lib"]
+    system += [path for path in os.environ["PATH"].split(os.pathsep) if os.path.isabs(path)]
     home = [str(Path.home() / name) for name in (".drjit", ".cache", ".config", ".embree4", ".local/lib", ".nv")]
     paths = [Path(path) for path in (*packages, *system, *home)]
     return [*paths, *(path.resolve() for path in paths)]
