@@ -23,13 +23,13 @@ TRIED = (
     "models",
     "explain ggx",
     "schema scene -o scene.schema.json",
-    "new material -o mine",
+    "new material velvet",
     "emit conductor -o conductor.glsl",
     "render conductor --preset Au --spp 2 --size 16x16 -o gold.exr",
     "render alum-bronze --spp 2 --size 16x16 -o bronze.png",
-    "info gold.exr",
+    "convert gold.exr -o gold.png",
     "view lambert --export page.html",
-    "verify lambert --effort quick",
+    "verify lambert --quick",
 )
 
 

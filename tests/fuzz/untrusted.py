@@ -140,7 +140,7 @@ def _none_opened(folder: Path) -> Iterator[None]:
 
 _NAMED = (
     "info {}", "convert a.npz {}", "convert {} b.png", "compare {} a.npz", "emit {} -o {}", "emit lambert -o {}",
-    "schema scene -o {}", "models {}", "explain {}", "new material -o {}", "render {}", "resume {}",
+    "schema scene -o {}", "models {}", "explain {}", "new material velvet -o {}", "render {}", "resume {}",
 )  # fmt: skip
 
 

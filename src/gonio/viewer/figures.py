@@ -108,6 +108,7 @@ def _suffix(path: Path) -> str:
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
     """An empty figure with a heading, its size in inches; no window, whatever backend the notebook uses."""
+    load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -30,6 +30,7 @@ SLICES = (20.0, 60.0)  # angles of view, degrees
 def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
     """Spheres under one light, slices in the plane of incidence, and images over theta_h and theta_d (Burley2012):
     the data, the fit, and the difference relative to the larger one, on a scale that ends at 50 %."""
+    matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
     source = table if isinstance(table, Measurement) else read(table)
@@ -39,8 +40,6 @@ def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
 
     def fitted(wo: Floats, wi: Floats) -> Floats:
         return np.asarray(fit.material.eval(wo, wi), np.float64)
-
-    matplotlib = figures.load_matplotlib()
 
     with matplotlib.rc_context(figures.STYLE):
         figure = Figure(figsize=(10.0, 8.2), layout="constrained")

@@ -110,6 +110,7 @@ class _Layout:
     @staticmethod
     def of(blocks: Sequence[_Block], title: str, subtitle: str) -> _Layout:
         """The layout of blocks under a heading, with room for all labels."""
+        figures.load_matplotlib()
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
         from matplotlib.text import Text
@@ -148,6 +149,7 @@ def _height(block: _Block, cell_height: int) -> float:
 
 
 def _draw(layout: _Layout, title: str, subtitle: str) -> Figure:
+    figures.load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
