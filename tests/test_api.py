@@ -17,6 +17,7 @@ from gonio.pictures import images
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "bake": go.bake,
     "capture": go.capture,
+    "check": go.check,
     "compare": go.compare,
     "compensation": go.compensation,
     "compress": go.compress,
@@ -40,9 +41,11 @@ ONLY_TYPED = {
     "fit": {"data", "scene", "spp", "output"},  # the scene is for go.fit_picture
     "capture": {"next_", "output"},  # methods of what is returned
     "compensation": {"model"},
+    "check": {"target", "model", "reference"},  # `against`; right values are go.material(...).f(wo, wi)
 }
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
+OTHER_DEFAULTS |= {"bake target"}  # typed, a preset of the homework may stand without one
 OTHER_DEFAULTS |= {"convert exposure", "capture free", "fit free", "fit model"}
 
 
