@@ -51,7 +51,8 @@ def operate(op: str, static: Value, args: list[Value]) -> Value:
     if op == "component":
         return args[0][static]
     if op == "vector":
-        return np.stack(np.broadcast_arrays(*[np.asarray(a, float) for a in args]))
+        # one column if all components are constants, so that the result multiplies numbers of any count
+        return np.stack(np.broadcast_arrays(*[np.atleast_1d(np.asarray(a, float)) for a in args]))
     if op in ("lookup", "fetch"):
         table, channel = static
         return (read_in_numpy if op == "lookup" else fetch_in_numpy)(table, *args)[channel]

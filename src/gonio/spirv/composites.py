@@ -88,7 +88,7 @@ def undefined(module: Module, type: int) -> Value:
     if kind.kind == "struct":
         return tuple(undefined(module, part) for part in kind.parts)
     if kind.kind in ("vector", "matrix", "array"):
-        return (undefined(module, kind.parts[0]),) * kind.count
+        return (undefined(module, kind.parts[0]),) * kind.length
     return UNDEFINED
 
 
@@ -115,7 +115,7 @@ def _construct(module: Module, type: int, *parts: Value) -> Value:
     flat: Sequence[Value] = parts
     if kind.kind == "vector":
         flat = [leaf for part in parts for leaf in leaves(part)]
-    expected = len(kind.parts) if kind.kind == "struct" else kind.count
+    expected = len(kind.parts) if kind.kind == "struct" else kind.length
     if kind.kind not in ("vector", "matrix", "array", "struct") or len(flat) != expected:
         raise ValueError(f"{len(flat)} parts of a {kind.kind} of {expected}")
     result = tuple(flat)

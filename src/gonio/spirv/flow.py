@@ -47,16 +47,16 @@ def _structured(function: Function) -> dict[int, int]:
     """Reverse postorder in which a construct's merge block comes after its blocks."""
     entry = next(iter(function.blocks))
     postorder: list[int] = []
-    seen = {entry}
+    visited = {entry}
     stack = [(entry, iter(successors(function, entry)))]
     while stack:
         label, rest = stack[-1]
-        following = next((one for one in rest if one not in seen), None)
+        following = next((one for one in rest if one not in visited), None)
         if following is None:
             postorder.append(label)
             stack.pop()
         else:
-            seen.add(following)
+            visited.add(following)
             stack.append((following, iter(successors(function, following))))
     return {label: place for place, label in enumerate(reversed(postorder))}
 

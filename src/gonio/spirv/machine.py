@@ -291,11 +291,11 @@ class Machine:
             kind = self.module.type(one.type)
             signed = (self.module.type(kind.parts[0]) if kind.parts else kind).kind == "int"
 
-            def whole(*scalars: Value) -> Value:
+            def on_integers(*scalars: Value) -> Value:
                 value = INTEGERS[name](*scalars)
                 return wrapped(value, signed) if isinstance(value, int) else value
 
-            return elementwise(whole, *values)
+            return elementwise(on_integers, *values)
         if name in WHOLE:
             return WHOLE[name](*values)
         if name == "Bitcast":

@@ -24,14 +24,14 @@ MAX_LEAVES = 1 << 16  # scalars in one value
 class Type(NamedTuple):
     """A type: kind is "float", "int", "uint", "bool", "vector", "matrix", "array", "struct", "pointer", "image", ...
 
-    parts  the types inside, for vectors, matrices and arrays one
-    count  of components, columns or items; the number of leaves of a struct
-    size   scalars of a value
+    parts   the types inside, for vectors, matrices and arrays one
+    length  of components, columns or items; the number of leaves of a struct
+    size    scalars of a value
     """
 
     kind: str
     parts: tuple[int, ...] = ()
-    count: int = 1
+    length: int = 1
     size: int = 1
 
 
@@ -101,7 +101,7 @@ class Module:
         if kind.kind == "struct":
             return tuple(self.zero(part) for part in kind.parts)
         if kind.kind in ("vector", "matrix", "array"):
-            return (self.zero(kind.parts[0]),) * kind.count
+            return (self.zero(kind.parts[0]),) * kind.length
         return UNDEFINED
 
     def shape(self, id: int) -> str:
@@ -111,9 +111,9 @@ class Module:
             return self.shape(kind.parts[0])
         if kind.kind == "vector":
             prefix = {"float": "", "int": "i", "uint": "u", "bool": "b"}.get(self.type(kind.parts[0]).kind, "?")
-            return f"{prefix}vec{kind.count}"
+            return f"{prefix}vec{kind.length}"
         if kind.kind == "matrix":
-            return f"mat{kind.count}"
+            return f"mat{kind.length}"
         return self.names.get(id, kind.kind) if kind.kind == "struct" else kind.kind
 
 
@@ -197,6 +197,7 @@ class _Parser:
 
     def _type(self, opcode: int, words: tuple[int, ...]) -> Type:
         kind, known = TYPES.get(opcode, "opaque"), self.module.type
+        parts: tuple[int, ...]
         if kind in ("int", "float"):
             name = kind if kind == "float" or words[2] else "uint"
             return Type(name if words[1] == 32 else f"{words[1]}-bit {name}")

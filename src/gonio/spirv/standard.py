@@ -187,12 +187,12 @@ def determinant(m: tuple[Value, ...]) -> Value:
 
 def inverse(m: tuple[Value, ...]) -> Value:
     """By cofactors."""
-    whole = determinant(m)
+    volume = determinant(m)
 
     def cofactor(c: int, r: int) -> Value:
         minor = tuple(column[:r] + column[r + 1 :] for i, column in enumerate(m) if i != c)
         value = determinant(minor)
-        return divide(value if (c + r) % 2 == 0 else negate(value), whole)
+        return divide(value if (c + r) % 2 == 0 else negate(value), volume)
 
     places = range(len(m))
     return transpose(tuple(tuple(cofactor(c, r) for r in places) for c in places))

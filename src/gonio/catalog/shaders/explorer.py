@@ -3,7 +3,7 @@
 analytic
 ::begin parameters
 float roughness 0 1 0.5      # name, smallest, largest, default
-color base .8 .6 .2          # name, red, green, blue
+color base 0.8 0.6 0.2          # name, red, green, blue
 bool isotropic 0
 ::end parameters
 ::begin shader

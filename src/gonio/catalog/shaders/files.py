@@ -78,15 +78,15 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
     inside  the folder in which the files that the adapter names must lie, None for any folder
     """
     path = Path(os.path.expanduser(text.strip())).absolute()
-    beside = next((one for one in (Path(f"{path}.toml"), path.with_suffix(".toml")) if one.is_file()), None)
+    adapter_file = next((one for one in (Path(f"{path}.toml"), path.with_suffix(".toml")) if one.is_file()), None)
     try:
-        stamp = tuple((one.stat().st_mtime_ns, one.stat().st_size) for one in (path, beside) if one is not None)
+        stamp = tuple((one.stat().st_mtime_ns, one.stat().st_size) for one in (path, adapter_file) if one is not None)
     except (OSError, ValueError) as error:
         raise InputError(f"no file '{text}'", text, str(getattr(error, "strerror", "") or "")) from None
     key = str(path), str(inside)
     known = _classes.pop(key, None)
     if known is None or known[0] != stamp:
-        program = read(path, beside, inside)
+        program = read(path, adapter_file, inside)
         known = stamp, _made(path, program, inside)
     _classes[key] = known
     while len(_classes) > MAX_CLASSES:
@@ -94,16 +94,16 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
     return known[1]
 
 
-def read(path: Path, beside: Path | None, inside: Path | None = None) -> Program:
+def read(path: Path, adapter_file: Path | None, inside: Path | None = None) -> Program:
     """The program of a file, with the adapter beside it or guesses."""
     where = path.name
     if not path.is_file():
         raise InputError(f"'{path}' is no file", where)
     if path.stat().st_size > MAX_FILE:
         raise InputError(f"over {MAX_FILE >> 20} MB", where, "a shader is shorter")
-    if beside is not None:
-        _confined(beside, inside)
-    adapter = adapters.read(beside) if beside is not None else Adapter()
+    if adapter_file is not None:
+        _confined(adapter_file, inside)
+    adapter = adapters.read(adapter_file) if adapter_file is not None else Adapter()
     data = path.read_bytes()
     if path.suffix.lower() == ".spv":
         module = parse(data, where)
@@ -111,7 +111,7 @@ def read(path: Path, beside: Path | None, inside: Path | None = None) -> Program
         text = data.decode("utf-8", "replace")
         if path.suffix.lower() == ".brdf":
             text, described = explorer.read(text, where)
-            adapter = described if beside is None else adapter
+            adapter = described if adapter_file is None else adapter
         language = adapter.language or ("hlsl" if path.suffix.lower() == ".hlsl" else "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
         module = parse(compile_text(text, where, language=language, defines=adapter.defines, folders=folders), where)

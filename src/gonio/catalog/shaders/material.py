@@ -75,7 +75,8 @@ class _ShaderFile(BSDF):
         factor = 1.0 if self.program.adapter.cosine else ops.abs(wi.z)
         above = self._above(wo, wi)
         color = self.program.color(self._run("eval", wo, light=wi))
-        return ops.vec3(*[where(above, channel * factor, 0.0) for channel in color])
+        channels = [where(above, channel * factor, 0.0) for channel in color]
+        return ops.vec3(*channels)  # type: ignore[return-value]  # three numbers in every variant
 
 
 class _SampledShaderFile(_ShaderFile):
@@ -123,9 +124,9 @@ def _is_isotropic(material: _ShaderFile) -> bool:
 
     def values(by: Any) -> Any:
         c, s = np.cos(by), np.sin(by)
-        turned = [np.stack([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]) for v in (wo, wi)]
+        rotated = [np.stack([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]) for v in (wo, wi)]
         every = {name: value[:, None] if np.ndim(value) else value for name, value in given.items()}
-        return np.asarray(graph.evaluate(wo=turned[0], wi=turned[1], **every))
+        return np.asarray(graph.evaluate(wo=rotated[0], wi=rotated[1], **every))
 
     first, second = values(0.0 * turn), values(turn)
     size = np.maximum(np.abs(first), np.abs(second))

@@ -45,23 +45,23 @@ class Program:
     # ------------------------------------------------------------------ parameters
 
     def _declared(self) -> Iterator[Declared]:
-        seen: set[str] = set()
+        names: set[str] = set()
         for name, type in (*self._uniforms(), *self._arguments()):
-            if name in seen:
+            if name in names:
                 continue
-            seen.add(name)
+            names.add(name)
             shape = self.module.shape(type)
             if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
                 yield Declared(name, shape, self.adapter.parameters.get(name, Uniform()))
-        unknown = [name for name in self.adapter.parameters if name not in seen]
+        unknown = [name for name in self.adapter.parameters if name not in names]
         if unknown:
-            known = ", ".join(sorted(seen)) or "none"
+            known = ", ".join(sorted(names)) or "none"
             raise InputError(f"no uniform '{unknown[0]}' in the shader", self.where, f"it has: {known}")
 
     def _uniforms(self) -> Iterator[tuple[str, int]]:
         module = self.module
         for id, one in module.variables.items():
-            storage, inside = module.type(one.type).count, module.type(one.type).parts[0]
+            storage, inside = module.type(one.type).length, module.type(one.type).parts[0]
             if storage not in (0, 2, 9, 12) or len(one.operands) > 1:  # uniform constant, uniform, push, storage
                 continue
             name = module.names.get(id, "")
@@ -114,7 +114,7 @@ class Program:
             value = _GIVEN[meaning](directions)
             kind = self.module.type(type)
             kind = self.module.type(kind.parts[0]) if kind.kind == "pointer" else kind
-            return value[: kind.count] if kind.kind == "vector" and isinstance(value, tuple) else value
+            return value[: kind.length] if kind.kind == "vector" and isinstance(value, tuple) else value
         kind = self.module.type(type)
         if kind.kind == "pointer":
             return self._argument(kind.parts[0], meaning, name, values, directions)
