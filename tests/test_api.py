@@ -37,7 +37,7 @@ TEXT = {"param", "preset", "as_json"}
 CREW = {"workers", "cluster"}  # in a program: with go.cluster(...)
 ONLY_TYPED = {
     "verify": {"at", "github"},
-    "emit": {"output"},
+    "emit": {"output", "check"},  # the pairs of directions for another program's tests are a file
     "fit": {"data", "scene", "spp", "output"},  # the scene is for go.fit_picture
     "capture": {"next_", "output"},  # methods of what is returned
     "compensation": {"model"},

@@ -347,6 +347,11 @@ photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
 assert_type(photographed.material, go.BSDF)
 print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)
 
+judged = go.check("E.png", "schlick-ibl")
+print(judged.passed)
+adopted = go.Shader("metal.glsl", roughness=0.3)
+assert_type(adopted, go.BSDF)
+
 # ---------------------------------------------------------------------- long jobs
 
 again = go.resume("ball.exr.checkpoint", spp=64)
