@@ -27,8 +27,8 @@ TOPICS = {
     "Integrator Law Panel ops",
     "Render and look": "render resume study plot view compare explain info convert",
     "Energy and light": "albedo Albedo bake compensation fresnel indices refractive_index",
-    "Measure and fit": "measure capture fit fit_picture compress",
-    "Shaders and laws": "emit verify",
+    "Measure and fit": "measure capture fit fit_picture compress check",
+    "Shaders and laws": "emit Shader verify",
     "Machines and settings": "cluster Cluster get_precision set_precision",
     "Errors": "GonioError InputError MachineError GonioWarning",
 }

@@ -7,6 +7,8 @@ Not here, since they would end or hang the test's process: `exr_threads` (tests/
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +16,6 @@ import numpy as np
 import pytest
 from gonio.bridge import engine
 from gonio.bridge.faults.black_environment import is_black_environment
-from gonio.bridge.faults.denormal_numbers import denormals_rounded
 from gonio.bridge.faults.interrupted_recording import interruptible
 from gonio.bridge.faults.lost_derivatives import own_variable
 from gonio.bridge.faults.merged_mesh_bbox import compute_boxes
@@ -140,19 +141,27 @@ def test_another_kernel_is_compiled_for_numpys_memory_where_it_is_not_aligned() 
     assert aligned != odd
 
 
-def test_denormal_numbers_depend_on_the_number_of_threads() -> None:
-    def product() -> int:
-        small, smaller = dr.opaque(mi.Float, 1e-30, 16), dr.opaque(mi.Float, 1e-10)
-        return int(np.array(dr.reinterpret_array(mi.UInt32, small * smaller)).max())
+DENORMAL = """
+import drjit as dr, numpy as np
+from gonio.bridge import engine
+from gonio.bridge.faults.denormal_numbers import denormals_rounded
+mi = engine.load()
 
-    before = dr.thread_count()
-    try:
-        dr.set_thread_count(2)
-        assert product() == 0
-        dr.set_thread_count(1)
-        assert product() > 0
-        with denormals_rounded():
-            assert product() == 0
-        assert product() > 0
-    finally:
-        dr.set_thread_count(before)
+def product():
+    small, smaller = dr.opaque(mi.Float, 1e-30, 16), dr.opaque(mi.Float, 1e-10)
+    return int(np.array(dr.reinterpret_array(mi.UInt32, small * smaller)).max())
+
+dr.set_thread_count(2)
+assert product() == 0
+dr.set_thread_count(1)
+assert product() > 0
+with denormals_rounded():
+    assert product() == 0
+assert product() > 0
+"""
+
+
+def test_denormal_numbers_depend_on_the_number_of_threads() -> None:
+    """In a process of its own: what other tests load may change how the main thread rounds."""
+    done = subprocess.run([sys.executable, "-c", DENORMAL], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

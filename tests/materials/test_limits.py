@@ -67,6 +67,7 @@ def layers() -> list[tuple[str, str, str]]:
     return found
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("model", "weight", "parameter"), layers())
 def test_a_layer_of_weight_0_changes_nothing(model: str, weight: str, parameter: str) -> None:
     made = go.model(model)

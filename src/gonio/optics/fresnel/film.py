@@ -62,9 +62,8 @@ def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: 
     """The color of R under daylight, summed over `NODES`."""
     mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
     total = zeros_like(eta)
-    for nm, shares in zip(NODES.tolist(), mixing.tolist(), strict=True):
-        color = of_channels(eta, shares[: len(channels(eta))])
-        total = total + _node(cos_i, eta, k, film_eta, thickness, nm, color)
+    for nm, (red, green, blue) in zip(NODES.tolist(), mixing.tolist(), strict=True):
+        total = total + _node(cos_i, eta, k, film_eta, thickness, nm, red, green, blue)
     # colors out of gamut would be above 1 or below 0
     return clamp(total, 0.0, 1.0)
 
@@ -109,11 +108,19 @@ def _unpolarized(
 
 @function
 def _node(
-    cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar, nm: float, color: Spectrum
+    cos_i: Scalar,
+    eta: Spectrum,
+    k: Spectrum | None,
+    film_eta: Scalar,
+    thickness: Scalar,
+    nm: float,
+    red: float,
+    green: float,
+    blue: float,
 ) -> Spectrum:
-    """The contribution of one wavelength, of a given color, to the color of R."""
+    """The contribution of one wavelength to the color of R."""
     R = _unpolarized(cos_i, _between(channels(eta), nm), _between(channels_of_k(k, eta), nm), film_eta, thickness, nm)
-    return R * color
+    return of_channels(eta, [R * share for share in (red, green, blue)][: len(channels(eta))])
 
 
 def _spectrum_of(film: Film, at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar]) -> Spectrum:

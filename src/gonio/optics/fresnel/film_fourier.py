@@ -50,8 +50,8 @@ def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta:
     if len(etas) != 3:
         luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, *CURVES[1][0])
         return clamp(of_channels(eta, [luminance.mean + luminance.wave]), 0.0, 1.0)
-    wide, (middle,), (narrow,) = CURVES
-    x = _band_of_two(cos_i, etas[0], ks[0], film_eta, thickness, wide)
+    (wide, other), (middle,), (narrow,) = CURVES
+    x = _band_of_two(cos_i, etas[0], ks[0], film_eta, thickness, *wide, *other)
     y = _band(cos_i, etas[1], ks[1], film_eta, thickness, *middle)
     z = _band(cos_i, etas[2], ks[2], film_eta, thickness, *narrow)
     X, Y, Z = (band.wave * white for band, white in zip((x, y, z), WHITE, strict=True))
@@ -84,9 +84,20 @@ def _band(
 
 @function
 def _band_of_two(
-    cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar, fits: Curve
+    cos_i: Scalar,
+    eta: Scalar,
+    k: Scalar | None,
+    film_eta: Scalar,
+    thickness: Scalar,
+    height: float,
+    place: float,
+    variance: float,
+    other_height: float,
+    other_place: float,
+    other_variance: float,
 ) -> Band:
     """Mean of both polarizations for a color-matching function fitted by two Gaussians."""
+    fits = [(height, place, variance), (other_height, other_place, other_variance)]
     return _through(fits, cos_i, eta, k, film_eta, thickness)
 
 
