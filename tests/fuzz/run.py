@@ -143,8 +143,8 @@ def run(targets: Sequence[Target], seed: int, count: int, finds: Path) -> dict[s
             for line in lines:
                 number, _, wrong = line.partition(" ")
                 found.setdefault(wrong, int(number))
-            if reason:
-                found.setdefault(reason, reached)
+            if reason:  # the last input stands for what happens at the end
+                found.setdefault(reason, min(reached, end - 1))
             first = reached + 1
     for number in found.values():
         target = targets[number // count]
