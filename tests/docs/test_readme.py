@@ -25,7 +25,7 @@ from gonio.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 FENCED = re.compile(r"^```(\w+) ?([\w.]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-INLINE = re.compile(r"`((?:\. |gonio )[^`]+)`")
+INLINE = re.compile(r"`((?:\. \.venv/|gonio )[^`]+)`")
 FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)*/?\.(?:png|exr|hdr|json|binary|bsdf|gonio|py|checkpoint)|examples/[\w/.-]+")
 ACTIVATE = ". .venv/bin/activate"
 # what `make demo` does not install: the extras of pyproject.toml
