@@ -120,6 +120,20 @@ def test_shader_survives_pickles_json_and_scenes(tmp_path: Path) -> None:
     assert pickle.loads(pickle.dumps(part)).instance() == material
 
 
+def test_a_spectral_picture_of_a_shader_says_why_not(tmp_path: Path, scene: Path) -> None:
+    (scene / "matte.glsl").write_text(
+        "#version 330\nuniform float albedo;\nvec3 brdf(vec3 L, vec3 V, vec3 N) { return vec3(albedo / 3.14159265); }\n"
+    )
+    described = json.loads((scene / "scene.json").read_text())
+    described["scene"]["shapes"][0]["material"] = {"type": "shader", "file": "matte.glsl", "albedo": 0.5}
+    (scene / "scene.json").write_text(json.dumps(described))
+    assert np.asarray(go.render(scene)).max() > 0.1
+    with pytest.raises(go.InputError, match="knows red, green and blue only") as refused:
+        go.render(scene, spectral=True)
+    assert refused.value.hint == "render in an RGB variant, such as llvm_ad_rgb"
+    assert str(refused.value.where).endswith("/shapes/0/material")
+
+
 def test_scene_takes_a_shader_from_its_folder_only(tmp_path: Path) -> None:
     from gonio.scene.materials import Material
     from pydantic import TypeAdapter, ValidationError

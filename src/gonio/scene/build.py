@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
@@ -27,6 +28,9 @@ from .values import BumpMap, ImageTexture, NormalMap
 
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
+
+# The InputError of a material's plugin, whose text ends the traceback that Mitsuba hands on: its what and its hint.
+_RAISED = re.compile(r"\nInputError: [^\n]*?: ([^\n]+)\n  hint: ([^\n]+)\Z")
 
 MERGE_FROM = 64  # number of materials of equal structure from which on they are merged into one BSDF
 
@@ -111,8 +115,11 @@ class _Builder:
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
         except RuntimeError as error:
+            text = str(error).strip()
+            if raised := _RAISED.search(text):
+                raise InputError(raised[1], self.description.where(where), raised[2]) from None
             raise InputError(
-                f"Mitsuba refuses it: {str(error).strip().splitlines()[-1][:200]}",
+                f"Mitsuba refuses it: {text.splitlines()[-1][:200]}",
                 self.description.where(where),
                 "simplify this part, and report it if it should work",
             ) from error
