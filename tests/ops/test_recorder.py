@@ -180,3 +180,31 @@ def test_values_in_tuples_and_dicts_are_named_by_their_place() -> None:
 
     names = {node.name for node in record(program, a="float").entry.nodes}
     assert {"found.bend", "found.pair.0", "found.pair.1"} <= names
+
+
+def test_values_added_to_a_list_later_are_named() -> None:
+    def program(a: Any) -> Any:
+        lobes: list[Any] = []
+        for scale in (2.0, 3.0):
+            lobes.append(a * scale)
+        return lobes[0] + lobes[1]
+
+    names = {node.name for node in record(program, a="float").entry.nodes}
+    assert {"lobes.0", "lobes.1"} <= names
+
+
+def test_the_first_name_of_a_value_stays() -> None:
+    def program(a: Any) -> Any:
+        first = a * 2.0
+        second = first
+        third = first + 1.0
+        return third + second
+
+    names = {node.name for node in record(program, a="float").entry.nodes}
+    assert "first" in names and "second" not in names
+
+
+def test_a_vector_of_constants_multiplies_numbers_of_any_count() -> None:
+    graph = record(lambda x: ops.vec3(1.0, 2.0, 3.0) * x, x="float")
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_array_equal(graph.evaluate(x=x), np.outer([1.0, 2.0, 3.0], x))
