@@ -57,6 +57,9 @@ CASES = {
     "float f(float x) { mat3 m = mat3(2.0, x, 0.0, 0.0, 1.0, x, x, 0.0, 3.0); return determinant(inverse(m)) + (m * vec3(x, 1.0, 2.0)).y; }": (  # noqa: E501
         lambda x: 1 / (6 + x**3) + x * x + 1
     ),
+    "float f(float x) { mat3 m = mat3(2.0, x, 1.0, 0.5, 1.0, x, x, 0.3, 3.0); return 1.0 + (inverse(m) * (m * vec3(x, 1.0, 2.0))).x; }": (  # noqa: E501
+        lambda x: 1 + x
+    ),
     "float scale = 2.0; float f(float x) { switch (int(3.0 * x)) { case 0: return scale; case 1: scale = x; break; default: scale = 5.0; } return scale; }": (  # noqa: E501
         lambda x: np.select([x < 1 / 3, x < 2 / 3], [2.0 + 0 * x, x], 5.0)
     ),
