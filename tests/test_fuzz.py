@@ -21,7 +21,7 @@ def test_what_was_found_and_a_few_spoilt_inputs_more_are_survived(tmp_path: Path
 
 
 # The seeds of checkpoints are rendered with `denoise=True`. Under glibc's checks of memory, a process that has rendered
-# and then denoised with guides aborts at its end in one of twelve runs ("free(): invalid next size"), without any spoilt
+# and then denoised with guides aborts at its end in one of twelve runs ("free(): invalid next size"), without spoilt
 # input; either alone does not in fifty. `make test-all` shows it until its cause is known.
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n == "checkpoint" else ()) for n in RENDERING]
