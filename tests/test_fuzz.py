@@ -20,12 +20,7 @@ def test_what_was_found_and_a_few_spoilt_inputs_more_are_survived(tmp_path: Path
     assert run.run(targets, seed=7, count=known + FEW, finds=tmp_path) == {}
 
 
-# The seeds of checkpoints are rendered with `denoise=True`. Under glibc's checks of memory, a process that has rendered
-# and then denoised with guides aborts at its end in one of twelve runs ("free(): invalid next size"), without spoilt
-# input; either alone does not in fifty. `make test-all` shows it until its cause is known.
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "checkpoint" else ()) for n in RENDERING]
-)
+@pytest.mark.parametrize("name", RENDERING)
 def test_readers_that_load_scenes_survive_in_a_process_each(name: str, tmp_path: Path) -> None:
     assert run.run([TARGETS[name]], seed=7, count=len(run.corpus(TARGETS[name])) + FEW, finds=tmp_path) == {}
 
