@@ -118,12 +118,19 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+CALL = re.compile(
+    r'(openat2?|open|execve)\((?:AT_FDCWD<[^>]*>, |\d+<([^>]*)>, )?"((?:[^"\\]|\\.)*)".*?(?:= \d+<([^>]*)>)?$'
+)
+
+
 def asked(trace: Path, folder: Path) -> Iterator[Path]:
-    """Every file that was opened or run, or looked for in vain."""
+    """Every file that was opened or run, or looked for in vain; where a link led, too."""
     for line in trace.read_text(errors="replace").splitlines():
-        call = re.search(r'(openat2?|open|execve)\((?:AT_FDCWD<[^>]*>, |\d+<([^>]*)>, )?"((?:[^"\\]|\\.)*)"', line)
+        call = CALL.search(line)
         if call is not None:
             yield Path(os.path.normpath(os.path.join(call[2] or folder, call[3])))
+            if call[4]:
+                yield Path(call[4])
 
 
 def trusted() -> list[Path]:
@@ -160,3 +167,34 @@ def test_only_what_was_given_is_opened(name: str, place: Path) -> None:
     }
     assert wrong == set()
     assert not (place / "ran").exists(), (place / "ran").read_text()
+
+
+@pytest.mark.slow
+def test_hostile_scenes_open_nothing_outside_their_folder(tmp_path: Path) -> None:
+    import hostile_scenes
+
+    hostile_scenes.outside(tmp_path / "outside")
+    for name in ("here", "home"):
+        shutil.copytree(tmp_path / "outside", tmp_path / name)
+    for name in ("tmp", "cache"):
+        (tmp_path / name).mkdir()
+    places = {"TMPDIR": "tmp", "GONIO_CACHE": "cache", "HOME": "home"}
+    own = {**os.environ, **{variable: str(tmp_path / name) for variable, name in places.items()}}
+    command = [*TRACE, "-o", str(tmp_path / "trace"), sys.executable, hostile_scenes.__file__, str(tmp_path)]
+    done = subprocess.run(command, cwd=tmp_path / "here", env=own, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    names = [name for name, *_ in hostile_scenes.scenes(tmp_path)]
+    assert len(done.stdout.splitlines()) == len(names) > 300
+    ours = [Path(gonio.__file__).parents[1], Path(__file__).parent]  # Python lists the folders that it imports from
+    allowed = [
+        *trusted(),
+        *ours,
+        *(tmp_path / name for name in ("scene", "tmp", "cache", "home/.drjit", "home/.cache")),
+    ]
+    scene, wrong = "imports", set()
+    for path in asked(tmp_path / "trace", tmp_path / "here"):
+        if path.is_relative_to(hostile_scenes.MARK):
+            scene = names[int(path.name)] if path.name != "end" else "the end"
+        elif scene != "imports" and not any(path.is_relative_to(root) for root in allowed):
+            wrong.add((scene, str(path)))
+    assert wrong == set()
