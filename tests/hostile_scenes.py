@@ -6,6 +6,7 @@ traces the process can tell the scenes apart.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -61,7 +62,8 @@ def outside(folder: Path) -> None:
     go.measure("lambert", output=folder / "a.gonio")
     files: dict[str, str | bytes] = {
         "a.obj": SQUARE, "a.ply": PLY, "a.png": png(), "a.xml": '<scene version="3.0.0"/>', "a.glsl": GLSL % "",
-        "a.mtlx": MTLX % ("", "a.png"), "a.mtl": "newmtl m\nmap_Kd a.png\n", "a.bin": bytes(36), "a.spd": "400 1\n700 1\n",
+        "a.mtlx": MTLX % ("", "a.png"), "a.mtl": "newmtl m\nmap_Kd a.png\n", "a.bin": bytes(36),
+        "a.spd": "400 1\n700 1\n",
         "a.toml": 'function = "BRDF"\n', "a.json": '{"type": "lambert"}', "a.py": "raise SystemExit\n",
         "a.gltf": json.dumps({"asset": {"version": "2.0"}, "materials": [{"name": "m"}]}),
     }  # fmt: skip
@@ -92,7 +94,7 @@ def gltf(**parts: Any) -> str:
 
 
 def forms() -> dict[str, tuple[str, dict[str, str]]]:
-    """By name: the ending of the file that is asked for, and the scene's files, in which @ stands for its path, ^ for its folder."""
+    """By name: the ending of the file that is asked for, and the scene's files; @ stands for its path, ^ for its folder."""
     shader, beside = lab({"type": "shader", "file": "my.glsl"}), {"my.glsl": GLSL % ""}
     documents = {kind: lab({"type": kind, "file": "m." + kind, "material": "m"}) for kind in ("gltf", "materialx")}
     pictures = {"images": [{"uri": "@"}], "textures": [{"source": 0}]}
@@ -182,22 +184,21 @@ def place(root: Path, files: dict[str, str], path: str, ending: str) -> Path:
     return folder / next(iter(files))
 
 
+def mark(name: str) -> None:
+    with contextlib.suppress(OSError):
+        open(MARK + name).close()
+
+
 def main(root: Path) -> None:
     for number, (_, files, path, ending) in enumerate(scenes(root)):
         scene = place(root, files, path, ending)
-        try:
-            open(f"{MARK}{number}").close()
-        except OSError:
-            pass
+        mark(str(number))
         try:
             go.render(scene, spp=1, size=(4, 4))
             print(number, "rendered", flush=True)
         except go.GonioError as error:
             print(number, "refused", f"{error.where}: {error.what}".replace("\n", " "), flush=True)
-    try:
-        open(f"{MARK}end").close()
-    except OSError:
-        pass
+    mark("end")
 
 
 if __name__ == "__main__":
