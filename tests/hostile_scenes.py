@@ -94,7 +94,7 @@ def gltf(**parts: Any) -> str:
 
 
 def forms() -> dict[str, tuple[str, dict[str, str]]]:
-    """By name: the ending of the file that is asked for, and the scene's files; @ stands for its path, ^ for its folder."""
+    """By name: the ending of the file that is asked for, and the files; @ stands for its path, ^ for its folder."""
     shader, beside = lab({"type": "shader", "file": "my.glsl"}), {"my.glsl": GLSL % ""}
     documents = {kind: lab({"type": kind, "file": "m." + kind, "material": "m"}) for kind in ("gltf", "materialx")}
     pictures = {"images": [{"uri": "@"}], "textures": [{"source": 0}]}
