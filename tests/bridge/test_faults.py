@@ -1,15 +1,15 @@
 """Canaries: each test fails once a fault of Mitsuba or Dr.Jit is fixed, and its file in `bridge/faults` can go.
 
-Not here, since they would end or hang the test's process: `exr_threads` (tests/test_one_cpu.py has the workaround),
-`missing_texture`; `shape_order`, which is left to chance; `bent_normals`, a call that BSDFs do not have;
-`kernel_array_order`, of which no short reproduction is known.
+Faults that end or hang a process have one of their own. Of `kernel_array_order` no short reproduction is known.
 """
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -165,3 +165,46 @@ def test_denormal_numbers_depend_on_the_number_of_threads() -> None:
     """In a process of its own: what other tests load may change how the main thread rounds."""
     done = subprocess.run([sys.executable, "-c", DENORMAL], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def ended(program: str, seconds: float) -> int | None:
+    """The exit code of a Python program with Mitsuba as `mi`; None if it does not end in time."""
+    text = f"from gonio.bridge import engine\nmi = engine.load()\n{program}"
+    try:
+        return subprocess.run([sys.executable, "-c", text], capture_output=True, timeout=seconds).returncode
+    except subprocess.TimeoutExpired:
+        return None
+
+
+def test_asking_for_a_missing_emissive_texture_ends_the_process() -> None:
+    assert ended("mi.Properties('x').get_emissive_texture('radiance')", 60) == -signal.SIGSEGV
+
+
+@pytest.mark.slow
+def test_an_exr_picture_is_never_read_by_one_thread(tmp_path: Path) -> None:
+    file = tmp_path / "a.exr"
+    mi.Bitmap(np.zeros((4, 4, 3), np.float32)).write(str(file))
+    read = f"import drjit as dr\ndr.set_thread_count(%d)\nmi.Bitmap({str(file)!r})"
+    assert ended(read % 2, 60) == 0
+    assert ended(read % 1, 20) is None
+
+
+MERGED = """\
+mesh = lambda k: {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([k % 3, 0, 0])}
+kinds = {f"m{k}": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.1 * k}} for k in range(9)}
+parts = {f"s{k}": {**mesh(k), "bsdf": {"type": "ref", "id": f"m{k // 3}"}} for k in range(27)}
+scene = mi.load_dict({"type": "scene", **kinds, "all": {"type": "merge", **parts}})
+print([str(shape.bsdf().id()) for shape in scene.shapes()])
+"""
+
+
+@pytest.mark.slow
+def test_merged_meshes_come_in_any_order() -> None:
+    program = f"from gonio.bridge import engine\nmi = engine.load()\n{MERGED}"
+    orders = {subprocess.check_output([sys.executable, "-c", program]) for _ in range(8)}
+    assert len(orders) > 1
+
+
+def test_no_method_returns_the_frame_of_a_bump_map() -> None:
+    bumps = mi.load_dict({"type": "bumpmap", "texture": {"type": "checkerboard"}, "bsdf": {"type": "diffuse"}})
+    assert [name for name in dir(bumps) if "frame" in name or "normal" in name] == []
