@@ -1,6 +1,8 @@
 # `make demo` renders the shading balls, `make test` passes the tests; both make what they need in .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
+# the suite starts hundreds of processes, each of which would compile every module again
+unexport PYTHONDONTWRITEBYTECODE
 
 # `tests` is also a folder
 .PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel

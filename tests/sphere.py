@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import roots_legendre
 
 SEED = 20130731  # the one seed of the suite
 
@@ -39,7 +40,7 @@ def hemisphere(n_mu: int, n_phi: int) -> tuple[np.ndarray, np.ndarray]:
     Gauss-Legendre in the angle theta, so that directions gather at the pole and at the horizon, and equal steps in
     azimuth, exact for every trigonometric polynomial below n_phi.
     """
-    x, w = np.polynomial.legendre.leggauss(n_mu)
+    x, w = roots_legendre(n_mu)  # NumPy's rule takes seconds for a thousand nodes
     theta = 0.25 * np.pi * (x + 1.0)
     weights = 0.25 * np.pi * w * np.sin(theta)
     phi = 2.0 * np.pi * (np.arange(n_phi) + 0.5) / n_phi

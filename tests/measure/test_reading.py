@@ -6,6 +6,7 @@ import io
 import pickle
 import struct
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import gonio as go
@@ -192,11 +193,18 @@ def claiming(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
 
 
 @pytest.mark.parametrize(
-    "data", [bomb(), claiming((2**60,)), claiming((-8,)), claiming((8,), "|O"), claiming((8,), "<f8,<f8")]
+    "archive",
+    [
+        bomb,
+        lambda: claiming((2**60,)),
+        lambda: claiming((-8,)),
+        lambda: claiming((8,), "|O"),
+        lambda: claiming((8,), "<f8,<f8"),
+    ],
 )
-def test_no_claim_of_an_archive_is_believed(data: bytes, tmp_path: Path) -> None:
+def test_no_claim_of_an_archive_is_believed(archive: Callable[[], bytes], tmp_path: Path) -> None:
     path = tmp_path / "a.gonio"
-    path.write_bytes(data)
+    path.write_bytes(archive())
     with pytest.raises(InputError, match=r"a\.gonio"):
         read(path)
 
