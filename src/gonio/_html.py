@@ -1,7 +1,8 @@
-"""Tables for notebooks."""
+"""Markup: tables for notebooks, ids of drawings."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from html import escape
 
@@ -12,3 +13,12 @@ def table(rows: Iterable[Iterable[object]], headings: Iterable[str] = (), title:
     lines = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows]
     body = "".join(f"<tr>{line}</tr>" for line in [*([head] if head else []), *lines])
     return (f"<b>{escape(title)}</b>" if title else "") + f"<table>{body}</table>"
+
+
+_ID = re.compile(r'(id="|url\(#|href="#)([A-Za-z]+[0-9a-f]{10})(?=["\)])')
+
+
+def numbered_ids(svg: str) -> str:
+    """Matplotlib's SVG with its ids numbered in order of appearance: its own follow from addresses in memory."""
+    numbers: dict[str, int] = {}
+    return _ID.sub(lambda found: f"{found[1]}i{numbers.setdefault(found[2], len(numbers))}", svg)

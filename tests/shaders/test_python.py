@@ -21,7 +21,14 @@ import materials
 ROUNDING = np.finfo(float).eps
 COUNT = 2000
 # one of each kind of formula: tables, selections, spectra, delta lobes, the error function, angles
-SOME = ["oren-nayar", "mix-with-mirror", "kulla-conty-turned", "shifted-gamma", "glass-turned"]
+SOME = [
+    "oren-nayar",
+    "mix-with-mirror",
+    "kulla-conty",
+    pytest.param("kulla-conty-turned", marks=pytest.mark.slow),
+    "shifted-gamma",
+    "glass-turned",
+]
 
 
 def _loaded(text: str) -> Any:

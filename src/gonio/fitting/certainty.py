@@ -95,7 +95,7 @@ def certainty(hessian: Floats, scores: Floats) -> Certainty:
     scale = np.sqrt(np.diag(hessian))
     s = np.where(scale > 0.0, scale, 1.0)
     inverse = np.linalg.pinv(hessian / np.outer(s, s), rcond=NULL) / np.outer(s, s)
-    matrix = inverse @ (scores.T @ scores) @ inverse
+    matrix = inverse @ np.einsum("ni,nj->ij", scores, scores) @ inverse
     undetermined = groups_of(null_space(hessian))
     for number in [one for group in undetermined for one in group]:
         matrix[number, :] = matrix[:, number] = 0.0

@@ -22,7 +22,7 @@ from .data import Data
 from .parameters import CHANNELS, Free, ranges, start_of, with_drjit
 
 Array = backend.Array
-BLOCK = 1 << 16  # rows that BLAS sums in float32 at a time
+BLOCK = 1 << 13  # rows that BLAS sums at a time; it shares more among its threads, whose number changes the last bits
 SMALL = 1e-3  # of the largest value: "log" and "relative" are absolute below, relative above
 NEAR = 0.1  # relative difference under which a series is more accurate than the logarithm in float32
 

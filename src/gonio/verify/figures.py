@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._html import numbered_ids
 from . import cells
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def _svg(figure: Figure) -> str:
     out = io.StringIO()
     figure.savefig(out, format="svg", dpi=110, metadata={"Date": None})
     text = out.getvalue()
-    return text[text.index("<svg") :]
+    return numbered_ids(text[text.index("<svg") :])
 
 
 def _label(axis: Axes, x: str, y: str, title: str = "") -> None:

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from .. import files
+from .._html import numbered_ids
 from ..errors import InputError, did_you_mean, encodable
 
 if TYPE_CHECKING:
@@ -71,24 +72,25 @@ class Drawing:
     def save(self, path: str | Path) -> Drawing:
         """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
         suffix = _suffix(Path(path))
-        return replace(self, path=files.write_whole(path, lambda part: self._fill(part, suffix[1:])))
+        return replace(self, path=files.write_whole(path, self._file(suffix[1:])))
 
     def _repr_png_(self) -> bytes:
-        stream = io.BytesIO()
-        self._fill(stream, "png")
-        return stream.getvalue()
+        return self._file("png")
 
-    def _fill(self, file: Path | BinaryIO, kind: str) -> None:
+    def _file(self, kind: str) -> bytes:
+        """The figure in a format, the same bytes each time."""
         matplotlib = load_matplotlib()
         from matplotlib.text import Text
 
         for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse
             text.set_text(encodable(text.get_text()))
-        name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
+        name = "Subject" if kind == "pdf" else "Description"
+        no_date = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
+        stream = io.BytesIO()
         with matplotlib.rc_context(STYLE):
-            self.figure.savefig(
-                file, format=kind, dpi=self.dpi, metadata={name: encodable(self.about)}, facecolor="white"
-            )
+            metadata = {name: encodable(self.about), **no_date}
+            self.figure.savefig(stream, format=kind, dpi=self.dpi, metadata=metadata, facecolor="white")
+        return numbered_ids(stream.getvalue().decode()).encode() if kind == "svg" else stream.getvalue()
 
 
 def check_output(path: Path) -> Path:
