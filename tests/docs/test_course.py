@@ -1,0 +1,115 @@
+"""The course: every page has its parts, its commands and programs run in the order in which they stand there, and the
+Chinese page shows the same formulas, listings and pictures as the English one."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from gonio import cli
+
+ROOT = Path(__file__).parents[2]
+COURSE = ROOT / "docs" / "course"
+ENGLISH = sorted(page for page in COURSE.glob("*.md") if not page.name.endswith(".zh.md"))
+PAGES = [page for page in ENGLISH if page.stem != "README"]
+PARTS = {
+    ".md": ("**Question.**", "## Derivation", "## Run it", "![", "**See.**", "## Check your own"),
+    ".zh.md": ("**问题。**", "## 推导", "## 运行", "![", "**看点。**", "## 检查自己的结果"),
+}
+STEP = re.compile(r"^```python ([\w.]+)\n(.*?)^```$|^    (gonio [^\n]*)$", re.DOTALL | re.MULTILINE)
+EXIT = re.compile(r"#.*exit code (\d)")
+# verbs that trace rays or integrate for seconds; the others take about one
+LONG = re.compile(r"^    gonio (render|study|verify|measure|fit|convert|view|compensation|emit)\b", re.MULTILINE)
+SHARED = re.compile(
+    r"^```.*?^```$|^    \S[^\n]*$|\$\$.*?\$\$|(?<=\]\()[^)\s]+\.(?:svg|png|jpg|csv)(?=\))", re.DOTALL | re.MULTILINE
+)
+
+
+def chinese(page: Path) -> Path:
+    return page.with_suffix(".zh.md")
+
+
+def cheap(command: str) -> list[str]:
+    """The words of a command after `gonio`, at a size that is enough to see that it runs."""
+    words = [word for word in shlex.split(command, comments=True)[1:] if word != "--denoise"]
+    for option, values in {"--spp": ("render", "study"), "--size": ("render", "study")}.items():
+        if words[0] in values:
+            if option in words:
+                del words[words.index(option) : words.index(option) + 2]
+            words += [option, "2" if option == "--spp" else "48x32"]
+    if words[0] == "view" and "--export" not in words:
+        words += ["--export", "page.html"]
+    if words[0] == "measure" and "--samples" not in words:
+        words += ["--samples", "20000"]
+    return words
+
+
+def _cases() -> Iterator[object]:
+    for page in PAGES:
+        slow = LONG.search(page.read_text(encoding="utf-8"))
+        yield pytest.param(page, id=page.stem, marks=[pytest.mark.slow] if slow else [])
+
+
+@pytest.mark.parametrize("page", list(_cases()))
+def test_commands_and_programs_run_in_their_order(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for folder in ("examples", "docs"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.chdir(tmp_path)
+    for name, program, command in STEP.findall(page.read_text(encoding="utf-8")):
+        if program:
+            Path(name).write_text(program, encoding="utf-8")
+            exec(compile(program, name, "exec"), {"__name__": name.removesuffix(".py")})
+            continue
+        expected = EXIT.search(command)
+        code = cli.run(cheap(command))
+        told = capsys.readouterr()
+        assert code == int(expected[1] if expected else 0), f"{command}\n{told.out}{told.err}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("language", PARTS)
+def test_a_task_has_its_parts(page: Path, language: str) -> None:
+    text = page.with_suffix(language).read_text(encoding="utf-8")
+    assert [part for part in PARTS[language] if part not in text] == []
+
+
+@pytest.mark.parametrize("page", ENGLISH, ids=lambda page: page.stem)
+def test_both_languages_show_the_same(page: Path) -> None:
+    """Formulas, listings, pictures and tables of values; only prose is translated."""
+    shown = [
+        [re.sub(r"\s+#.*", "", part) for part in SHARED.findall(one.read_text(encoding="utf-8"))]
+        for one in (page, chinese(page))
+    ]
+    assert shown[0] == shown[1]
+
+
+@pytest.mark.parametrize("page", ENGLISH, ids=lambda page: page.stem)
+def test_chinese_pages_link_to_chinese_pages(page: Path) -> None:
+    links = re.findall(r"\]\(([\w-]+)\.md\)", chinese(page).read_text(encoding="utf-8"))
+    assert [link for link in links if chinese(COURSE / f"{link}.md").exists() and link != page.stem] == []
+
+
+@pytest.mark.parametrize("name", ["README.md", "README.zh.md"])
+def test_the_overview_lists_every_page(name: str) -> None:
+    text = (COURSE / name).read_text(encoding="utf-8")
+    suffix = name.removeprefix("README")
+    assert [page.stem for page in PAGES if f"({page.stem}{suffix})" not in text] == []
+
+
+def test_every_picture_is_shown() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in ENGLISH)
+    assert [path.name for path in (COURSE / "pictures").iterdir() if f"pictures/{path.name}" not in text] == []
+
+
+def test_reference_values_are_those_of_the_code() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs/make_course_values.py", "--check"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
