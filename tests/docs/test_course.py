@@ -7,7 +7,6 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +24,7 @@ PARTS = {
 }
 STEP = re.compile(r"^```python ([\w.]+)\n(.*?)^```$|^    (gonio [^\n]*)$", re.DOTALL | re.MULTILINE)
 EXIT = re.compile(r"#.*exit code (\d)")
-# verbs that trace rays or integrate for seconds; the others take about one
-LONG = re.compile(r"^    gonio (render|study|verify|measure|fit|convert|view|compensation|emit)\b", re.MULTILINE)
+READ_COMMANDS_FILES = {"l17-storing"}  # pages with a program that reads what a command above it has written
 SHARED = re.compile(
     r"^```.*?^```$|^    \S[^\n]*$|\$\$.*?\$\$|(?<=\]\()[^)\s]+\.(?:svg|png|jpg|csv)(?=\))", re.DOTALL | re.MULTILINE
 )
@@ -51,28 +49,42 @@ def cheap(command: str) -> list[str]:
     return words
 
 
-def _cases() -> Iterator[object]:
-    for page in PAGES:
-        slow = LONG.search(page.read_text(encoding="utf-8"))
-        yield pytest.param(page, id=page.stem, marks=[pytest.mark.slow] if slow else [])
-
-
-@pytest.mark.parametrize("page", list(_cases()))
-def test_commands_and_programs_run_in_their_order(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for folder in ("examples", "docs"):
-        (tmp_path / folder).symlink_to(ROOT / folder)
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, in which the repository's pages and scenes are found."""
+    for name in ("examples", "docs"):
+        (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _run(name: str, program: str) -> None:
+    Path(name).write_text(program, encoding="utf-8")
+    exec(compile(program, name, "exec"), {"__name__": name.removesuffix(".py")})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_and_programs_run_in_their_order(page: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, program, command in STEP.findall(page.read_text(encoding="utf-8")):
         if program:
-            Path(name).write_text(program, encoding="utf-8")
-            exec(compile(program, name, "exec"), {"__name__": name.removesuffix(".py")})
+            _run(name, program)
             continue
         expected = EXIT.search(command)
         code = cli.run(cheap(command))
         told = capsys.readouterr()
         assert code == int(expected[1] if expected else 0), f"{command}\n{told.out}{told.err}"
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.stem not in READ_COMMANDS_FILES], ids=lambda page: page.stem
+)
+def test_programs_run(page: Path, folder: Path) -> None:
+    programs = [(name, text) for name, text, _ in STEP.findall(page.read_text(encoding="utf-8")) if text]
+    assert programs
+    for name, program in programs:
+        _run(name, program)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
