@@ -74,6 +74,7 @@ def test_commands_and_programs_run_in_their_order(page: Path, folder: Path, caps
         code = cli.run(cheap(command))
         told = capsys.readouterr()
         assert code == int(expected[1] if expected else 0), f"{command}\n{told.out}{told.err}"
+        assert "Error in " not in told.out  # a verdict, not a program that fails
 
 
 @pytest.mark.sample(6)
