@@ -1,4 +1,4 @@
-"""Listings of the pages: every command has its verb and its options, and the programs of the course run."""
+"""Listings of the pages: every command has its verb and its options."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from gonio.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs/course").glob("*.md"), *(ROOT / "examples").glob("*/README.md")]
-COURSE = sorted((ROOT / "docs/course").glob("*.md"))
-PROGRAM = re.compile(r"^```python [\w.]+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 def commands(page: Path) -> Iterator[list[str]]:
@@ -38,14 +36,3 @@ def test_every_command_has_its_verb_and_its_options(page: Path) -> None:
                 command.make_context(name, rest, parent=context)
             except click.ClickException as error:
                 pytest.fail(f"{page.name}: gonio {' '.join(words)}: {error.format_message()}")
-
-
-@pytest.mark.parametrize("page", [page for page in COURSE if page.stem != "README"], ids=lambda page: page.stem)
-def test_a_task_has_its_parts_and_its_program_runs(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    for part in ("**Question.**", "## Derivation", "## Run it", "![", "**See.**", "## Check your own"):
-        assert part in text, f"{page.name}: {part}"
-    programs = PROGRAM.findall(text)
-    assert programs
-    for program in programs:
-        exec(compile(program, str(page), "exec"), {})

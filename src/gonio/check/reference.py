@@ -34,6 +34,7 @@ MODELS = {
     "conductor-ggx": f"conductor({_SILVER},ndf=ggx)",
     "dielectric-beckmann": f"dielectric({_GLASS},ndf=beckmann)",
     "dielectric-ggx": f"dielectric({_GLASS},ndf=ggx)",
+    "pbr-material": "conductor(preset=Ag,alpha=0.25,fresnel=schlick,masking=schlick-direct)",
     "kulla-conty": f"kulla-conty(base=conductor({_SILVER},ndf=ggx),color=sheet)",
 }
 TABLES = {"text": "schlick-direct", "figure": "schlick-ibl"}
