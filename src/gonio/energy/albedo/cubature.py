@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ...ops import Direction, Scalar, backend
-from .cells import Nodes, Seen, product, rim, step_aside
+from .cells import Nodes, Seen, product, rimmed, step_aside
 
 ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
@@ -28,7 +28,7 @@ UNSEEN = 0.01  # below this fraction of the integral implied by the samples, a c
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
-_GAUSS, _FEWER, _RIM = product(ORDER), product(ORDER - 1), rim(1e-3)
+_GAUSS, _RIMMED = product(ORDER), rimmed(1e-3)
 
 Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
 # (wo, u) of rows (N, 3) -> a Sample of arrays: determines where cells are divided first
@@ -89,12 +89,13 @@ def integrate(
     allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
         fine_cells = cells.quarters()
-        inner, other, rim = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
+        inner, other = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _RIMMED))
         fine = inner.integral.reshape(-1, 4, channels)
         difference = np.abs(coarse - fine.sum(1))
-        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them
+        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
+        # and if it is near their rim all of Gauss's
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
-        difference += 0.02 * step_aside(inner, rim).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
+        difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
         divide = difference.max(1) > allowed
         # the tail of a narrow lobe in a cell wider than the lobe: it contains samples, but every node is 0
         level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)

@@ -283,7 +283,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Declared facts agree with the results: `transmits`, `two_sided`, `delta`, and the eta of samples."""
+    """Declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, and the eta of samples."""
     model = subject.model
     # all pairs of sides, even those without declared values
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))
@@ -297,16 +297,16 @@ def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> s
         if np.any(bright & across) or np.any(lit & sampled_across):
             return "light is transmitted, and `transmits` says that none is"
         below = np.any(bright & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
-        declared = bool(getattr(model, "two_sided", True))
-        if below and not declared and subject.best == "float64":
-            return "it reflects light from below, and neither `transmits` nor `two_sided` says so"
-        if declared and subject.best == "float64" and 1 in subject.sides:
+        same, other = bool(getattr(model, "two_sided", True)), bool(getattr(model, "back_differs", False))
+        if below and not (same or other) and subject.best == "float64":
+            return "it reflects light from below, and none of `transmits`, `two_sided` and `back_differs` says so"
+        if same and not other and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
             over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
-                return "`two_sided` says that both sides are the same, and their values differ"
+                return "`two_sided` says that both sides are the same, and their values differ: `back_differs`?"
     fact = getattr(model, "delta", "maybe")
     if fact == "never" and np.any(lit & drawn.delta):
         return 'it has delta samples, and `delta` says "never"'
