@@ -12,9 +12,9 @@ from pathlib import Path
 
 from .. import files
 from .report import Report
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
 
-CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", KNOWN: "declared", NOT_APPLICABLE: "none"}
+CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", KNOWN: "declared", TOLERATED: "declared", NOT_APPLICABLE: "none"}
 
 STYLE = """
 :root { --ink: #1d2530; --soft: #5c6876; --paper: #fbfaf7; --card: #fff; --line: #e4e1da; --accent: #2b5d8a;
@@ -133,7 +133,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.worst:
         rows.append(("worst case", html.escape(v.worst)))
     rows.append(("reproduce", f"<pre>{html.escape(v.command)}</pre>"))
-    if v.failed or v.status in (DECLARED, KNOWN):
+    if v.failed or v.excused or v.status == DECLARED:
         rows.append(
             ("in a picture", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning))
         )

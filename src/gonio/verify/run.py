@@ -49,6 +49,7 @@ def verify(
     sarif: str | Path | None = None,
     baseline: str | Path | None = None,
     write_baseline: str | Path | None = None,
+    tolerate: str = "",
     progress: Callable[[int, int, str], None] | None = None,
     isolated: bool | None = None,
     workers: int = 1,
@@ -68,6 +69,7 @@ def verify(
     output    folder for report.html and report.json; None writes nothing
     junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
+    tolerate  "invisible", "small" or "visible": failures of that grade and below do not fail the report
     progress  called with the steps done, all steps, and the name of the next
     isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
     workers   such processes at a time; the report is the same
@@ -80,7 +82,7 @@ def verify(
     if seed < 0:
         raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
     effort = _effort(quick, deep)
-    outputs = Outputs(output, junit, sarif, baseline, write_baseline)
+    outputs = Outputs(output, junit, sarif, baseline, write_baseline, tolerate)
     known = outputs.check()
     names = None if law is None else [law] if isinstance(law, str) else list(law)
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]

@@ -9,7 +9,7 @@ import numpy as np
 from . import directions
 from .forensics import diagnosis
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,6 +19,7 @@ MARKS = {
     FAIL: "[bold red]FAIL[/]",
     DECLARED: "[yellow]breaks as declared[/]",
     KNOWN: "[yellow]fails, known[/]",
+    TOLERATED: "[yellow]fails, tolerated:[/]",
     NOT_APPLICABLE: "[dim]-[/]",
 }
 
@@ -61,7 +62,7 @@ def _allowed(verdict: Verdict) -> str:
 def _remark(verdict: Verdict) -> str:
     if verdict.status == NOT_APPLICABLE:
         return "does not apply: " + "; ".join(verdict.why)
-    if verdict.failed or verdict.status == KNOWN:
+    if verdict.failed or verdict.excused:
         return verdict.title
     return verdict.notes[0] if verdict.notes else ""
 
