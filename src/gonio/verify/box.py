@@ -216,7 +216,10 @@ _PLURAL = {"choice": "choices", "corner": "corners", "edge": "edges", "interior"
 
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:
     try:
-        return Place(values, why, subject.replace(**values), along)
+        changed = subject.replace(**values)
+        if subject.guided:  # a guide per place would take most of the time
+            changed = dataclasses.replace(changed, drawn_by=subject)
+        return Place(values, why, changed, along)
     except InputError:
         return None  # the material rejects the values
 
@@ -301,7 +304,6 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     together = per_ray(subject, {**others, **moved}) or per_ray(subject, moved)
     shape = (count, RAYS)
     # a guide has no jumps of its own, and one would be computed for every value, which takes seconds
-    guided = any(inner.guided for _, inner in tree.walk(subject.model))
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
     else:
@@ -310,7 +312,7 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     channels = [value[:, c].reshape(shape) for c in range(value.shape[1])]
     same = all(np.array_equal(channels[0], other) for other in channels[1:])
     channels = channels[:1] if same else channels
-    if guided:
+    if subject.guided:
         return channels
     if together is not None:
         density = together.pdf(many[0], many[1], "float32")

@@ -14,7 +14,14 @@ from .. import files
 from .report import Report
 from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
 
-CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", KNOWN: "declared", TOLERATED: "declared", NOT_APPLICABLE: "none"}
+CLASSES = {
+    PASS: "pass",
+    FAIL: "fail",
+    DECLARED: "declared",
+    KNOWN: "declared",
+    TOLERATED: "declared",
+    NOT_APPLICABLE: "none",
+}
 
 STYLE = """
 :root { --ink: #1d2530; --soft: #5c6876; --paper: #fbfaf7; --card: #fff; --line: #e4e1da; --accent: #2b5d8a;

@@ -29,6 +29,7 @@ from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, F
 DEFAULT_SEED = 1
 # steps of judging a subject besides the laws
 PLACES, QUALITY = "other values", "sampling quality"
+GUIDES = 2  # other values at which the laws of sampling judge a guide: each takes seconds
 CONFIRMATION = 0.001  # p-value of the test with a second seed, below which a rejection is confirmed
 Target = BSDF | Subject | str
 Begin = Callable[[str], None]
@@ -219,6 +220,8 @@ def _places(one: Subject, effort: str, seed: int) -> list[Place]:
 def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
     """The law at the given values, and, unless it fails there, at the others."""
     results = []
+    if law.samples and one.guided:
+        others = others[:GUIDES]
     for place in [Place({}, "given", one), *(others if law.everywhere else [])]:
         began = time.perf_counter()
         place = place if law.at_ends else place.inside()

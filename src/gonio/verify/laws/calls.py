@@ -9,7 +9,7 @@ import numpy as np
 
 from ...bridge.answers import Answer
 from ...errors import InputError
-from ...material import BSDF, tree
+from ...material import BSDF
 from ...ops import Mode, Precision, backend
 from .. import box, directions, severity
 from ..effort import Effort
@@ -192,7 +192,7 @@ def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
     """The largest difference beyond `same`, relative to the larger value, as text."""
-    lit = first["sample's pdf"][:, 0] > 0.0
+    lit = first["sample's pdf"][:, 0] > 0.0 if "sample's pdf" in first else np.ones(len(wo), bool)
     for name, a in first.items():
         b = second[name]
         if a.shape != b.shape:
@@ -256,15 +256,17 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})
     if together is None:
         return
+
+    def results(one: Subject) -> dict[str, np.ndarray]:
+        # a guide depends on all values together: its density and samples differ from those of one value
+        return {"eval": one.eval(wo, wi)} if one.guided else _answers(one, wo, wi, u, one.best)[0]
+
     try:
-        separate = [_answers(subject.replace(**values), wo, wi, u, subject.best)[0] for values in ends]
+        separate = [results(subject.replace(**values)) for values in ends]
     except InputError:
         return  # the material rejects this combination of values
-    (mixed,) = _answers(together, wo, wi, u, subject.best)
+    mixed = results(together)
     each = {name: np.where(odd[:, None], separate[1][name], first) for name, first in separate[0].items()}
-    if any(one.guided for _, one in tree.walk(subject.model)):
-        # a guide depends on all values together: its density and samples differ from those of one value
-        mixed = {**each, "eval": mixed["eval"]}
     names = " and ".join(list(ends[0])[:3])
     answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
     yield answer._replace(wrong=f"{answer.wrong}, {names} from ray to ray") if answer.wrong else answer

@@ -31,6 +31,7 @@ class Energy(Law):
     """
 
     number = 3
+    samples = True
     name = "energy"
     title = "directional albedo <= 1; quadrature and sampling agree"
     meaning = (
@@ -65,6 +66,8 @@ class Energy(Law):
         white = lossless_variant(subject)
         if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
             white = subject  # it has no albedo to set, but claims to be lossless
+        if white is not None and subject.guided:  # a guide of its own would take seconds
+            white = dataclasses.replace(white, drawn_by=subject.sampler)
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
         if finding.figure > GAIN:
@@ -189,12 +192,26 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
         return _randomly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(subject.sample, subject.power(), wo, effort.accuracy, seed)
+    integral = cubature.integrate(_seeds(subject), subject.power(), wo, effort.accuracy, seed)
     return integral.value + ideal, integral.error + effort.accuracy
+
+
+def _seeds(subject: Subject) -> cubature.Sampler:
+    """The subject's samples that carry light: cells around the others, as in a black sector, need not be divided."""
+
+    def sample(wo: np.ndarray, u: np.ndarray) -> object:
+        s = subject.sampler.sample(wo, u)
+        unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-3
+        dark = subject.eval(wo, np.where(unit[:, None], s.wi, [0.0, 0.0, 1.0])).max(1) <= 0.0
+        return s._replace(pdf=np.where(dark & ~s.delta, 0.0, s.pdf))
+
+    return sample
 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
     """The light of all delta lobes, (N, channels)."""
+    if subject.drawn_by is not None and subject.guided and getattr(subject.model, "delta", "maybe") == "never":
+        return np.zeros((len(wo), subject.eval(wo[:1], wo[:1], precision="float32").shape[1]))
     power = lobes.of(subject, wo, seed, "importance")
     carried = power.carried
     if not full and carried.size:

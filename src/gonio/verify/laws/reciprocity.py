@@ -152,7 +152,7 @@ def _eta(subject: Subject, seed: int) -> float:
         return 1.0
     rng = np.random.default_rng([seed, 4])
     wo = directions.on_side(directions.uniform(rng, 4096), 1)
-    drawn = subject.sample(wo, directions.numbers(rng, 4096))
+    drawn = subject.sampler.sample(wo, directions.numbers(rng, 4096))
     through = (drawn.pdf > 0.0) & (drawn.wi[:, 2] < 0.0)
     if np.any(through & ~drawn.delta):  # light through a hole carries no information about the index
         through &= ~drawn.delta
