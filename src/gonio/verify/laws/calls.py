@@ -285,7 +285,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, and the eta of samples."""
+    """Declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, eta of samples."""
     model = subject.model
     # all pairs of sides, even those without declared values
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,6 +18,8 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 EXACT = 1e-10
 SINGLE = 2e-3
 LOBE = 1e4  # 1/sr; larger values and densities are those of a lobe of a degree at most
+ENDS = (0.0, 1.0 - 2.0**-24)  # of a random number
+EVERY = 64  # samples, one of which has a certain number at a certain end
 ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
 PAIRS = 1 << 13  # samples, to find a cause
 
@@ -162,7 +165,10 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
     rng = np.random.default_rng([seed, 5])
     wo = directions.uniform(rng, count)
     wo[:, 2] = np.abs(wo[:, 2]) * rng.choice(np.array(subject.sides or (1,)), count)
-    return directions.single(wo), directions.numbers(rng, count)
+    u = directions.numbers(rng, count)
+    for number, (which, end) in enumerate(itertools.product(range(3), ENDS)):  # where inversions divide by 0 or end
+        u[number::EVERY, which] = end
+    return directions.single(wo), u
 
 
 def _conventions(s: object, problems: list[str], precision: Precision) -> None:
