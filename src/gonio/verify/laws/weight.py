@@ -84,6 +84,9 @@ class Weight(Law):
                     lambda b, x, y, m: b.pdf(x, y)[:, None],
                 )
             value = subject.eval(o, i, mode)
+            clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30))
+            if clamped:
+                yield Cause(f"the weight is {clamped}", "clamped weight")
             if _gray(s.weight[rows]) and not _gray(value):
                 yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
@@ -154,6 +157,24 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
     densities = (subject.pdf(many, moved, precision) > 0.0).reshape(6, -1)
     lit = np.concatenate([subject.pdf(wo, wi, precision)[None] > 0.0, densities, values])
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
+
+
+def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
+    """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else ""."""
+    off = np.abs(weight - right) > 0.01 * np.maximum(weight, right)
+    if off.sum() < 64 or off.mean() > 0.97:
+        return ""
+    values = weight[off]
+    most = float(np.median(values))
+    if most <= 0.0 or np.mean(np.abs(values / most - 1.0) < 1e-4) < 0.99:
+        return ""
+    if np.all(right[off] > values):
+        return f"{most:.4g} wherever eval / pdf is larger: clamped to at most {most:.4g}?"
+    return (
+        f"{most:.4g} wherever eval / pdf is smaller: clamped to at least {most:.4g}?"
+        if np.all(right[off] < values)
+        else ""
+    )
 
 
 def _gray(values: np.ndarray) -> bool:
