@@ -176,3 +176,23 @@ def test_an_invisible_failure_has_an_exit_code_of_its_own_and_can_be_tolerated()
     assert "tolerated: invisible" in str(tolerated)
     with pytest.raises(InputError, match="'broken' is not a grade"):
         verify(SlightlyBright(0.5), law="weight", tolerate="broken")
+
+
+class Branches(go.BSDF):
+    """Python's `if` on the directions of many rays."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return ops.vec3(0.1, 0.1, 0.1) * (wi.z if wo.z > 0.0 else 0.0)
+
+
+def test_a_branch_of_python_is_told_the_function_to_use_and_told_once() -> None:
+    text = " ".join(str(verify(Branches(), quick=True)).split())
+    assert text.count("ops.where(condition, a, b)") == 1 and "in eval" in text
+    assert "the same exception, follows from POSITIVITY's" in text
+
+
+def test_a_page_begins_with_what_failed() -> None:
+    from gonio.verify import page
+
+    html = page.page(verify(SlightlyBright(0.5), quick=True, law=["weight", "isotropy"]))
+    assert html.index("<section id='c0-weight'>") < html.index("<table>") < html.index("<section id='c0-isotropy'>")

@@ -301,6 +301,9 @@ def guarded(model: Any, method: str, run: Any) -> Any:
         if isinstance(error, GonioError):
             raise Fault(f"{error.what} in {method}", error.where) from raised
         text = str(error).strip().splitlines()
+        if text and "implicit conversion to 'bool'" in text[0]:
+            what = f"Python's `if`, `and`, `or` or `not` on the values of many rays in {method}"
+            raise Fault(f"{what}: write `ops.where(condition, a, b)`, `&`, `|`, `~`", _line(model, error)) from raised
         raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from raised
 
 
