@@ -15,6 +15,7 @@ from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..forensics.causes import place_of
+from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
 from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
@@ -64,6 +65,9 @@ class Energy(Law):
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
+        masking = mismatch(subject) if effort.full else ""
+        if masking:
+            finding.problems.append(masking)
         white = lossless_variant(subject)
         if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
             white = subject  # it has no albedo to set, but claims to be lossless
@@ -91,6 +95,7 @@ class Energy(Law):
         return max(biases, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        yield from (Cause(problem, "masking") for problem in finding.problems if problem.startswith("the masking"))
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
