@@ -38,3 +38,16 @@ def test_a_lobe_that_sampling_does_not_know_is_found_about_the_mirror_direction(
     one = subject.of(Blind())
     found = cubature.integrate(one.sample, one.power(), WO[1:2], 1e-4)
     assert found.value[0, 0] == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("edge", [0.711119, 0.926114, 0.5])
+def test_a_step_near_the_rim_of_cells_is_in_the_stated_error(edge: float) -> None:
+    """Between the rim of a cell and the first of Gauss's nodes a step changes no rule of Gauss's."""
+
+    def toon(o, i):  # type: ignore[no-untyped-def]
+        return [ops.where(i.z > 0.0, i.z * ops.inv_pi * ops.where(i.z > edge, 1.0, 0.8), 0.0)]
+
+    found = cubature.integrate(go.Lambert().sample, toon, WO[1:2], 1e-4)
+    exact = 1.0 - 0.2 * edge**2
+    assert abs(found.value[0, 0] - exact) < 2.0 * found.error[0, 0] + 1e-5
+    assert found.error[0, 0] < 1e-3

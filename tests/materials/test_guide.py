@@ -50,6 +50,15 @@ class OneWay(go.BSDF):
         return vec3(0.5, 0.5, 0.5) * where((wo.z < 0.0) & (wi.z < 0.0), -wi.z * go.ops.inv_pi, 0.0)
 
 
+class Sectors(go.BSDF):
+    """Alternate sectors of 45 degrees of the azimuth between the two directions; black toward the normal itself."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        cos, sin = wo.x * wi.x + wo.y * wi.y, wo.x * wi.y - wo.y * wi.x
+        even = sqr(cos * cos - sin * sin) > sqr(2.0 * cos * sin)
+        return vec3(0.8, 0.8, 0.8) * where((wo.z > 0.0) & (wi.z > 0.0) & even, wi.z * go.ops.inv_pi, 0.0)
+
+
 def _at(degrees: float, azimuth: float = 0.3) -> list[float]:
     a, b = np.radians(degrees), azimuth
     return [float(np.sin(a) * np.cos(b)), float(np.sin(a) * np.sin(b)), float(np.cos(a))]
@@ -126,6 +135,14 @@ def test_a_black_material_is_sampled_by_the_cosine() -> None:
     drawn = hidden(go.Lambert(0.0)).sample(_at(30.0), np.random.default_rng(1).random((64, 3)))
     assert np.all(drawn.weight == 0.0)
     np.testing.assert_allclose(drawn.pdf, drawn.wi[:, 2] / np.pi, rtol=1e-6)
+
+
+def test_a_black_slice_has_a_density_too() -> None:
+    around = np.random.default_rng(4).normal(size=(1 << 16, 3))
+    wi = np.abs(around / np.linalg.norm(around, axis=1, keepdims=True)) * np.sign(around) ** [1, 1, 0]
+    for degrees in (0.0, 1.0):
+        total = 2.0 * np.pi * Sectors().pdf(np.tile(_at(degrees), (len(wi), 1)), wi).mean()
+        assert total == pytest.approx(1.0, abs=0.05)
 
 
 def test_light_from_one_side_is_sampled_on_that_side() -> None:

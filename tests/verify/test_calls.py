@@ -86,3 +86,23 @@ def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) 
     verdict = verify(f"{tmp_path}/calls_wrong.py:calls_wrong", quick=True, law="calls")["calls"]
     assert verdict.failed and "eval_pdf's value is not eval: 2 times as large" in verdict.why[0]
     assert verdict.grade == "broken" and "2" in verdict.cause
+
+
+class RedAboveBlueBelow(go.BSDF):
+    """A sheet that is printed on both sides."""
+
+    @property
+    def back_differs(self) -> bool:
+        return True
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        color = ops.where(wo.z > 0.0, ops.vec3(0.8, 0.1, 0.1), ops.vec3(0.1, 0.1, 0.8))
+        return color * ops.where(wo.z * wi.z > 0.0, ops.abs(wi.z) * ops.inv_pi, 0.0)
+
+
+def test_a_surface_may_declare_another_color_on_its_back() -> None:
+    assert verify(RedAboveBlueBelow(), quick=True, law=["calls"]).passed
+    undeclared = type("Undeclared", (RedAboveBlueBelow,), {"back_differs": False})
+    assert "`back_differs`" in " ".join(verify(undeclared(), quick=True, law=["calls"])["calls"].why)
+    assert not go.two_sided(go.Lambert()).back_differs
+    assert go.mix(go.Lambert(), RedAboveBlueBelow(), 0.5).back_differs

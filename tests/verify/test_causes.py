@@ -277,3 +277,34 @@ def test_light_that_meets_a_pigment_twice_is_no_mistake_and_a_colour_that_is_squ
     verdict = verify(BouncingLacquer(), quick=True, law="linearity")["linearity"]
     assert verdict.status == "pass" and any("more than once" in note for note in verdict.notes)
     assert verify(Squared(), quick=True, law="linearity")["linearity"].failed
+
+
+def test_masking_that_is_not_that_of_the_distribution_is_told() -> None:
+    from gonio.optics.ndf.ggx import GGX
+    from gonio.verify.forensics import masking
+
+    class Undermasked(GGX):
+        """GGX with the masking of half its width."""
+
+        name = "undermasked"
+
+        def Lambda(self, v: Any, alpha: Any) -> Any:
+            return super().Lambda(v, ops.vec2(0.5 * alpha.x, 0.5 * alpha.y))
+
+    assert masking.mismatch(of(go.Conductor(alpha=0.4))) == ""
+    assert masking.mismatch(of(go.Conductor(alpha=(0.1, 0.6), ndf="beckmann"))) == ""
+    words = masking.mismatch(of(go.Conductor(alpha=0.4, ndf=Undermasked)))
+    assert words.startswith("the masking does not match the distribution")
+
+
+class OneSided(Weighed):
+    def _factor(self, wo: Any, wi: Any, m: Any) -> Any:
+        return 1.0 + 0.0 * wo.z
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return super().eval(wo, wi, mode) * (1.0 + 0.2 * (wo.x * wi.y - wo.y * wi.x))
+
+
+def test_a_lobe_to_one_side_is_not_called_anisotropic() -> None:
+    cause = verify(OneSided(), quick=True, law="isotropy")["isotropy"].cause
+    assert "mirrored" in cause and "`isotropic`" not in cause

@@ -10,6 +10,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
+from gonio.errors import InputError
 from gonio.material import KnownViolation
 from gonio.verify import report, verify
 from gonio.verify.laws import Law
@@ -157,3 +158,41 @@ def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
 def test_a_report_prints_as_the_terminal_shows_it() -> None:
     text = str(verify(go.Lambert(0.5), quick=True, law=["reciprocity"]))
     assert "reciprocity" in text and "all laws hold" in text
+
+
+class SlightlyBright(go.Lambert):
+    """Its weights are a hundred-thousandth too large."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        s = super().sample(wo, u, mode)
+        return s._replace(weight=s.weight * 1.00001)
+
+
+def test_an_invisible_failure_has_an_exit_code_of_its_own_and_can_be_tolerated() -> None:
+    judged = verify(SlightlyBright(0.5), quick=True, law="weight")
+    assert not judged.passed and judged["weight"].grade == "invisible" and judged.exit_code == 4
+    tolerated = verify(SlightlyBright(0.5), quick=True, law="weight", tolerate="small")
+    assert tolerated.passed and tolerated.exit_code == 0 and tolerated["weight"].status == "tolerated"
+    assert "tolerated: invisible" in str(tolerated)
+    with pytest.raises(InputError, match="'broken' is not a grade"):
+        verify(SlightlyBright(0.5), law="weight", tolerate="broken")
+
+
+class Branches(go.BSDF):
+    """Python's `if` on the directions of many rays."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return ops.vec3(0.1, 0.1, 0.1) * (wi.z if wo.z > 0.0 else 0.0)
+
+
+def test_a_branch_of_python_is_told_the_function_to_use_and_told_once() -> None:
+    text = " ".join(str(verify(Branches(), quick=True)).split())
+    assert text.count("ops.where(condition, a, b)") == 1 and "in eval" in text
+    assert "the same exception, follows from POSITIVITY's" in text
+
+
+def test_a_page_begins_with_what_failed() -> None:
+    from gonio.verify import page
+
+    html = page.page(verify(SlightlyBright(0.5), quick=True, law=["weight", "isotropy"]))
+    assert html.index("<section id='c0-weight'>") < html.index("<table>") < html.index("<section id='c0-isotropy'>")

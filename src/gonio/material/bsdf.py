@@ -205,6 +205,12 @@ class BSDF(Material):
         return False
 
     @property
+    def back_differs(self) -> bool:
+        """Whether a surface that does not transmit, here or of an inner material, reflects from below too, with values
+        other than from above."""
+        return any(inner.back_differs for inner in tree.children(self).values())
+
+    @property
     def ambient(self) -> Spectrum | None:
         """Factor of the scene's ambient light, for empirical models; None for all others."""
         return None

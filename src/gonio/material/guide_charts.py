@@ -199,7 +199,12 @@ class Slices:
         light = np.array([fine.light.sum((1, 2)) * self.cell for fine in nodes])
         density = np.array([self._fitted(fine.light) for fine in nodes])
         sums = (_trapezoid(density.shape[-2], 1.0), _trapezoid(density.shape[-1], self.span))
-        density /= np.maximum(np.einsum("gakj,k,j->ga", density, *sums), MIN_LIGHT)[..., None, None]
+        totals = np.einsum("gakj,k,j->ga", density, *sums)
+        density /= np.maximum(totals, MIN_LIGHT)[..., None, None]
+        dark = totals <= MIN_LIGHT
+        if dark.any() and not dark.all():
+            # wo near a black slice are sampled from it in part: it needs a density that integrates to 1 as well
+            density[dark] = density[~dark].mean(0)
         along = density.reshape(len(self.sides), self.azimuths, len(self.versions), *density.shape[1:])
         mixed = 0.5 * (along[..., 1:, :, :] + along[..., :-1, :, :])
         mixed = 0.5 * (mixed + np.roll(mixed, -1, axis=1)) if self.full else mixed

@@ -44,7 +44,7 @@ class Place:
     """A point in the ranges of the parameters.
 
     values   those that differ from the given material, by path
-    why      "given", "choice", "corner", "edge", "interior" or "jump"
+    why      "given", "choice", "color", "corner", "edge", "interior", "jump" or "pair"
     subject  the BSDF there
     along    the parameters that vary; those of the subject itself for the given point
     """
@@ -62,7 +62,7 @@ class Place:
             # not all by the same amount: at eta = k the formula of a conductor has a kink
             margin = MARGIN * (1.0 + 0.1 * number) * (axis.high - axis.low)
             if axis.path in self.values:
-                moved[axis.path] = float(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
+                moved[axis.path] = _plain(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
             elif np.ndim(value) == 0 and not isinstance(value, tuple | list) and value == axis.high:
                 moved[axis.path] = axis.high - margin
         if not moved:
@@ -87,6 +87,7 @@ class Axis:
     low: float
     high: float
     ratio: bool
+    kind: str = "float"
 
     def at(self, share: float | np.ndarray) -> Any:
         """The value at a share of the range, 0 to 1."""
@@ -111,7 +112,7 @@ def axes(subject: Subject) -> list[Axis]:
             low = max(low, min(MIN_ALBEDO, high))
         if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
             low += MARGIN * (high - low)
-        axes_.append(Axis(leaf.path, low, high, ratio))
+        axes_.append(Axis(leaf.path, low, high, ratio, leaf.parameter.kind))
     return axes_
 
 
@@ -167,7 +168,8 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     edges = [{axis.path: axis.at(end)} for axis in along for end in (1.0, 0.0)]
     rng.shuffle(edges)  # type: ignore[arg-type]
     interior = [{axis.path: axis.at(rng.uniform()) for axis in along} for _ in range(effort.places) if along]
-    kinds = {"corner": corners, "edge": edges, "interior": interior}
+    kinds = {"corner": corners, "color": _colors(along), "pair": _unequal(subject, along)}
+    kinds |= {"edge": edges, "interior": interior}
     while any(kinds.values()):
         for why, rest in kinds.items():
             if rest:
@@ -176,13 +178,44 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     for why, values in wanted:
         if len(made) >= most:
             break
-        values = {path: value if isinstance(value, str | bool) else float(value) for path, value in values.items()}
+        values = {path: value if isinstance(value, str | bool) else _plain(value) for path, value in values.items()}
         if any(values == place.values for place in made):
             continue
         place = _made(subject, values, why, tuple(along))
         if place is not None:
             made.append(place)
     return made
+
+
+# of three channels, as shares of a range: all different, one alone, one at the low end
+COLORS = ((0.95, 0.1, 0.5), (0.0, 0.9, 0.9), (0.9, 0.0, 0.0), (0.5, 0.95, 0.1), (0.0, 0.9, 0.0), (0.9, 0.0, 0.9))
+WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # of the two axes, as shares of a range
+
+
+def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
+    """Saturated values of all colors together, the channels of each in another order."""
+    spectra = [axis for axis in along if axis.kind == "spectrum"]
+    return [
+        {axis.path: _plain([float(axis.at(s)) for s in np.roll(shares, k)]) for k, axis in enumerate(spectra)}
+        for shares in COLORS
+        if spectra
+    ]
+
+
+def _unequal(subject: Subject, along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
+    """Two unequal widths where one number, or two equal ones, are given."""
+    alphas = [axis for axis in along if axis.kind == "alpha" and _equal(tree.value_at(subject.model, axis.path))]
+    return [{axis.path: _plain([float(axis.at(s)) for s in shares]) for axis in alphas} for shares in WIDTHS if alphas]
+
+
+def _equal(value: Any) -> bool:
+    numbers = np.asarray(value, float).ravel() if isinstance(value, int | float | tuple | list) else np.arange(2.0)
+    return bool(np.ptp(numbers) == 0.0)
+
+
+def _plain(value: Any) -> Any:
+    """A float, or a tuple of floats."""
+    return tuple(np.asarray(value, float).tolist()) if np.ndim(value) else float(value)
 
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
@@ -211,12 +244,16 @@ def covered(subject: Subject, tried: list[Place]) -> str:
     return f"judged at the given values and {len(tried)} others ({words}) {ranges}"
 
 
-_PLURAL = {"choice": "choices", "corner": "corners", "edge": "edges", "interior": "inside", "jump": "jumps"}
+_PLURAL = {"choice": "choices", "color": "colors", "corner": "corners", "edge": "edges", "interior": "inside"}
+_PLURAL |= {"jump": "jumps", "pair": "unequal widths"}
 
 
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:
     try:
-        return Place(values, why, subject.replace(**values), along)
+        changed = subject.replace(**values)
+        if subject.guided:  # a guide per place would take most of the time
+            changed = dataclasses.replace(changed, drawn_by=subject)
+        return Place(values, why, changed, along)
     except InputError:
         return None  # the material rejects the values
 
@@ -301,7 +338,6 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     together = per_ray(subject, {**others, **moved}) or per_ray(subject, moved)
     shape = (count, RAYS)
     # a guide has no jumps of its own, and one would be computed for every value, which takes seconds
-    guided = any(inner.guided for _, inner in tree.walk(subject.model))
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
     else:
@@ -310,7 +346,7 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     channels = [value[:, c].reshape(shape) for c in range(value.shape[1])]
     same = all(np.array_equal(channels[0], other) for other in channels[1:])
     channels = channels[:1] if same else channels
-    if guided:
+    if subject.guided:
         return channels
     if together is not None:
         density = together.pdf(many[0], many[1], "float32")
@@ -349,6 +385,8 @@ def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | Non
 
 
 def _short(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_short, value))})"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

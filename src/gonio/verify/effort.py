@@ -35,9 +35,9 @@ class Effort:
 
 
 EFFORTS = {
-    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4, places=6),
-    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 18),
-    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 60),
+    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4, places=8),
+    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 22),
+    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 72),
 }
 # At the other parameter values. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
 # of float32 directions.

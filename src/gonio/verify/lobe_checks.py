@@ -187,17 +187,37 @@ def modes(probe: Probe) -> Misses:
         ratio, expected = distinct(float(radiance[row].mean() / max(power[row].mean(), 1e-12)), float(factor[row]))
         verb = "transmits" if through[row] else "reflects"
         text = f"{verb} {ratio} times as much radiance as power, {expected} expected (1 / eta^2)"
-        yield _miss(off, text, o, i, _power_of_index(radiance, power, eta, through & exists))
+        total = np.sum(probe.power.carried[rows] * probe.power.valid[rows][..., None], axis=1)
+        yield _miss(off, text, o, i, _power_of_index(radiance, power, eta, through & exists, total))
 
 
-def _power_of_index(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray) -> str:
-    """The cause where radiance over power is one power of the index for all of transmission."""
+def _power_of_index(
+    radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, total: np.ndarray
+) -> str:
+    """The cause where radiance over power is one power of the index for all of transmission.
+
+    total  power of all lobes (N, channels); if it is 1 only once power has lost a factor, power is the wrong one
+    """
     if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
         return ""
     ratio = radiance[usable].sum(1) / np.maximum(power[usable].sum(1), 1e-12)
-    for exponent, words in ((0.0, "is missing"), (2.0, "is inverted"), (-4.0, "is applied twice")):
+    full, carried, squared = total[usable], power[usable], eta[usable, None] ** 2.0
+
+    def conserved(scale: np.ndarray | float) -> bool:
+        return bool(np.all(np.abs(full - carried + scale * carried - 1.0) < 1e-3))
+
+    for exponent, right, wrong in (
+        (0.0, "the factor 1 / eta^2 of radiance is missing", "power has the factor 1 / eta^2, which only radiance has"),
+        (2.0, "the factor 1 / eta^2 is inverted", "the two modes are exchanged"),
+        (-4.0, "the factor 1 / eta^2 is applied twice", "power has the factor eta^2, which no light has"),
+    ):
         if np.all(np.abs(ratio / eta[usable] ** exponent - 1.0) < 1e-3):
-            return f"radiance over power is {f'eta^{exponent:g}' if exponent else '1'}: the factor 1 / eta^2 {words}?"
+            of_power = not conserved(1.0) and conserved(squared if exponent >= 0.0 else 1.0 / squared)
+            text = f"eta^{exponent:g}" if exponent else "1"
+            known = of_power or conserved(1.0)
+            return (
+                f"radiance over power is {text}: {wrong if of_power else right if known else f'{right}, or {wrong}'}?"
+            )
     return ""
 
 

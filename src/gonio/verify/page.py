@@ -11,10 +11,18 @@ import json
 from pathlib import Path
 
 from .. import files
+from .forensics import diagnosis
 from .report import Report
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
 
-CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", KNOWN: "declared", NOT_APPLICABLE: "none"}
+CLASSES = {
+    PASS: "pass",
+    FAIL: "fail",
+    DECLARED: "declared",
+    KNOWN: "declared",
+    TOLERATED: "declared",
+    NOT_APPLICABLE: "none",
+}
 
 STYLE = """
 :root { --ink: #1d2530; --soft: #5c6876; --paper: #fbfaf7; --card: #fff; --line: #e4e1da; --accent: #2b5d8a;
@@ -107,18 +115,19 @@ def _settings(card: Card) -> str:
 
 def _card(card: Card, number: int) -> str:
     rows, details = [], []
+    failed = "".join(_detail(v, f"c{number}-{v.law}") for v in diagnosis.in_order(card.verdicts))
     for v in card.verdicts:
         anchor = f"c{number}-{v.law}"
         figure = html.escape(v.shown if v.figure is not None else "; ".join(v.why))
         allowed = f"{v.tolerance:.0e}" if v.tolerance else "0" if v.tolerance == 0 else ""
         allowed = "" if v.tolerance is not None and v.tolerance == float("inf") else allowed
         rows.append(f"<tr><td>{v.number}<td><a href='#{anchor}'>{v.law}</a><td>{_pill(v)}<td>{figure}<td>{allowed}")
-        if v.status != NOT_APPLICABLE:
+        if v.status != NOT_APPLICABLE and not v.failed:
             details.append(_detail(v, anchor))
     below = [*filter(None, [card.covered]), *card.notes, *([card.quality.words] if card.quality else [])]
     lines = "".join(f"<p class=soft>{html.escape(line)}</p>" for line in below)
     return (
-        f"<h2>{html.escape(card.title)}</h2>"
+        f"<h2>{html.escape(card.title)}</h2>{failed}"
         f"<table><tr><th><th>law<th>verdict<th>figure<th>allowed{''.join(rows)}</table>{lines}{''.join(details)}"
     )
 
@@ -133,7 +142,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.worst:
         rows.append(("worst case", html.escape(v.worst)))
     rows.append(("reproduce", f"<pre>{html.escape(v.command)}</pre>"))
-    if v.failed or v.status in (DECLARED, KNOWN):
+    if v.failed or v.excused or v.status == DECLARED:
         rows.append(
             ("in a picture", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning))
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from .._version import __version__
 from . import statistics, terminal
+from .severity import Grade
 from .verdict import Card, Verdict
 
 if TYPE_CHECKING:
@@ -45,7 +46,10 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        return 0 if self.passed else 1
+        """0 if nothing fails, 1 if something does, 4 if no picture shows any of the failures."""
+        if self.passed:
+            return 0
+        return 4 if all(verdict.grade is Grade.INVISIBLE for verdict in self.failures) else 1
 
     @property
     def failures(self) -> list[Verdict]:

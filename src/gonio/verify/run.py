@@ -29,6 +29,7 @@ from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, F
 DEFAULT_SEED = 1
 # steps of judging a subject besides the laws
 PLACES, QUALITY = "other values", "sampling quality"
+GUIDES = 2  # other values at which the laws of sampling judge a guide: each takes seconds
 CONFIRMATION = 0.001  # p-value of the test with a second seed, below which a rejection is confirmed
 Target = BSDF | Subject | str
 Begin = Callable[[str], None]
@@ -49,6 +50,7 @@ def verify(
     sarif: str | Path | None = None,
     baseline: str | Path | None = None,
     write_baseline: str | Path | None = None,
+    tolerate: str = "",
     progress: Callable[[int, int, str], None] | None = None,
     isolated: bool | None = None,
     workers: int = 1,
@@ -68,6 +70,7 @@ def verify(
     output    folder for report.html and report.json; None writes nothing
     junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
+    tolerate  "invisible", "small" or "visible": failures of that grade and below do not fail the report
     progress  called with the steps done, all steps, and the name of the next
     isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
     workers   such processes at a time; the report is the same
@@ -80,7 +83,7 @@ def verify(
     if seed < 0:
         raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
     effort = _effort(quick, deep)
-    outputs = Outputs(output, junit, sarif, baseline, write_baseline)
+    outputs = Outputs(output, junit, sarif, baseline, write_baseline, tolerate)
     known = outputs.check()
     names = None if law is None else [law] if isinstance(law, str) else list(law)
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
@@ -217,6 +220,8 @@ def _places(one: Subject, effort: str, seed: int) -> list[Place]:
 def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
     """The law at the given values, and, unless it fails there, at the others."""
     results = []
+    if law.samples and one.guided:
+        others = others[:GUIDES]
     for place in [Place({}, "given", one), *(others if law.everywhere else [])]:
         began = time.perf_counter()
         place = place if law.at_ends else place.inside()

@@ -43,12 +43,14 @@ class Subject:
     model     the material or plugin
     target    its name: "conductor", "glass.py:Glass", "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
+    drawn_by  the subject whose samples show where light is, if its own guide would take seconds; else None
     memo      cache of values that are expensive to compute: `estimators`
     """
 
     model: Any
     target: str
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
+    drawn_by: Subject | None = dataclasses.field(default=None, repr=False, compare=False)
     memo: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
 
     # ------------------------------------------------------------------ facts
@@ -72,6 +74,16 @@ class Subject:
     def perturbs_normal(self) -> bool:
         """Whether its normal differs from that of the surface."""
         return bool(self.model.perturbs_normal)
+
+    @functools.cached_property
+    def guided(self) -> bool:
+        """Whether it, or a material inside it, has only an `eval`, and is sampled by a guide computed from that."""
+        return isinstance(self.model, BSDF) and any(one.guided for _, one in tree.walk(self.model))
+
+    @property
+    def sampler(self) -> Subject:
+        """The subject whose samples show where its light is."""
+        return self.drawn_by or self
 
     @property
     def stochastic(self) -> bool:
@@ -132,7 +144,7 @@ class Subject:
                 sides.append(side)
                 continue
             with contextlib.suppress(Fault):  # the laws of sampling report a `sample` that fails
-                if np.any(self.sample(wo, directions.numbers(rng, 512), precision="float32").weight > 0.0):
+                if np.any(self.sampler.sample(wo, directions.numbers(rng, 512), precision="float32").weight > 0.0):
                     sides.append(side)
         return tuple(sides)
 
@@ -167,7 +179,7 @@ class Subject:
         """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""
         model = self.model
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
-        return Subject(changed, self.target, {**self.settings, **values})
+        return Subject(changed, self.target, {**self.settings, **values}, self.drawn_by)
 
     def rebuilt(self) -> Subject | None:
         """A new object of the same BSDF, which has not been called; None where it cannot be made."""
@@ -289,6 +301,9 @@ def guarded(model: Any, method: str, run: Any) -> Any:
         if isinstance(error, GonioError):
             raise Fault(f"{error.what} in {method}", error.where) from raised
         text = str(error).strip().splitlines()
+        if text and "implicit conversion to 'bool'" in text[0]:
+            what = f"Python's `if`, `and`, `or` or `not` on the values of many rays in {method}"
+            raise Fault(f"{what}: write `ops.where(condition, a, b)`, `&`, `|`, `~`", _line(model, error)) from raised
         raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from raised
 
 

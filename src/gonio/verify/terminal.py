@@ -9,7 +9,7 @@ import numpy as np
 from . import directions
 from .forensics import diagnosis
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,6 +19,7 @@ MARKS = {
     FAIL: "[bold red]FAIL[/]",
     DECLARED: "[yellow]breaks as declared[/]",
     KNOWN: "[yellow]fails, known[/]",
+    TOLERATED: "[yellow]fails, tolerated:[/]",
     NOT_APPLICABLE: "[dim]-[/]",
 }
 
@@ -39,8 +40,14 @@ def show_card(card: Card, console: Console) -> None:
     for line in filter(None, below):
         console.print(f"[dim]{escape(line)}[/]")
     console.print()
-    for v in diagnosis.in_order(card.verdicts):
-        _explain(v, console)
+    ordered = diagnosis.in_order(card.verdicts)
+    same = [v for v in ordered if v.figure is None and v.cause.startswith("follows")]  # the exception of another law
+    for v in ordered:
+        if v not in same:
+            _explain(v, console)
+    if same:
+        laws = ", ".join(v.law for v in same)
+        console.print(f"[bold red]{escape(laws)}[/]: the same exception, {escape(same[0].cause)}\n")
 
 
 def _mark(verdict: Verdict) -> str:
@@ -61,7 +68,7 @@ def _allowed(verdict: Verdict) -> str:
 def _remark(verdict: Verdict) -> str:
     if verdict.status == NOT_APPLICABLE:
         return "does not apply: " + "; ".join(verdict.why)
-    if verdict.failed or verdict.status == KNOWN:
+    if verdict.failed or verdict.excused:
         return verdict.title
     return verdict.notes[0] if verdict.notes else ""
 
@@ -70,13 +77,12 @@ def _explain(verdict: Verdict, console: Console) -> None:
     from rich.text import Text
 
     console.print(Text(f"{verdict.law}: ", style="bold red").append(verdict.title, style="default not bold"))
-    follows = verdict.figure is None and verdict.cause.startswith("follows")  # the exception of another law
-    rows = [("why", line) for line in verdict.why if not follows] + [("note", line) for line in verdict.notes]
+    rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
     rows += [
         ("in a picture", verdict.bias.words if verdict.bias else ""),
         ("cause", verdict.cause),
         ("worst", verdict.worst),
-        ("means", "" if follows else verdict.meaning),
+        ("means", verdict.meaning),
         ("tolerance", verdict.reason),
         ("again", verdict.command),
     ]

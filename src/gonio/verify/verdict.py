@@ -20,6 +20,7 @@ from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
 KNOWN = "known"  # failed already when the baseline was written
+TOLERATED = "tolerated"  # fails, but no more than the user tolerates in pictures
 
 
 class Evidence(Protocol):
@@ -111,6 +112,11 @@ class Verdict:
     @property
     def failed(self) -> bool:
         return self.status == FAIL
+
+    @property
+    def excused(self) -> bool:
+        """Whether it violates the law, and fails no report."""
+        return self.status in (KNOWN, TOLERATED)
 
     def as_dict(self) -> dict[str, object]:
         """All fields but the evidence; numbers that JSON cannot hold become null."""

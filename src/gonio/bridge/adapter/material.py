@@ -64,7 +64,7 @@ class PlacedMaterial:
         for name in ("absorption", "priority"):
             if name in self.slots and self.slots[name].varies:
                 raise InputError("a texture given, but the interior has no uv coordinates", f"{self.name}.{name}")
-        self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
+        self.sides = TwoSided(self.model) if sides and not (self.model.transmits or self.model.back_differs) else None
         self.derived: OfVariant = None
         self.derive()
 

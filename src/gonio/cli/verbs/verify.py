@@ -38,6 +38,9 @@ class Files:
     write_baseline: Annotated[
         Path | None, Option("--write-baseline", metavar="FILE", help="List the failures there, as known from then on.")
     ] = None
+    tolerate: Annotated[
+        str, Option(metavar="GRADE", help="Pass failures up to a grade: invisible, small or visible.")
+    ] = ""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def verify(
     """Prove BSDFs: energy, reciprocity, sampling, gradients, precision.
 
     Each target is judged in a process of its own, which it may crash or block. The exit code is 1 if a target breaks a
-    law and does not declare that violation.
+    law and does not declare that violation, or 4 if no picture shows any of these violations.
 
     \b
     Examples:
@@ -108,7 +111,7 @@ def verify(
     from ...verify.isolation import child
 
     effort = how.name()
-    outputs = Outputs(to.output, to.junit, to.sarif, to.baseline, to.write_baseline)
+    outputs = Outputs(to.output, to.junit, to.sarif, to.baseline, to.write_baseline, to.tolerate)
     known = outputs.check()
     items = [child.Item(one, tuple(made.settings()), how.vary) for one in target]
     task = child.Task(items, effort, 1 if how.seed is None else how.seed, how.law)

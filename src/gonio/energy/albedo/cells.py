@@ -42,6 +42,19 @@ def rim(inset: float) -> Nodes:
     return Nodes(near[:, 0], near[:, 1], np.full(len(near), 1.0 / len(near)))
 
 
+def rimmed(inset: float) -> Nodes:
+    """A rule of four nodes per direction that is exact to degree 5, as Lobatto's, with the outer ones at a fraction of
+    the width from the rim: a step between the rim and the first node of Gauss's rules, which these miss, changes it.
+    """
+    outer = (1.0 - 2.0 * inset) ** 2
+    inner = (0.2 - outer / 3.0) / (1.0 / 3.0 - outer)
+    share = 0.5 * (1.0 / 3.0 - inner) / (outer - inner)
+    x = 0.5 + 0.5 * np.array([-np.sqrt(outer), -np.sqrt(inner), np.sqrt(inner), np.sqrt(outer)])
+    w = np.array([share, 0.5 - share, 0.5 - share, share])
+    s, t = np.meshgrid(x, x, indexing="ij")
+    return Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
+
+
 def step_aside(inside: Seen, rim: Seen, times: float = 4.0) -> np.ndarray:
     """Bound on the integral missed between the nodes and the rim if the values at the rim differ strongly, (cells,): no
     rule resolves a step there, such as the horizon or the critical angle.

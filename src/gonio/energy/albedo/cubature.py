@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ...ops import Direction, Scalar, backend
-from .cells import Nodes, Seen, product, rim, step_aside
+from .cells import Nodes, Seen, product, rimmed, step_aside
 
 ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
@@ -28,7 +28,7 @@ UNSEEN = 0.01  # below this fraction of the integral implied by the samples, a c
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
-_GAUSS, _FEWER, _RIM = product(ORDER), product(ORDER - 1), rim(1e-3)
+_GAUSS, _RIMMED = product(ORDER), rimmed(1e-3)
 
 Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
 # (wo, u) of rows (N, 3) -> a Sample of arrays: determines where cells are divided first
@@ -83,18 +83,20 @@ def integrate(
     tolerance  absolute, per integral; if cells run out, the reported error is larger
     """
     cells, points = _seeded(sample, wo, seed)
-    coarse = _values(integrand, wo, cells, _GAUSS).integral
+    (first,) = _values(integrand, wo, cells, _GAUSS)
+    coarse = first.integral
     channels = coarse.shape[1]
     value, error = np.zeros((len(wo), channels)), np.zeros((len(wo), channels))
     allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
         fine_cells = cells.quarters()
-        inner, other, rim = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
+        inner, other = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = inner.integral.reshape(-1, 4, channels)
         difference = np.abs(coarse - fine.sum(1))
-        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them
+        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
+        # and if it is near their rim all of Gauss's
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
-        difference += 0.02 * step_aside(inner, rim).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
+        difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
         divide = difference.max(1) > allowed
         # the tail of a narrow lobe in a cell wider than the lobe: it contains samples, but every node is 0
         level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
@@ -180,12 +182,13 @@ def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: 
     return ((row.astype(np.int64) * 2 + below) * n_a + a) * n_b + b
 
 
-def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: Nodes) -> Seen:
-    """The integrand at nodes of every cell."""
+def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> list[Seen]:
+    """The integrand at the nodes of every cell, for each of some rules with equally many nodes, in one kernel."""
     dr = backend.drjit()
     types = backend.types("float64")
-    nodes = [backend.float_of(column, types) for column in at]
-    many = len(at.s)
+    nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
+    each = len(rules[0].s)
+    many = each * len(rules)
     parts = []
     chunk = (1 << 22) // many
     for start in range(0, len(cells.row), chunk):
@@ -204,9 +207,10 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: Nodes) -> S
         wi = types.vec3(sin * cos_phi, sin * sin_phi, cos * of_cell(part.side))
         value = list(integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi))
         area = sin * width * height
-        sums = [dr.block_sum(channel * (area * weight), many) for channel in value]
+        sums = [dr.block_sum(channel * (area * weight), each) for channel in value]
         summed = sum(value[1:], start=value[0]) * area
-        ends = [dr.block_reduce(op, summed, many) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
+        ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         dr.eval(sums, ends)
         parts.append(Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
-    return Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])
+    seen = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return [Seen(*[column[number :: len(rules)] for column in seen]) for number in range(len(rules))]

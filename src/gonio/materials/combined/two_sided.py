@@ -62,6 +62,10 @@ class TwoSided(BSDF):
         return True
 
     @property
+    def back_differs(self) -> bool:
+        return False
+
+    @property
     def ambient(self) -> Spectrum | None:
         """The base's factor of ambient light."""
         return self.base.ambient

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..report import Report
-from ..verdict import FAIL, KNOWN, Verdict
+from ..verdict import FAIL, KNOWN, TOLERATED, Verdict
 
 SCHEMA = "gonio-baseline/1"
 WORSE = 1.1  # ratio of figures beyond which a failure is new: rounding and other machines change less
@@ -44,7 +44,7 @@ def _failures(data: Any) -> list[tuple[tuple[str, str], float | None]]:
         ((str(card["title"]), str(verdict["law"])), _number(verdict["figure"]))
         for card in data["cards"]
         for verdict in card["verdicts"]
-        if verdict["status"] in (FAIL, KNOWN)
+        if verdict["status"] in (FAIL, KNOWN, TOLERATED)
     ]
 
 
@@ -58,7 +58,7 @@ def text(report: Report) -> str:
         {"title": card.title, "law": verdict.law, "figure": verdict.as_dict()["figure"], "why": verdict.why[:1]}
         for card in report.cards
         for verdict in card.verdicts
-        if verdict.status in (FAIL, KNOWN)
+        if verdict.failed or verdict.excused
     ]
     data = {"schema": SCHEMA, "seed": report.seed, "effort": report.effort, "failures": failures}
     return json.dumps(data, indent=2) + "\n"

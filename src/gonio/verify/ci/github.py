@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 
 from ..report import Report
-from ..verdict import KNOWN
 from . import places
 
 _KINDS = {"error": "error", "warning": "warning", "note": "notice"}
@@ -21,11 +20,11 @@ def text(report: Report) -> str:
     lines = []
     for card in report.cards:
         for verdict in card.verdicts:
-            if not verdict.failed and verdict.status != KNOWN:
+            if not verdict.failed and not verdict.excused:
                 continue
             place = places.of(card, verdict)
             options = {"file": place.file, "line": str(place.line)} if place else {}
-            options["title"] = f"{card.title}: {verdict.law}" + (": known" if verdict.status == KNOWN else "")
+            options["title"] = f"{card.title}: {verdict.law}" + (f": {verdict.status}" if verdict.excused else "")
             named = ",".join(f"{name}={_property(value)}" for name, value in options.items())
             lines.append(f"::{_KINDS[places.level(verdict)]} {named}::{_data(chr(10).join(places.words(verdict)))}\n")
     return "".join(lines)

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ... import files
+from ...errors import InputError
 
 if TYPE_CHECKING:
     from ..report import Report
     from .baseline import Known
 
 Name = str | Path | None
+GRADES = ("invisible", "small", "visible")  # that can be tolerated, the least severe first
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class Outputs:
     junit, sarif    files
     baseline        file of known failures; a report.json will do
     write_baseline  file for the failures, which are known from then on
+    tolerate        the severest grade that fails no report: "invisible", "small" or "visible"; "" fails on all
     """
 
     report: Name = None
@@ -30,9 +33,13 @@ class Outputs:
     sarif: Name = None
     baseline: Name = None
     write_baseline: Name = None
+    tolerate: str = ""
 
     def check(self) -> Known:
         """The known failures. InputError if a file cannot be read or written, before anything is computed."""
+        if self.tolerate not in ("", *GRADES):
+            hint = f"give one of {', '.join(GRADES)}"
+            raise InputError(f"'{self.tolerate}' is not a grade that can be tolerated", "--tolerate", hint)
         if self.report is not None:
             files.check_folder(self.report)
         for file in (self.junit, self.sarif, self.write_baseline):
@@ -53,12 +60,24 @@ class Outputs:
         if self.write_baseline is not None:
             files.write_whole(self.write_baseline, baseline.text(report).encode())
             baseline.apply(report, baseline.read(Path(self.write_baseline)))
+        if self.tolerate:
+            _tolerate(report, self.tolerate)
         if self.report is not None:
             page.write(report, Path(self.report))
         if self.junit is not None:
             files.write_whole(self.junit, junit.text(report).encode())
         if self.sarif is not None:
             files.write_whole(self.sarif, sarif.text(report).encode())
+
+
+def _tolerate(report: Report, most: str) -> None:
+    """Mark the failures of that grade and of less severe ones, so that they do not fail the report."""
+    from ..verdict import TOLERATED
+
+    tolerated = GRADES[: GRADES.index(most) + 1]
+    for verdict in report.failures:
+        if verdict.grade in tolerated:
+            verdict.status = TOLERATED
 
 
 __all__ = ["Outputs"]

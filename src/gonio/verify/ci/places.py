@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from ..verdict import DECLARED, FAIL, KNOWN, Card, Verdict
+from ..verdict import DECLARED, FAIL, Card, Verdict
 
 _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
@@ -43,7 +43,7 @@ def level(verdict: Verdict) -> str:
     """ "error" for a failure, "warning" if no picture shows it, "note" if declared or known, else "none"."""
     if verdict.status == FAIL:
         return "warning" if grade(verdict) in _SLIGHT else "error"
-    return "note" if verdict.status in (DECLARED, KNOWN) else "none"
+    return "note" if verdict.excused or verdict.status == DECLARED else "none"
 
 
 def grade(verdict: Verdict) -> str:

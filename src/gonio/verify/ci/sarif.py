@@ -29,7 +29,7 @@ def text(report: Report) -> str:
             _result(card, verdict, order[verdict.law])
             for card in report.cards
             for verdict in card.verdicts
-            if verdict.failed or verdict.status in (DECLARED, KNOWN)
+            if verdict.failed or verdict.excused or verdict.status == DECLARED
         ],
         "properties": {"seed": report.seed, "effort": report.effort, "tests": report.tests},
     }
@@ -81,6 +81,8 @@ def _result(card: Card, verdict: Verdict, rule: int) -> dict[str, Any]:
     if verdict.status == KNOWN:
         result["baselineState"] = "unchanged"
         result["suppressions"] = [{"kind": "external", "justification": "known from the baseline"}]
+    elif verdict.excused:
+        result["suppressions"] = [{"kind": "external", "justification": "tolerated: no picture shows it"}]
     elif verdict.status == DECLARED:
         result["suppressions"] = [{"kind": "inSource", "justification": "the BSDF declares it"}]
     return result

@@ -42,6 +42,9 @@ def named(ratio: Ratio) -> Cause | None:
     region = _region(ratio, bad)
     if region is None and unsupported is not None:
         return unsupported
+    clamp = _clamp(ratio, bad)
+    if clamp is not None:
+        return clamp
     if region is None:
         # a single channel is a region as well
         text = f"{ratio.name} is 1 but {words}"
@@ -53,6 +56,22 @@ def named(ratio: Ratio) -> Cause | None:
         return _cause(ratio, inside, words)
     text = f"{ratio.name} is 1 everywhere else, and wrong {words}"
     return Cause(text, text)
+
+
+def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
+    """One of the two that has a single value wherever they differ, the largest or smallest of its values."""
+    if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST:
+        return None
+    for values, other, name in ((ratio.above, ratio.below, ratio.top), (ratio.below, ratio.above, ratio.bottom)):
+        clamped, right = values[bad].max(1), other[bad].max(1)
+        middle = float(np.median(clamped))
+        if middle <= 0.0 or np.mean(np.abs(clamped / middle - 1.0) < 1e-4) < 0.99:
+            continue
+        for word, side in (("at most", right > clamped), ("at least", right < clamped)):
+            if side.mean() > 0.99:
+                text = f"{name} is {middle:.4g} wherever the other is {'larger' if word == 'at most' else 'smaller'}"
+                return Cause(f"{text}: clamped to {word} {middle:.4g}?", f"{name} clamped")
+    return None
 
 
 def _part(ratio: Ratio) -> Cause | None:

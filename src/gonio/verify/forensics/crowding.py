@@ -189,7 +189,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
         ("1 / pdf", "samples are uniform, and the pdf is not", lambda o, i: 1.0),
         ("cos_i / pdf", "samples follow the cosine, and the pdf does not", lambda o, i: np.abs(i[:, 2])),
     ]
-    yield Factor("1", "a constant of the pdf", lambda o, i: np.ones(len(o)))
+    yield Factor("1", "a constant of the pdf, or the probability of choosing a lobe", lambda o, i: np.ones(len(o)))
     for formula, guess, value in densities:
         yield Factor(formula, guess, functools.partial(over_pdf, value=value))
     if not subject.transmits:

@@ -5,6 +5,7 @@ It runs after all laws, and only for those that fail; a report without failures 
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -50,6 +51,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
     named: dict[str, str] = {}  # a cause's key, and the law that named it
     faults: dict[str, str] = {}  # an exception without its numbers, and the law that met it first
     nan = False  # whether values are NaN at more than single directions, which affects every other figure
+    infinite = False  # whether some value is
     visible: set[str] = set()  # laws whose failure changes a picture
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
@@ -78,10 +80,12 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
             # a disagreement of two estimates; a gain of eval itself follows from no other law
             follows = FOLLOWS.get(law.name, ()) if cause is None and finding.figure <= finding.tolerance else ()
             leader = next((name for name in follows if name in visible), None)
-            if cause is None and nan:
-                leader = "positivity"
-        if verdict.grade is Grade.NAN and verdict.bias is not None and verdict.bias.average > 0.0:
-            nan = True
+        # a figure of NaN, or among values that are NaN, has no other cause
+        if nan or (infinite and not math.isfinite(finding.figure)):
+            leader = leader or "positivity"
+        if verdict.grade is Grade.NAN:
+            infinite = True
+            nan = nan or (verdict.bias is not None and verdict.bias.average > 0.0)
         if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE):
             visible.add(law.name)
         if leader is not None:

@@ -169,6 +169,10 @@ def _otherwise(ratio: Ratio) -> Fit | None:
     ways: list[tuple[str, str, tuple[Subject, np.ndarray, np.ndarray, str]]] = []
     if not ratio.antisymmetric:
         ways.append(("with wo and wi exchanged", "swapped arguments", (subject, wi, wo, "radiance")))
+        flips = {"wi.x": (-1.0, 1.0, 1.0), "wi.y": (1.0, -1.0, 1.0), "wi.x and wi.y": (-1.0, -1.0, 1.0)}
+        for text, flip in flips.items():
+            guess = "a sign of a tangent, or a direction that points the other way"
+            ways.append((f"with the sign of {text} flipped", guess, (subject, wo, wi * np.array(flip), "radiance")))
     if subject.transmits:
         for mode in ("radiance", "importance"):
             ways.append((f"in mode {mode}", "`mode` is ignored, or inverted", (subject, wo, wi, mode)))

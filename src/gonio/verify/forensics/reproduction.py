@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from ..subject import Subject
 from ..verdict import Finding
 from . import crowding
 
-HEAD = """import drjit as dr
+HEAD = """import glob, os, sys
+for library in glob.glob(sys.prefix + "/lib/libLLVM*.so*"):  # LLVM 14 to 16, which a system may have, abort
+    os.environ.setdefault("DRJIT_LIBLLVM_PATH", library)
+import drjit as dr
 import mitsuba as mi
 
 mi.set_variant("llvm_ad_rgb")
@@ -49,7 +53,16 @@ def script(law: str, subject: Subject, finding: Finding) -> str:
 
 
 def _head(subject: Subject, wo: np.ndarray) -> str:
-    return HEAD.format(plugin=_literal(subject.model.plugin), wo=_vector(wo))
+    return _registered(subject, HEAD.format(plugin=_literal(subject.model.plugin), wo=_vector(wo)))
+
+
+def _registered(subject: Subject, head: str) -> str:
+    """The head of a program, which also runs the file that registers the plugin, if there is one."""
+    file, _, name = subject.target.rpartition(":")
+    if not (name and file.endswith(".py")):
+        return head
+    run = f"import runpy\nrunpy.run_path({str(Path(file).expanduser().resolve())!r})  # registers the plugin\nbsdf ="
+    return head.replace("bsdf =", run, 1)
 
 
 def _vector(w: np.ndarray) -> str:
@@ -191,7 +204,9 @@ def _linearity(subject: Subject, finding: Finding) -> str:
     wo, wi = finding.at
     at = {v: subject.replace(**{name: v}).model.plugin for v in (0.125, 0.3125, 0.875)}
     head = HEAD.format(plugin=_literal(at[0.125]), wo=_vector(wo)).replace("1 << 24", "1")
-    head = head.replace(f"bsdf = mi.load_dict({_literal(at[0.125])})", f"plugin = {_literal(at[0.125])}")
+    head = _registered(subject, head).replace(
+        f"bsdf = mi.load_dict({_literal(at[0.125])})", f"plugin = {_literal(at[0.125])}"
+    )
     return head + (
         f"wo, values = {_vector(wi)}, []\n"
         "for v in (0.125, 0.3125, 0.875):\n"

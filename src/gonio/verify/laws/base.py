@@ -25,6 +25,7 @@ class Law:
     meaning  the effect of a violation on pictures
     everywhere  whether it is also judged at other values of the parameters
     at_ends     and at the ends of their ranges
+    samples     whether it judges `sample`, of which at other values of the parameters only few guides are computed
     on_request  whether it is judged only when it is named
     """
 
@@ -35,6 +36,7 @@ class Law:
     meaning: ClassVar[str] = ""
     everywhere: ClassVar[bool] = True
     at_ends: ClassVar[bool] = True
+    samples: ClassVar[bool] = False
     on_request: ClassVar[bool] = False
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -80,7 +82,7 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
     if not exact:
         wo, wi = directions.single(wo), directions.single(wi)
     try:
-        drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
+        drawn = subject.sampler.sample(wo[third : 2 * third], directions.numbers(rng, third))
     except Fault:  # the laws of sampling report it; the others need no samples
         return wo, wi
     good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
@@ -89,10 +91,14 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
 
 
 ROUNDINGS = 4
+ROWS = 1 << 20  # per call
+CLOSER = 64  # at the few pairs where that is not enough
 ALLOWED = 8.0  # roundings of the directions that are tolerated of float32 code
 
 
-def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0) -> np.ndarray:
+def rounding(
+    function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0, times: int = ROUNDINGS
+) -> np.ndarray:
     """The change of a value by ALLOWED roundings of both directions in float32 (6e-8 each), (N, channels).
 
     Narrow lobes magnify the rounding of a half vector by 1 / alpha, and a step that close may be crossed; no float32
@@ -101,14 +107,41 @@ def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
     slope, step = np.zeros_like(value), np.zeros_like(value)
-    for _ in range(ROUNDINGS):
-        turns = [rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi)]
-        a, b = (w + 2.0**-24 * turn for w, turn in zip((wo, wi), turns, strict=True))
-        slope = np.maximum(slope, np.abs(function(a, b) - value))
-        for side in (ALLOWED, -ALLOWED):  # one of the two crosses a step that close
-            a, b = (w + 2.0**-24 * side * np.sign(turn) for w, turn in zip((wo, wi), turns, strict=True))
-            step = np.maximum(step, np.abs(function(a, b) - value))
+    together = max(1, ROWS // max(3 * len(wo), 1))  # changes of direction per call: calls of few rows cost as much
+    for first in range(0, times, together):
+        moved: list[tuple[np.ndarray, np.ndarray]] = []
+        for _ in range(min(together, times - first)):
+            turns = [rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi)]
+            moved.append((wo + 2.0**-24 * turns[0], wi + 2.0**-24 * turns[1]))
+            for side in (ALLOWED, -ALLOWED):  # one of the two crosses a step that close
+                moved.append((wo + 2.0**-24 * side * np.sign(turns[0]), wi + 2.0**-24 * side * np.sign(turns[1])))
+        values = function(*(np.concatenate(part) for part in zip(*moved, strict=True))).reshape(-1, 3, *value.shape)
+        change = np.abs(values - value)
+        slope, step = np.maximum(slope, change[:, 0].max(0)), np.maximum(step, change[:, 1:].max((0, 1)))
     return np.where(step > 4.0 * ALLOWED * slope, step, ALLOWED * slope)
+
+
+def beyond_rounding(
+    a: np.ndarray,
+    b: np.ndarray,
+    function: Callable[..., np.ndarray],
+    wo: np.ndarray,
+    wi: np.ndarray,
+    floor: float | np.ndarray,
+    tolerance: float,
+) -> np.ndarray:
+    """The relative difference of a and b (N, channels) beyond the rounding of the directions of `function`.
+
+    Pairs above the tolerance are looked at again: of four random changes of direction none may show how fast a value
+    changes where it is steepest.
+    """
+    error = relative(a, b, rounding(function, wo, wi), floor)
+    over = np.flatnonzero(error.max(1) > tolerance)
+    if 0 < len(over) < len(error) // 100:
+        floor = floor[over] if isinstance(floor, np.ndarray) else floor
+        noise = rounding(function, wo[over], wi[over], 1, CLOSER)
+        error[over] = np.minimum(error[over], relative(a[over], b[over], noise, floor))
+    return error
 
 
 def relative(a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: float = 0.0) -> np.ndarray:

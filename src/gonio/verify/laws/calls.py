@@ -9,7 +9,7 @@ import numpy as np
 
 from ...bridge.answers import Answer
 from ...errors import InputError
-from ...material import BSDF, tree
+from ...material import BSDF
 from ...ops import Mode, Precision, backend
 from .. import box, directions, severity
 from ..effort import Effort
@@ -192,7 +192,7 @@ def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
     """The largest difference beyond `same`, relative to the larger value, as text."""
-    lit = first["sample's pdf"][:, 0] > 0.0
+    lit = first["sample's pdf"][:, 0] > 0.0 if "sample's pdf" in first else np.ones(len(wo), bool)
     for name, a in first.items():
         b = second[name]
         if a.shape != b.shape:
@@ -256,15 +256,17 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})
     if together is None:
         return
+
+    def results(one: Subject) -> dict[str, np.ndarray]:
+        # a guide depends on all values together: its density and samples differ from those of one value
+        return {"eval": one.eval(wo, wi)} if one.guided else _answers(one, wo, wi, u, one.best)[0]
+
     try:
-        separate = [_answers(subject.replace(**values), wo, wi, u, subject.best)[0] for values in ends]
+        separate = [results(subject.replace(**values)) for values in ends]
     except InputError:
         return  # the material rejects this combination of values
-    (mixed,) = _answers(together, wo, wi, u, subject.best)
+    mixed = results(together)
     each = {name: np.where(odd[:, None], separate[1][name], first) for name, first in separate[0].items()}
-    if any(one.guided for _, one in tree.walk(subject.model)):
-        # a guide depends on all values together: its density and samples differ from those of one value
-        mixed = {**each, "eval": mixed["eval"]}
     names = " and ".join(list(ends[0])[:3])
     answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
     yield answer._replace(wrong=f"{answer.wrong}, {names} from ray to ray") if answer.wrong else answer
@@ -283,7 +285,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Declared facts agree with the results: `transmits`, `two_sided`, `delta`, and the eta of samples."""
+    """Declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, eta of samples."""
     model = subject.model
     # all pairs of sides, even those without declared values
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))
@@ -297,16 +299,16 @@ def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> s
         if np.any(bright & across) or np.any(lit & sampled_across):
             return "light is transmitted, and `transmits` says that none is"
         below = np.any(bright & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
-        declared = bool(getattr(model, "two_sided", True))
-        if below and not declared and subject.best == "float64":
-            return "it reflects light from below, and neither `transmits` nor `two_sided` says so"
-        if declared and subject.best == "float64" and 1 in subject.sides:
+        same, other = bool(getattr(model, "two_sided", True)), bool(getattr(model, "back_differs", False))
+        if below and not (same or other) and subject.best == "float64":
+            return "it reflects light from below, and none of `transmits`, `two_sided` and `back_differs` says so"
+        if same and not other and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
             over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
-                return "`two_sided` says that both sides are the same, and their values differ"
+                return "`two_sided` says that both sides are the same, and their values differ: `back_differs`?"
     fact = getattr(model, "delta", "maybe")
     if fact == "never" and np.any(lit & drawn.delta):
         return 'it has delta samples, and `delta` says "never"'

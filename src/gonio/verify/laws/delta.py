@@ -33,6 +33,7 @@ class DeltaLobes(Law):
     Fresnel's equations for its own index, is reciprocal, and is chosen as often as its pdf states."""
 
     number = 10
+    samples = True
     name = "delta"
     title = "delta lobes obey Snell's law, Fresnel's equations and reciprocity"
     meaning = "Mirror images and views through glass are displaced, too bright or too dark."

@@ -9,18 +9,20 @@ import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
-from ...material import BSDF
+from ...material import BSDF, tree
 from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..forensics.causes import place_of
+from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
 from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
-from .base import Law
+from .base import Law, where_found
 
 GAIN = 1e-3
+MOST_ALONE = 6  # parameters that are whitened alone
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
 
@@ -43,7 +45,8 @@ class Energy(Law):
             figure=0.0, tolerance=GAIN, reason="a quarter of an 8-bit step; the integrals are ten times more accurate"
         )
         value, error = _quadrature(subject, wo, effort, seed)
-        mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed)
+        guided = subject.drawn_by is not None  # sampled by a guide of its own at the given values only
+        mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed) if not guided else [value] * 3
         curves = AlbedoCurves(wo, value, error, mean, noise)
         excess = value.max(1) - error.max(1) - 1.0
         row = int(np.argmax(excess))
@@ -52,7 +55,7 @@ class Energy(Law):
         theta = directions.angles(wo)[:, 0]
         finding.worst = f"wo at {theta[row]:.4g} degrees, channel {channel}: albedo {value[row, channel]:.5f}"
         finding.shown = f"albedo {value.min():.4f} to {value.max():.4f}"
-        for i in range(len(wo)):
+        for i in range(0 if guided else len(wo)):
             p = _agreement(value[i], error[i], mean[i], noise[i], heavy[i])
 
             def repeat(i: int = i) -> float:
@@ -62,17 +65,24 @@ class Energy(Law):
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
+        masking = mismatch(subject) if effort.full else ""
+        if masking:
+            finding.problems.append(masking)
         white = lossless_variant(subject)
         if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
             white = subject  # it has no albedo to set, but claims to be lossless
+        if white is not None and subject.guided:  # a guide of its own would take seconds
+            white = dataclasses.replace(white, drawn_by=subject.sampler)
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
+            self._one_at_a_time(subject, wo, effort, seed, finding)
         if finding.figure > GAIN:
             finding.shown = f"gain {finding.figure:.4f}"
         finding.evidence = curves
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        subject = where_found(subject, finding)
         biases = [estimators.sampling_bias(subject)]
         if finding.figure > finding.tolerance:
             biases.append(estimators.gain_bias(subject))
@@ -85,6 +95,7 @@ class Energy(Law):
         return max(biases, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        yield from (Cause(problem, "masking") for problem in finding.problems if problem.startswith("the masking"))
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
@@ -161,6 +172,28 @@ class Energy(Law):
                 f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
             )
 
+    def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
+        """A gain with one albedo 1, or one F = 1, alone: with all of them another term may make up for it."""
+        if not effort.full or not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
+            return
+        white = {
+            leaf.path: leaf.parameter.white
+            for leaf in tree.leaves(subject.model)
+            if leaf.parameter.white is not None and not leaf.parameter.inner and leaf.path not in subject.model.fixed
+        }
+        coarse = dataclasses.replace(effort, accuracy=3e-4)
+        for path, value in [*white.items()][:MOST_ALONE] if len(white) > 1 else ():
+            try:
+                alone = subject.replace(**{path: value})
+            except InputError:
+                continue
+            alone = dataclasses.replace(alone, drawn_by=subject if subject.guided else None)
+            albedo, error = _quadrature(alone, wo[:: max(len(wo) // 4, 1)], coarse, seed)
+            gain = float((albedo - error).max() - 1.0)
+            if gain > max(finding.figure, GAIN):
+                finding.figure, finding.settings = gain, {path: value}
+                finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
+
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
     """The channel of a white furnace that is a constant times the other two, which are equal."""
@@ -189,12 +222,26 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
         return _randomly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(subject.sample, subject.power(), wo, effort.accuracy, seed)
+    integral = cubature.integrate(_seeds(subject), subject.power(), wo, effort.accuracy, seed)
     return integral.value + ideal, integral.error + effort.accuracy
+
+
+def _seeds(subject: Subject) -> cubature.Sampler:
+    """The subject's samples that carry light: cells around the others, as in a black sector, need not be divided."""
+
+    def sample(wo: np.ndarray, u: np.ndarray) -> object:
+        s = subject.sampler.sample(wo, u)
+        unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-3
+        dark = subject.eval(wo, np.where(unit[:, None], s.wi, [0.0, 0.0, 1.0])).max(1) <= 0.0
+        return s._replace(pdf=np.where(dark & ~s.delta, 0.0, s.pdf))
+
+    return sample
 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
     """The light of all delta lobes, (N, channels)."""
+    if subject.drawn_by is not None and subject.guided and getattr(subject.model, "delta", "maybe") == "never":
+        return np.zeros((len(wo), subject.eval(wo[:1], wo[:1], precision="float32").shape[1]))
     power = lobes.of(subject, wo, seed, "importance")
     carried = power.carried
     if not full and carried.size:

@@ -87,6 +87,10 @@ class Isotropy(Law):
             wo, wi = pairs(subject, 4096, seed)
             turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
             there, back = subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
+            if np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back)) < 1e-3:
+                words = "values change when both directions are mirrored, and not when they rotate: a lobe to one side"
+                yield Cause(f"{words}, as from a sine of the azimuth between them, or a cross product?", "handed")
+                return
             off = np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back), axis=0)
             names = [name for name, share in zip(("red", "green", "blue"), off, strict=False) if share > 0.01]
             where = f" in {' and '.join(names)}" if len(off) == 3 and 0 < len(names) < 3 else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 
@@ -34,20 +35,25 @@ class Linearity(Law):
         if subject.stochastic:
             raise DoesNotApply("the model is stochastic: its single values are random")
         wo, wi = pairs(subject, effort.pairs // 4, seed)
-        cases = [(name, *pair(wo, wi)) for name, pair in _pairs(subject).items()]
+        cases = [(name.partition(":")[0], name, *pair(wo, wi)) for name, pair in _pairs(subject).items()]
         if not cases:
             raise DoesNotApply("it has no albedo to change, and is not a Gonio material that could be mixed")
         exact = subject.best == "float64"
-        dead = [label for label, _, _ in cases if label != "mix" and effort.full and _is_dead(subject, label, wo, wi)]
-        worst, place, name, notes = -1.0, 0, "", [f"tried: {', '.join(label for label, _, _ in cases)}"]
+        tried = list(dict.fromkeys(label for label, *_ in cases))
+        dead = [label for label in tried if label != "mix" and effort.full and _is_dead(subject, label, wo, wi)]
+        worst, place, name, notes = -1.0, 0, "", [f"tried: {', '.join(tried)}"]
         tolerance = EXACT if exact else SINGLE
-        for label, a, b in cases:
+        for label, case, a, b in cases:
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
+            if size > tolerance and case != label:
+                # as where one layer dims another by its brightest channel
+                notes.append(f"{label} is not linear between two colors: off by {size:.2g}")
+                continue
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi):
                 notes.append(f"{label} counts more than once, as with several bounces of light: off by {size:.2g}")
                 continue
             if size > worst:
-                worst, place, name = size, row, label
+                worst, place, name = size, row, case
         return Finding(
             figure=max(worst, 0.0),
             tolerance=tolerance,
@@ -55,11 +61,12 @@ class Linearity(Law):
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=[f"{name} changes nothing" for name in dead],
-            notes=notes,
+            notes=list(dict.fromkeys(notes)),
+            details=name,
         )
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
-        name = finding.worst.partition(":")[0]
+        name = str(finding.details)
         pair = _pairs(subject)[name]
 
         def expected_first(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,11 +94,16 @@ class Linearity(Law):
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
     """Values that should be equal: at an albedo between two others, and of a mix, against the interpolation."""
 
-    def between(name: str) -> severity.Pair:
-        low, high, middle = (subject.replace(**{name: v}) for v in (0.125, 0.875, 0.3125))
+    def between(name: str, a: Value, b: Value) -> severity.Pair:
+        low, high = subject.replace(**{name: a}), subject.replace(**{name: b})
+        mean = 0.75 * np.asarray(a) + 0.25 * np.asarray(b)
+        middle = subject.replace(**{name: tuple(mean.tolist()) if mean.ndim else float(mean)})
         return lambda wo, wi: (middle.eval(wo, wi), 0.75 * low.eval(wo, wi) + 0.25 * high.eval(wo, wi))
 
-    cases = {n: between(n) for n, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0}
+    names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
+    cases = {name: between(name, 0.125, 0.875) for name in names}
+    # a mean of the channels, or a difference of two, is linear in gray values
+    cases |= {f"{name}: in color": between(name, *COLORS) for name in names}
     if isinstance(subject.model, BSDF):
         other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
         mixed = Subject(models()["mix"](subject.model, other, 0.25), "mix")  # type: ignore[call-arg]
@@ -100,6 +112,8 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
     return cases
 
 
+Value: TypeAlias = "float | tuple[float, float, float]"
+COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
 STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 

@@ -42,6 +42,7 @@ class Pdf(Law):
     """int pdf dwi = 1 - failed samples, pdf > 0 where eval > 0, and samples are distributed by the pdf (chi-square)."""
 
     number = 4
+    samples = True
     name = "pdf"
     title = "pdf integrates to 1, covers eval, and is the density of the samples"
     meaning = "Multiple importance sampling gives samples wrong weights: energy is lost or gained, or noise persists."

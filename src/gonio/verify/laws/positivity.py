@@ -192,6 +192,8 @@ def _values(
     """Each checked quantity: its name, values (n, channels), directions, and rows."""
     rows = np.arange(len(wo))
     yield "eval", subject.eval(wo, wi, precision=precision), wo, wi, rows
+    if subject.drawn_by is not None:
+        return  # pdf and samples are those of a guide, whose weights are eval over its own density
     yield "pdf", subject.pdf(wo, wi, precision)[:, None], wo, wi, rows
     s = subject.sample(wo, u, precision=precision)
     shown = np.where(np.isfinite(s.wi), s.wi, 0.0)

@@ -14,7 +14,7 @@ from ..forensics.causes import place_of
 from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
-from .base import ALLOWED, Law, pair_in_words, pairs, relative, rounding, worst_of
+from .base import ALLOWED, Law, beyond_rounding, pair_in_words, pairs, relative, rounding, worst_of
 
 TOLERANCE = 1e-3
 
@@ -37,16 +37,15 @@ class Precision(Law):
         wo, wi = pairs(subject, effort.pairs, seed)
         worst, place, name, plain = -1.0, 0, "", 0.0
         curve = np.zeros(len(wo))
-        for what in ("eval", "pdf"):
+        for what in ("eval", "pdf") if subject.drawn_by is None else ("eval",):
 
             def values(a: np.ndarray, b: np.ndarray, p: ops.Precision = "float64", what: str = what) -> np.ndarray:
                 return subject.eval(a, b, precision=p) if what == "eval" else subject.pdf(a, b, p)[:, None]
 
             quick, exact = values(wo, wi, "float32"), values(wo, wi)
-            noise = rounding(values, wo, wi)
             floor = 1e-6 * float(np.percentile(np.abs(exact), 99.0))
             plain = max(plain, float(np.percentile(relative(quick, exact, 0.0, floor), 99.9)))
-            error = relative(quick, exact, noise, floor)
+            error = beyond_rounding(quick, exact, values, wo, wi, floor, TOLERANCE)
             if what == "eval":
                 curve = relative(quick, exact, 0.0, floor).max(1)
             row, size = worst_of(error)
@@ -73,5 +72,11 @@ class Precision(Law):
         noise = rounding(lambda a, b: subject.eval(a, b), wo, wi)
         bad = relative(single, exact, noise, 1e-6 * float(np.percentile(np.abs(exact), 99.0))).max(1) > TOLERANCE
         place = place_of(wo, wi, bad)
+        # of a product or a power, one part too large may make the whole 0, infinite or NaN
+        lost = ~np.isfinite(single) | ((single == 0.0) & (exact != 0.0))
+        if bad.any() and lost.any(1)[bad].mean() > 0.5:
+            words = "float32 is 0 or not finite where float64 has a value" + (f", {place}" if place else "")
+            yield Cause(f"{words}: a power or an exponential beyond its range, 1e-38 to 3e38?", "overflow")
+            return
         words = "float32 loses digits of float64" + (f", {place}" if place else "")
         yield Cause(f"{words}: a difference of two nearly equal numbers?", "cancellation")

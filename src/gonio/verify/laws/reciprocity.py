@@ -152,7 +152,7 @@ def _eta(subject: Subject, seed: int) -> float:
         return 1.0
     rng = np.random.default_rng([seed, 4])
     wo = directions.on_side(directions.uniform(rng, 4096), 1)
-    drawn = subject.sample(wo, directions.numbers(rng, 4096))
+    drawn = subject.sampler.sample(wo, directions.numbers(rng, 4096))
     through = (drawn.pdf > 0.0) & (drawn.wi[:, 2] < 0.0)
     if np.any(through & ~drawn.delta):  # light through a hole carries no information about the index
         through &= ~drawn.delta
@@ -172,7 +172,7 @@ def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, ex
         # a billionth of the largest value is as good as 0
         floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
         return relative(there, back, 0.0, floor)
-    noise = rounding(lambda a, b: subject.f(a, b) * scale, wo, wi) + rounding(subject.f, wi, wo)
+    noise = rounding(lambda a, b: subject.f(a, b) * _scale(a, b, eta)[:, None], wo, wi) + rounding(subject.f, wi, wo)
     floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
     return relative(there, back, noise, floor)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,6 +18,8 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 EXACT = 1e-10
 SINGLE = 2e-3
 LOBE = 1e4  # 1/sr; larger values and densities are those of a lobe of a degree at most
+ENDS = (0.0, 1.0 - 2.0**-24)  # of a random number
+EVERY = 64  # samples, one of which has a certain number at a certain end
 ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
 PAIRS = 1 << 13  # samples, to find a cause
 
@@ -25,6 +28,7 @@ class Weight(Law):
     """weight = eval / pdf at the sampled wi; declared delta samples have neither a value nor a pdf."""
 
     number = 5
+    samples = True
     name = "weight"
     title = "weight = eval / pdf at the sampled wi; delta samples are declared"
     meaning = "Brightness depends on the integrator: BSDF sampling and light sampling converge to different pictures."
@@ -80,6 +84,9 @@ class Weight(Law):
                     lambda b, x, y, m: b.pdf(x, y)[:, None],
                 )
             value = subject.eval(o, i, mode)
+            clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30))
+            if clamped:
+                yield Cause(f"the weight is {clamped}", "clamped weight")
             if _gray(s.weight[rows]) and not _gray(value):
                 yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
@@ -132,7 +139,7 @@ class Weight(Law):
                 relative(a, b, noise_value, floor).max(1),
                 relative(c, d, noise_pdf, 1e-6 * scale.max(1, keepdims=True))[:, 0],
             )
-            if precision == "float32":
+            if precision == "float32" and not error.max() <= SINGLE:
                 # a direction that rounding moves over an edge (the horizon, total reflection) is not an error
                 error = np.where(_on_edge(subject, wo[rows], s.wi[rows], precision), 0.0, error)
             row, size = worst_of(error)
@@ -144,12 +151,30 @@ class Weight(Law):
 def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precision) -> np.ndarray:
     """Whether a change of wi by a few roundings makes the value or the pdf vanish, or appear."""
     rng = np.random.default_rng(8)
-    lit = [subject.pdf(wo, wi, precision) > 0.0]
-    for _ in range(6):
-        moved = wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape)
-        lit.append(subject.pdf(wo, moved, precision) > 0.0)
-        lit.append(np.any(subject.eval(wo, moved, precision=precision) > 0.0, axis=1))
+    moved = np.concatenate([wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape) for _ in range(6)])
+    many = np.tile(wo, (6, 1))
+    values = np.any(subject.eval(many, moved, precision=precision) > 0.0, axis=1).reshape(6, -1)
+    densities = (subject.pdf(many, moved, precision) > 0.0).reshape(6, -1)
+    lit = np.concatenate([subject.pdf(wo, wi, precision)[None] > 0.0, densities, values])
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
+
+
+def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
+    """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else ""."""
+    off = np.abs(weight - right) > 0.01 * np.maximum(weight, right)
+    if off.sum() < 64 or off.mean() > 0.97:
+        return ""
+    values = weight[off]
+    most = float(np.median(values))
+    if most <= 0.0 or np.mean(np.abs(values / most - 1.0) < 1e-4) < 0.99:
+        return ""
+    if np.all(right[off] > values):
+        return f"{most:.4g} wherever eval / pdf is larger: clamped to at most {most:.4g}?"
+    return (
+        f"{most:.4g} wherever eval / pdf is smaller: clamped to at least {most:.4g}?"
+        if np.all(right[off] < values)
+        else ""
+    )
 
 
 def _gray(values: np.ndarray) -> bool:
@@ -161,7 +186,10 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
     rng = np.random.default_rng([seed, 5])
     wo = directions.uniform(rng, count)
     wo[:, 2] = np.abs(wo[:, 2]) * rng.choice(np.array(subject.sides or (1,)), count)
-    return directions.single(wo), directions.numbers(rng, count)
+    u = directions.numbers(rng, count)
+    for number, (which, end) in enumerate(itertools.product(range(3), ENDS)):  # where inversions divide by 0 or end
+        u[number::EVERY, which] = end
+    return directions.single(wo), u
 
 
 def _conventions(s: object, problems: list[str], precision: Precision) -> None:
