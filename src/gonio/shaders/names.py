@@ -10,7 +10,7 @@ from ..ops.graph import first_free
 from ..ops.table import Table
 from .languages import Language
 from .placement import Placement
-from .program import Program, place
+from .program import Routines, place
 from .source import module_constant
 from .syntax import literal
 from .values import Kind, Record, Routine, Value, check_single, stem_of
@@ -29,7 +29,7 @@ class Names:
 
     def __init__(
         self,
-        program: Program,
+        program: Routines,
         language: Language,
         placement: Placement | None = None,
         renamed: Mapping[str, str] | None = None,

@@ -16,7 +16,7 @@ from .layout import COLUMNS, INDENT, comment, wrap
 from .manifest import TERMS
 from .names import Names
 from .operations import operations
-from .program import ENTRIES, Program, choices
+from .program import ENTRIES, Program, Routines, choices
 from .routine import RoutineWriter
 from .syntax import literal
 from .textures import READERS, axes
@@ -37,7 +37,7 @@ class Block(NamedTuple):
     table: Table | None = None
 
 
-def blocks(made: Program, names: Names, bindings: Mapping[int, int]) -> list[Block]:
+def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Block]:
     """The declarations of a shader, each before its use.
 
     bindings  number of the binding of each table, by the table's identity
@@ -76,7 +76,7 @@ def joined(head: Sequence[str], declared: Sequence[Block]) -> str:
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 
 
-def _table(made: Program, names: Names, table: Table, binding: int) -> list[str]:
+def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str]:
     """The declaration of a table's texture, and the functions that read it."""
     language = names.language
     size = " x ".join(map(str, table.shape))
@@ -122,7 +122,7 @@ def head(made: Program, names: Names) -> list[str]:
     ]
     for call, (method, _) in zip(calls, entries, strict=True):
         lines.append(f"// {call:{max(map(len, calls))}}  {ENTRIES[method]}")
-    lines += ["//", *_costs(made, names)]
+    lines += ["//", *costs({names.routines[routine]: operations(routine) for routine in made.entries.values()})]
     lines += [
         "//",
         "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
@@ -131,9 +131,8 @@ def head(made: Program, names: Names) -> list[str]:
     return lines
 
 
-def _costs(made: Program, names: Names) -> list[str]:
-    """The operations of each function, in lines of a comment."""
-    counts = {names.routines[routine]: operations(routine) for routine in made.entries.values()}
+def costs(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """The operations of each function by kind, in lines of a comment."""
     parts = []
     for name, kinds in counts.items():
         listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
@@ -149,10 +148,10 @@ def _arguments(made: Program, method: str, language: Language) -> list[str]:
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
 
 
-def structs(made: Program, names: Names) -> list[Record]:
+def structs(made: Routines, names: Names) -> list[Record]:
     own = made.struct_of(made.bound)
-    assert own is not None
-    names.note(own.record)
+    if own is not None:
+        names.note(own.record)
     if made.derived is not None:
         names.note(made.derived.record)
     return list(names.records.values())
