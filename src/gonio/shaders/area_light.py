@@ -9,8 +9,8 @@ from .bundle import Bundle
 from .functions import functions_bundle
 from .placement import Placement
 
-TITLE = """Light that a surface reflects from a convex quadrilateral of uniform radiance 1, by linearly transformed cosines
-(Heitz2016a).
+TITLE = """Light that a surface reflects from a convex quadrilateral of uniform radiance 1, by linearly transformed
+cosines (Heitz2016a).
 
 wo and the corners are vectors from the point of the surface, in its local frame, +z the shading normal; wo has unit
 length. The corners lie in order around the light, either way; a light with one side is tested before. What is below

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from .. import ops
 from .._version import __version__
+from ..errors import InputError
 from ..ops import graph
 from ..owner import exclusive
 from . import text as texts
@@ -32,7 +33,10 @@ class _Plain(Routines):
 
         def every(**arguments: object) -> tuple[object, ...]:
             """The driver of a recording; not part of the shader."""
-            return tuple(function(*(arguments.get(name) for name in types)) for function, types in functions)
+            return tuple(
+                function(*(arguments[name] if kind else None for name, kind in types.items()))
+                for function, types in functions
+            )
 
         either = inspect.Parameter.KEYWORD_ONLY
         every.__signature__ = inspect.Signature([inspect.Parameter(name, either) for name in kinds])  # type: ignore[attr-defined]
@@ -51,10 +55,14 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
     functions  pairs of a function marked `@function` and the types of its arguments: name -> "float", "vec3", ...; or
                None for an argument that is None and shapes the code
     title      the comment at the beginning of the text
+    Raises InputError for a language of Python files.
     The manifest has the keys lang, shader, functions, operations and textures of a material's.
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
+    if language.standalone:
+        what = f"{language.name} given, a shader language expected: a Python file holds a whole material"
+        raise InputError(what, "emit: lang", "such as glsl, wgsl or hlsl")
     made = _Plain(functions, language.single)
     names = Names(made, language, place)
     bindings = {id(table): place.first_binding + index for index, table in enumerate(made.tables)}

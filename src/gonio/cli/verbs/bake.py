@@ -84,8 +84,10 @@ def bake(
     first, --preset homework-figure the second, sampled as its picture is.
 
     Tables of an anisotropic distribution have a third axis, the azimuth. Of a material without roughness: E over the
-    cosine. `--lut ltc` are linearly transformed cosines of an isotropic material, with the shader code of light from
-    quadrilaterals by them, and its error. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
+    cosine. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
+
+    `--lut ltc` fits linearly transformed cosines to an isotropic material, and writes their error and the shader code
+    of area lights.
 
     \b
     Examples:

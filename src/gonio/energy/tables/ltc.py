@@ -115,14 +115,14 @@ def _check(model: BSDF, size: int) -> str:
         raise InputError(f"linearly transformed cosines of {size} x {size} asked for", "--resolution", "give 2 to 256")
     if not model.isotropic:
         raise InputError(f"{kind} is anisotropic", "--lut", "ltc has one matrix per angle: give both widths one value")
-    path = next(_roughness(model), "")
+    path = next(roughness_paths(model), "")
     if model.stochastic or at(model, path, 1.0).delta != "never":
         what = f"{kind} is estimated by random walks" if model.stochastic else f"{kind} has a mirror lobe"
         raise InputError(what, "--lut", "ltc approximates finite lobes that `eval` computes")
     return path
 
 
-def _roughness(model: BSDF) -> Iterator[str]:
+def roughness_paths(model: BSDF) -> Iterator[str]:
     """Paths of the parameters that a roughness may set: widths first."""
     leaves = list(tree.leaves(model))
     yield from (leaf.path for leaf in leaves if leaf.parameter.kind == "alpha")
@@ -333,7 +333,7 @@ def _inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
 
 
 def covered(inverse: Array, wo: Array, corners: Array) -> Array:
-    """The part of the lobe of W (N, 5), seen along wo (N, 3), that each quadrilateral covers, by the shaders' formula."""
+    """The part of the lobe of each W (N, 5), seen along wo (N, 3), that a quadrilateral covers, as in shaders."""
     kind = backend.types("float64")
     numbers: Any = tuple(kind.float(part) for part in (inverse / inverse[:, 2:3])[:, (0, 1, 3, 4)].T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))
