@@ -85,7 +85,7 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
         "textures": [texture(table, names, bindings) for table in made.tables],
     }
     tables = {names.table(table, "table_"): pixels(table) for table in made.tables}
-    return Bundle(texts.joined(head, texts.blocks(made, names, bindings)), manifest, tables)
+    return Bundle(texts.joined(head, texts.blocks(made, names, bindings), language, place.prefix), manifest, tables)
 
 
 def _arguments(functions: Functions, name: str) -> list[str]:

@@ -53,6 +53,10 @@ class Names:
         """A global name as it is written: replaced if another shader of the module has it, after the prefix."""
         return self.placement.prefix + self.renamed.get(name, name)
 
+    def constant(self, name: str) -> str:
+        """The public name of a constant."""
+        return self.public(self.language.word(name))
+
     def table(self, table: Table, start: str = "") -> str:
         """The public name of a table, or with "table_", "lookup_", "fetch_" that of its texture and its functions."""
         stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
@@ -122,9 +126,9 @@ class Names:
             check_single(number, value.source)
         if value.name and self.constants.get(value.name, (number,))[0] == number:
             self.constants.setdefault(value.name, (number, module_constant(number, value.source)[1]))
-            return self.public(value.name)
+            return self.constant(value.name)
         for name, known in CONSTANTS.items():
             if abs(number) == known:
                 self.constants.setdefault(name, (known, ""))
-                return self.public(name) if number > 0 else f"-{self.public(name)}"
+                return self.constant(name) if number > 0 else f"-{self.constant(name)}"
         return literal(number) if self.language.single else repr(number)

@@ -50,7 +50,7 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
     ]
     result = []
     for name, (value, about) in names.constants.items():
-        line = language.constant(names.public(name), literal(value))
+        line = language.constant(names.constant(name), literal(value))
         if about and len(line) + len(about) + 4 <= 110:
             result.append(Block("constant", name, [f"{line}  // {about}"]))
         else:
@@ -60,7 +60,18 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
         result.append(Block("struct", language.word(record.name), lines))
     for table in made.tables:
         result.append(Block("table", f"table_{table.name}", _table(made, names, table, bindings[id(table)]), table))
-    return result + bodies
+    return result + _helpers(names, bodies) + bodies
+
+
+def _helpers(names: Names, bodies: Sequence[Block]) -> list[Block]:
+    """The functions of the language's own that others call."""
+    text = "\n".join(line for block in bodies for line in block.lines)
+    called = {name: names.public(name) for name in names.language.helpers}
+    return [
+        Block("function", name, [line.format(name=public) for line in names.language.helpers[name]])
+        for name, public in called.items()
+        if re.search(rf"\b{public}\(", text)
+    ]
 
 
 def _raw(names: Names, name: str) -> str:
@@ -69,11 +80,12 @@ def _raw(names: Names, name: str) -> str:
     return next((before for before, after in names.renamed.items() if after == name), name)
 
 
-def joined(head: Sequence[str], declared: Sequence[Block]) -> str:
+def joined(head: Sequence[str], declared: Sequence[Block], language: Language, prefix: str = "") -> str:
     """The text of a shader: constants line after line, all else parted by an empty line."""
     constants = [line for block in declared if block.kind == "constant" for line in block.lines]
-    parts = [list(head), constants, *(block.lines for block in declared if block.kind != "constant")]
-    return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
+    parts = [constants, *(block.lines for block in declared if block.kind != "constant")]
+    lines = "\n\n".join("\n".join(part) for part in parts if part).split("\n")
+    return "\n".join([*head, "", *language.whole(lines, prefix)]) + "\n"
 
 
 def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str]:
