@@ -67,6 +67,7 @@ class Routines:
         self._derived: dict[tuple, Struct] = {}
         self.routines = simplified
         self.tables: list[Table] = []
+        self.readings: dict[int, set[str]] = {}
 
     # ------------------------------------------------------------------ structs
 

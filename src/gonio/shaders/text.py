@@ -14,6 +14,8 @@ from ..ops.table import Table
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment, wrap
 from .manifest import TERMS
+from .method_writer import INTERPOLATED, MethodWriter
+from .method_writer import readers as method_readers
 from .names import Names
 from .operations import operations
 from .program import ENTRIES, Program, Routines, choices
@@ -43,8 +45,9 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
     bindings  number of the binding of each table, by the table's identity
     """
     language = names.language
+    writer = MethodWriter if language.methods else RoutineWriter
     bodies = [
-        Block("function", _raw(names, names.routines[r]), RoutineWriter(names, r).text())
+        Block("function", _raw(names, names.routines[r]), writer(names, r).text())
         for r in made.routines
         if stem_of(r) not in language.native
     ]
@@ -60,6 +63,9 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
         result.append(Block("struct", language.word(record.name), lines))
     for table in made.tables:
         result.append(Block("table", f"table_{table.name}", _table(made, names, table, bindings[id(table)]), table))
+    if language.methods and any("lookup" in how for how in made.readings.values()):
+        lines = INTERPOLATED.strip().format(name=names.public("interpolated")).splitlines()
+        result.insert(0, Block("function", "interpolated", lines))
     return result + _helpers(names, bodies) + bodies
 
 
@@ -99,6 +105,8 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2
     binding_lines = language.binding(names.table(table, "table_"), dimension, binding, *group)
+    if language.methods:
+        return [*binding_lines, "", about, *method_readers(names, table, readings)]
     readers = [line for how in readings for line in ("", *READERS[how](names, table))]
     return [*binding_lines, "", about, *readers[1:]]
 

@@ -60,7 +60,7 @@ def emit(
             "--lang",
             "--language",
             metavar="NAME",
-            help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot; numpy, torch, jax: a Python file.",
+            help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl; numpy, torch, jax: a Python file.",
             autocompletion=completion.languages,
         ),
     ] = "glsl",

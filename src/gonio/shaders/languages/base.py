@@ -29,6 +29,7 @@ class Language:
     single               whether all values are float32
     standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
+    methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
     """
 
@@ -67,6 +68,7 @@ class Language:
     end: ClassVar[str] = ";"
     single: ClassVar[bool] = True
     standalone: ClassVar[bool] = False
+    methods: ClassVar[bool] = False
     templates: ClassVar[bool] = False
 
     def type(self, name: str) -> str:
