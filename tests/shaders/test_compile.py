@@ -97,10 +97,7 @@ GLSLANG = shutil.which("glslangValidator", path=f"{Path(sys.executable).parent}{
 def _glslang(text: str, folder: Path) -> str:
     """What glslang says against HLSL, or ""."""
     assert GLSLANG is not None
-    # glslang knows HLSL as it was before 2021, when ?: still chose component by component
-    source = (
-        "#define select(mask, a, b) ((mask) ? (a) : (b))\n" + text + "\nfloat4 main() : SV_Target { return 0.0; }\n"
-    )
+    source = text + "\nfloat4 main() : SV_Target { return 0.0; }\n"
     file = folder / "shader.hlsl"
     file.write_text(source)
     command = [GLSLANG, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(folder / "out.spv"), str(file)]

@@ -23,15 +23,16 @@ from ..arguments import renamed
 from ..catalog import library, notation, operands, outside
 from ..catalog.operands import Kind
 from ..energy.tables import bake as baking
-from ..energy.tables import prefilter
+from ..energy.tables import ltc, prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
-from ..material import BSDF, is_model, models
+from ..material import BSDF, is_model, model, models
 from ..members import Family
 from ..optics.masking import Masking
 from ..optics.ndf import NDF, distributions
 from ..owner import public
 from ..pictures import images
+from ..shaders.area_light import area_light
 
 BAKED = frozenset({Kind.DISTRIBUTION, Kind.PICTURE, *operands.MATERIALS})
 
@@ -44,7 +45,7 @@ def bake(
     *,
     preset: str | None = None,
     lut: Sequence[str] | None = None,
-    resolution: int = 128,
+    resolution: int | None = None,
     method: str = "quadrature",
     masking: str | None = None,
     samples: int = 1024,
@@ -69,8 +70,9 @@ def bake(
     target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"; or a picture of an
               environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
     output    folder to write to, all files or none; None writes nothing
-    lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass
-    resolution  texels along each axis, 1 to 4096
+    lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass. Or "ltc" alone: linearly
+              transformed cosines of an isotropic target, with the shader code of light from quadrilaterals
+    resolution  texels along each axis, 1 to 4096; None is 128, and 64 of "ltc", which has at most 256
     method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
               by the `sampler` "hammersley", "stratified" or "independent" (of `seed`, 0 if None)
     masking   masking of a distribution; a material has its own
@@ -85,9 +87,13 @@ def bake(
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
     if preset is not None:
-        return _preset(target, output, preset, resolution, seed, store, flip)
+        return _preset(target, output, preset, resolution or 128, seed, store, flip)
     folder = None if output is None else files.check_folder(output)
     ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
+    if lut and "ltc" in lut:
+        _check_ltc(lut, {"layout": layout, "aspect": aspect, "method": method, "floor": floor})
+        return _cosines(_target(target), folder, resolution or ltc.SIZE, masking)
+    resolution = 128 if resolution is None else resolution
     axes = {"resolution": resolution, "layout": layout, "aspect": aspect, "azimuths": azimuths}
     sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed, "floor": floor}
     picture = {"store": store, "flip": flip, "wrap": wrap}
@@ -109,6 +115,35 @@ def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, 
     names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy.tables.bake`
     given = {names.get(name, name): value for name, value in options.items()}
     return baking.cached(target, lut=tuple(lut) if lut else None, **{**given, "seed": given["seed"] or 0})
+
+
+LANGUAGES = ("glsl", "wgsl", "hlsl")  # of the code that comes with linearly transformed cosines
+
+
+def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
+    """Raise InputError for tables and options that do not go with linearly transformed cosines."""
+    if len(lut) > 1:
+        what = f"ltc with '{next(name for name in lut if name != 'ltc')}'"
+        raise InputError(what, "--lut", "its axes are others: bake them into two folders")
+    _check_default(options, "ltc has axes and a method of its own")
+
+
+def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: str | None) -> Baked:
+    """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
+    distribution = isinstance(target, str)
+    if isinstance(target, str):
+        target = model("conductor")(ndf=target, masking=masking or "smith-correlated").lossless()
+    elif masking is not None:
+        raise InputError("masking given for a material", "--masking", "the parameters of the material define it")
+    baked = ltc.bake(target, resolution, schlick=distribution)
+    codes = [area_light(baked, language) for language in LANGUAGES]
+    baked.manifest["textures"] = codes[0].manifest["textures"]
+    if folder is not None:
+        contents = {code.manifest["shader"]: code.text.encode() for code in codes}
+        for texture in codes[0].manifest["textures"]:
+            contents[texture["file"]] = codes[0].tables[texture["uniform"]].astype("<f4").tobytes()
+        _write(baked, folder, contents)
+    return baked
 
 
 def _homework(

@@ -114,7 +114,7 @@ def bundle(
     sources = [_recorded(one, functions, lean, on) for one in models]
     module = Module(language, place, constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
-    text = texts.joined(module.head, module.blocks)
+    text = texts.joined(module.head, module.blocks, language, place.prefix)
     described = manifests[0] if len(manifests) == 1 else of_several(manifests, language)
     return Bundle(text, described, {name: pixels(table) for name, table in module.tables.items()})
 

@@ -223,7 +223,7 @@ class ExpressionWriter:
         infix = "?" in template
         parts = [self.part(mask, OR) if infix else self.unparenthesized(mask)]
         parts += [self.splat(x, value.type, CHOICE + 1 if infix else CHOICE) for x in (a, b)]
-        return template.format(*parts), CHOICE if infix else ATOM
+        return template.format(*parts, prefix=self.names.placement.prefix), CHOICE if infix else ATOM
 
     def splat(self, value: Value, type_: str, level: int = CHOICE) -> str:
         """The text of a value, converted to a vector if it is a float and a vector is needed."""

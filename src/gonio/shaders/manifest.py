@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..material import BSDF, tree
+from ..ops.table import Table
 from ..ops.types import Value
 from . import program as programs
 from .languages import Language
@@ -80,23 +81,25 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
             for name, type_ in (terms.record.fields if terms and terms.record else [])
         ],
         "parameters": list(_parameters(model, set(struct.paths))),
-        "textures": [
-            {
-                "uniform": names.table(table, "table_"),
-                "dimension": 3 if len(axes(table)) == 3 else 2,
-                "size": list(axes(table)),
-                "channels": width(table),
-                "format": {1: "r32float", 2: "rg32float", 4: "rgba32float"}[width(table)],
-                "file": f"{names.table(table)}.f32",
-                "group": names.placement.group,
-                "binding": bindings[id(table)],
-            }
-            for table in made.tables
-        ],
+        "textures": [texture(table, names, bindings) for table in made.tables],
         "transmits": bool(facts.transmits),
         "delta": facts.delta,
         "stochastic": False,
         "isotropic": bool(facts.isotropic),
+    }
+
+
+def texture(table: Table, names: Names, bindings: Mapping[int, int]) -> dict[str, Json]:
+    """The texture of a table."""
+    return {
+        "uniform": names.table(table, "table_"),
+        "dimension": 3 if len(axes(table)) == 3 else 2,
+        "size": list(axes(table)),
+        "channels": width(table),
+        "format": {1: "r32float", 2: "rg32float", 4: "rgba32float"}[width(table)],
+        "file": f"{names.table(table)}.f32",
+        "group": names.placement.group,
+        "binding": bindings[id(table)],
     }
 
 

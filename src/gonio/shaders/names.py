@@ -10,7 +10,7 @@ from ..ops.graph import first_free
 from ..ops.table import Table
 from .languages import Language
 from .placement import Placement
-from .program import Program, place
+from .program import Routines, place
 from .source import module_constant
 from .syntax import literal
 from .values import Kind, Record, Routine, Value, check_single, stem_of
@@ -29,7 +29,7 @@ class Names:
 
     def __init__(
         self,
-        program: Program,
+        program: Routines,
         language: Language,
         placement: Placement | None = None,
         renamed: Mapping[str, str] | None = None,
@@ -52,6 +52,10 @@ class Names:
     def public(self, name: str) -> str:
         """A global name as it is written: replaced if another shader of the module has it, after the prefix."""
         return self.placement.prefix + self.renamed.get(name, name)
+
+    def constant(self, name: str) -> str:
+        """The public name of a constant."""
+        return self.public(self.language.word(name))
 
     def table(self, table: Table, start: str = "") -> str:
         """The public name of a table, or with "table_", "lookup_", "fetch_" that of its texture and its functions."""
@@ -122,9 +126,9 @@ class Names:
             check_single(number, value.source)
         if value.name and self.constants.get(value.name, (number,))[0] == number:
             self.constants.setdefault(value.name, (number, module_constant(number, value.source)[1]))
-            return self.public(value.name)
+            return self.constant(value.name)
         for name, known in CONSTANTS.items():
             if abs(number) == known:
                 self.constants.setdefault(name, (known, ""))
-                return self.public(name) if number > 0 else f"-{self.public(name)}"
+                return self.constant(name) if number > 0 else f"-{self.constant(name)}"
         return literal(number) if self.language.single else repr(number)

@@ -35,4 +35,4 @@ class Placement:
                 raise InputError(f"{number!r} given, a whole number >= 0 expected", f"{LOCATION}: {name}")
         if self.group and not language.groups:
             what = f"group {self.group} given, and {language.title or language.name} has no groups of bindings"
-            raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl or glsl-vulkan")
+            raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl, slang or glsl-vulkan")

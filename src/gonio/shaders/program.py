@@ -43,39 +43,31 @@ class Struct:
         self.paths = [path for path, _ in fields]
 
 
-class Program:
-    """The parts of a model's shader.
+class Routines:
+    """What the text of a shader is written from.
 
     routines  in order of definition, callees first
-    entries   method -> its routine, including "derive" if there is something to derive
-    structs   of parameters, derived values and results, in order of use
-    without   paths of parameters that are off and shape the code
-    single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
+    entries   name -> the routine that a program calls
+    recorded  the recording of each routine
+    bound     the material of symbols, if there is one
     tables    the tables that are read
     readings  for each table, by identity, how it is read: "lookup" or "fetch"
     """
 
-    def __init__(
-        self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = (), single: bool = True
-    ) -> None:
-        self.model, self.without = model, tuple(without)
-        self.bound = recording.symbols(model, self.without)
-        recorded = _record(self.bound, functions, single)
+    bound: BSDF | None = None
+    derives: str = ""  # name of the routine that computes derived values
+
+    def __init__(self, recorded: graph.Graph, single: bool) -> None:
         simplified = routines(recorded, guarded=not single)
         self.driver = simplified.pop()
         functions_of = dict(zip((r.name for r in simplified), recorded.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
         self.entries: dict[str, Routine] = {}
-        stem = graph.class_name(model)
-        for routine in simplified:
-            for method in (*functions, "derive"):
-                if routine.name == f"{stem}_{method}":
-                    self.entries[method] = routine
         self._parameters: dict[tuple, Struct] = {}
         self._derived: dict[tuple, Struct] = {}
-        self.routines = self._reachable(simplified)
-        self._trim_derived()
-        self.tables = self._tables()
+        self.routines = simplified
+        self.tables: list[Table] = []
+        self.readings: dict[int, set[str]] = {}
 
     # ------------------------------------------------------------------ structs
 
@@ -95,6 +87,83 @@ class Program:
         """The struct of the quantities derived from a model's parameters; also for the dict itself."""
         key = tuple(derived_list(value))
         return self._derived.get(key)
+
+    @property
+    def _with_derived(self) -> object:
+        """An argument that holds the derived values of the whole model."""
+        for method, routine in self.entries.items():
+            if method != "derive":
+                return self.recorded[routine].arguments["self"]
+        return None
+
+    @property
+    def derived(self) -> Struct | None:
+        """The struct that the entries take in addition to the parameters."""
+        return self.derived_of(self._with_derived) if "derive" in self.entries else None
+
+    # ------------------------------------------------------------------ contents
+
+    def _reachable(self, all_: list[Routine]) -> list[Routine]:
+        wanted = set(self.entries.values())
+        for routine in reversed(all_):  # callers come after callees
+            if routine in wanted:
+                wanted |= {v.static for v in routine.values() if v.op == "call"}
+        for routine in all_:
+            unnamed = routine.record is None and not routine.single
+            if routine in wanted and unnamed and routine.name != self.derives:
+                self._name_result(routine)
+        return [routine for routine in all_ if routine in wanted]
+
+    def _name_result(self, routine: Routine) -> None:
+        result = self.recorded[routine].result
+        if routine.name.endswith("_terms"):
+            name = routine.name.removesuffix("_terms") + "Terms"
+        elif hasattr(result, "_fields"):
+            name = type(result).__name__
+        else:
+            name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
+        fields = [(_result_name(path, value), value.type) for path, value in routine.results]
+        doc = inspect.getdoc(type(result)) or "" if hasattr(result, "_fields") else ""
+        routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)))
+
+    def _tables(self) -> list[Table]:
+        tables: dict[int, Table] = {}
+        self.readings: dict[int, set[str]] = {}
+        for routine in self.routines:
+            for value in routine.values():
+                if value.op == "texel":
+                    table, _, how = value.static
+                    tables.setdefault(id(table), table)
+                    self.readings.setdefault(id(table), set()).add(how)
+        return list(tables.values())
+
+
+class Program(Routines):
+    """The parts of a model's shader.
+
+    entries   method -> its routine, including "derive" if there is something to derive
+    structs   of parameters, derived values and results, in order of use
+    without   paths of parameters that are off and shape the code
+    single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
+    """
+
+    bound: BSDF
+
+    def __init__(
+        self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = (), single: bool = True
+    ) -> None:
+        self.model, self.without = model, tuple(without)
+        self.bound = recording.symbols(model, self.without)
+        super().__init__(_record(self.bound, functions, single), single)
+        stem = graph.class_name(model)
+        self.derives = f"{stem}_derive"
+        for routine in self.routines:
+            for method in (*functions, "derive"):
+                if routine.name == f"{stem}_{method}":
+                    self.entries[method] = routine
+        self.routines = self._reachable(self.routines)
+        self._trim_derived()
+        self.tables = self._tables()
 
     def _trim_derived(self) -> None:
         """Make one struct for each structure of derived values, with the fields that are used."""
@@ -132,55 +201,6 @@ class Program:
         derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
         derive.record, derive.single = struct.record, False
         self.routines = self._reachable(self.routines)  # without routines that only unused fields needed
-
-    @property
-    def _with_derived(self) -> object:
-        """An argument that holds the derived values of the whole model."""
-        for method, routine in self.entries.items():
-            if method != "derive":
-                return self.recorded[routine].arguments["self"]
-        return None
-
-    @property
-    def derived(self) -> Struct | None:
-        """The struct that the entries take in addition to the parameters."""
-        return self.derived_of(self._with_derived) if "derive" in self.entries else None
-
-    # ------------------------------------------------------------------ contents
-
-    def _reachable(self, all_: list[Routine]) -> list[Routine]:
-        wanted = set(self.entries.values())
-        for routine in reversed(all_):  # callers come after callees
-            if routine in wanted:
-                wanted |= {v.static for v in routine.values() if v.op == "call"}
-        for routine in all_:
-            unnamed = routine.record is None and not routine.single
-            if routine in wanted and unnamed and routine.name != f"{graph.class_name(self.model)}_derive":
-                self._name_result(routine)
-        return [routine for routine in all_ if routine in wanted]
-
-    def _name_result(self, routine: Routine) -> None:
-        result = self.recorded[routine].result
-        if routine.name.endswith("_terms"):
-            name = routine.name.removesuffix("_terms") + "Terms"
-        elif hasattr(result, "_fields"):
-            name = type(result).__name__
-        else:
-            name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
-        fields = [(_result_name(path, value), value.type) for path, value in routine.results]
-        doc = inspect.getdoc(type(result)) or "" if hasattr(result, "_fields") else ""
-        routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)))
-
-    def _tables(self) -> list[Table]:
-        tables: dict[int, Table] = {}
-        self.readings: dict[int, set[str]] = {}
-        for routine in self.routines:
-            for value in routine.values():
-                if value.op == "texel":
-                    table, _, how = value.static
-                    tables.setdefault(id(table), table)
-                    self.readings.setdefault(id(table), set()).add(how)
-        return list(tables.values())
 
 
 def _record(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:

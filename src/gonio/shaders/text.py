@@ -14,9 +14,11 @@ from ..ops.table import Table
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment, wrap
 from .manifest import TERMS
+from .method_writer import INTERPOLATED, MethodWriter
+from .method_writer import readers as method_readers
 from .names import Names
 from .operations import operations
-from .program import ENTRIES, Program, choices
+from .program import ENTRIES, Program, Routines, choices
 from .routine import RoutineWriter
 from .syntax import literal
 from .textures import READERS, axes
@@ -37,20 +39,21 @@ class Block(NamedTuple):
     table: Table | None = None
 
 
-def blocks(made: Program, names: Names, bindings: Mapping[int, int]) -> list[Block]:
+def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Block]:
     """The declarations of a shader, each before its use.
 
     bindings  number of the binding of each table, by the table's identity
     """
     language = names.language
+    writer = MethodWriter if language.methods else RoutineWriter
     bodies = [
-        Block("function", _raw(names, names.routines[r]), RoutineWriter(names, r).text())
+        Block("function", _raw(names, names.routines[r]), writer(names, r).text())
         for r in made.routines
         if stem_of(r) not in language.native
     ]
     result = []
     for name, (value, about) in names.constants.items():
-        line = language.constant(names.public(name), literal(value))
+        line = language.constant(names.constant(name), literal(value))
         if about and len(line) + len(about) + 4 <= 110:
             result.append(Block("constant", name, [f"{line}  // {about}"]))
         else:
@@ -60,7 +63,21 @@ def blocks(made: Program, names: Names, bindings: Mapping[int, int]) -> list[Blo
         result.append(Block("struct", language.word(record.name), lines))
     for table in made.tables:
         result.append(Block("table", f"table_{table.name}", _table(made, names, table, bindings[id(table)]), table))
-    return result + bodies
+    if language.methods and any("lookup" in how for how in made.readings.values()):
+        lines = INTERPOLATED.strip().format(name=names.public("interpolated")).splitlines()
+        result.insert(0, Block("function", "interpolated", lines))
+    return result + _helpers(names, bodies) + bodies
+
+
+def _helpers(names: Names, bodies: Sequence[Block]) -> list[Block]:
+    """The functions of the language's own that others call."""
+    text = "\n".join(line for block in bodies for line in block.lines)
+    called = {name: names.public(name) for name in names.language.helpers}
+    return [
+        Block("function", name, [line.format(name=public) for line in names.language.helpers[name]])
+        for name, public in called.items()
+        if re.search(rf"\b{public}\(", text)
+    ]
 
 
 def _raw(names: Names, name: str) -> str:
@@ -69,14 +86,15 @@ def _raw(names: Names, name: str) -> str:
     return next((before for before, after in names.renamed.items() if after == name), name)
 
 
-def joined(head: Sequence[str], declared: Sequence[Block]) -> str:
+def joined(head: Sequence[str], declared: Sequence[Block], language: Language, prefix: str = "") -> str:
     """The text of a shader: constants line after line, all else parted by an empty line."""
     constants = [line for block in declared if block.kind == "constant" for line in block.lines]
-    parts = [list(head), constants, *(block.lines for block in declared if block.kind != "constant")]
-    return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
+    parts = [constants, *(block.lines for block in declared if block.kind != "constant")]
+    lines = "\n\n".join("\n".join(part) for part in parts if part).split("\n")
+    return "\n".join([*head, "", *language.whole(lines, prefix)]) + "\n"
 
 
-def _table(made: Program, names: Names, table: Table, binding: int) -> list[str]:
+def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str]:
     """The declaration of a table's texture, and the functions that read it."""
     language = names.language
     size = " x ".join(map(str, table.shape))
@@ -87,6 +105,8 @@ def _table(made: Program, names: Names, table: Table, binding: int) -> list[str]
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2
     binding_lines = language.binding(names.table(table, "table_"), dimension, binding, *group)
+    if language.methods:
+        return [*binding_lines, "", about, *method_readers(names, table, readings)]
     readers = [line for how in readings for line in ("", *READERS[how](names, table))]
     return [*binding_lines, "", about, *readers[1:]]
 
@@ -122,7 +142,7 @@ def head(made: Program, names: Names) -> list[str]:
     ]
     for call, (method, _) in zip(calls, entries, strict=True):
         lines.append(f"// {call:{max(map(len, calls))}}  {ENTRIES[method]}")
-    lines += ["//", *_costs(made, names)]
+    lines += ["//", *costs({names.routines[routine]: operations(routine) for routine in made.entries.values()})]
     lines += [
         "//",
         "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
@@ -131,9 +151,8 @@ def head(made: Program, names: Names) -> list[str]:
     return lines
 
 
-def _costs(made: Program, names: Names) -> list[str]:
-    """The operations of each function, in lines of a comment."""
-    counts = {names.routines[routine]: operations(routine) for routine in made.entries.values()}
+def costs(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """The operations of each function by kind, in lines of a comment."""
     parts = []
     for name, kinds in counts.items():
         listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
@@ -149,10 +168,10 @@ def _arguments(made: Program, method: str, language: Language) -> list[str]:
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
 
 
-def structs(made: Program, names: Names) -> list[Record]:
+def structs(made: Routines, names: Names) -> list[Record]:
     own = made.struct_of(made.bound)
-    assert own is not None
-    names.note(own.record)
+    if own is not None:
+        names.note(own.record)
     if made.derived is not None:
         names.note(made.derived.record)
     return list(names.records.values())

@@ -19,8 +19,8 @@ from .base import MATERIALS, verb
 class Baking:
     """What is baked, and how."""
 
-    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,prefiltered", help="The tables to bake.")] = ""
-    resolution: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128
+    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""
+    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, of ltc 64.")] = None
     method: Annotated[str, Option(metavar="NAME", help="Integrate by quadrature, cosine, ggx, visible, ...")] = (
         "quadrature"
     )
@@ -86,6 +86,9 @@ def bake(
     Tables of an anisotropic distribution have a third axis, the azimuth. Of a material without roughness: E over the
     cosine. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
 
+    `--lut ltc` fits linearly transformed cosines to an isotropic material, and writes their error and the shader code
+    of area lights.
+
     \b
     Examples:
       gonio bake ggx -o tables
@@ -94,6 +97,7 @@ def bake(
       gonio bake --preset homework-text -o text
       gonio bake --preset homework-figure -o figure
       gonio bake conductor --preset Au --lut E,Eavg -o gold
+      gonio bake conductor --preset Au --lut ltc -o gold-light
       gonio bake sky.hdr --lut prefiltered -o sky
     """
     from ...render import tables

@@ -7,13 +7,16 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from .. import completion
 from ..options import Json, Material, output_option
 from .base import MATERIALS, verb
+
+if TYPE_CHECKING:
+    from ...shaders import Bundle, Placement
 
 SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
@@ -25,6 +28,19 @@ class Place:
     prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
     group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, not in GLSL ES.")] = 0
     first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
+
+
+@dataclass
+class Short:
+    """Code in place of the material's whole functions."""
+
+    fit: Annotated[
+        str, Option(metavar="N|N/M", help="Instead write albedos as rational fits of this order; N/0: polynomials.")
+    ] = ""
+    ibl: Annotated[bool, Option("--ibl", help="Instead write the split sum of image-based lighting.")] = False
+    budget: Annotated[
+        int, Option(metavar="N", help="Choose the most exact terms, table or fit within N operations.")
+    ] = 0
 
 
 @verb(MATERIALS, place=3)
@@ -44,7 +60,7 @@ def emit(
             "--lang",
             "--language",
             metavar="NAME",
-            help="glsl, glsl-vulkan, wgsl, hlsl; numpy, torch, jax: a Python file.",
+            help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl; numpy, torch, jax: a Python file.",
             autocompletion=completion.languages,
         ),
     ] = "glsl",
@@ -61,6 +77,7 @@ def emit(
         bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
     ] = False,
     place: Place,
+    short: Short,
     check: Annotated[
         int, Option(metavar="N", help="Instead of a shader write N pairs of directions with their 64-bit values, JSON.")
     ] = 0,
@@ -80,10 +97,12 @@ def emit(
       gonio emit conductor --preset Au --constants
       gonio emit conductor --preset Au --language torch -o gold.py
       gonio emit conductor --preset Au --check 10000 -o vectors.json
+      gonio emit conductor --preset Au --fit 4 --lang wgsl
+      gonio emit conductor --ibl --budget 80
+      gonio emit conductor --preset Au --budget 150
     """
     from ... import files
     from ...shaders import Placement
-    from ...shaders import bundle as make_bundle
 
     folders = [Path(one) for one in output or () if one.endswith(SLASHES)]
     single = [Path(one) for one in output or () if not one.endswith(SLASHES)]
@@ -95,7 +114,7 @@ def emit(
         _write_pairs(made.texts(model), check, functions, single, folders)
         return
     at = Placement(place.prefix, place.group, place.first_binding)
-    shader = make_bundle(made.texts(model), lang, functions, lean=lean, constants=constants, placement=at)
+    shader = _shader(made.texts(model), lang, functions, short, at, {"lean": lean, "constants": constants})
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())
@@ -106,6 +125,37 @@ def emit(
         print("\n".join(written))
     else:
         sys.stdout.write(shader.text)
+
+
+def _shader(
+    models: list[str], lang: str, functions: str, short: Short, at: Placement, options: dict[str, bool]
+) -> Bundle:
+    """The shader, with its measured errors on stderr if it is an approximation."""
+    from ...catalog import notation
+    from ...errors import InputError
+    from ...shaders import bundle, curves, tiers
+
+    if not (short.fit or short.ibl or short.budget):
+        return bundle(models, lang, functions, placement=at, **options)
+    if len(models) != 1 or (short.fit and (short.ibl or short.budget)):
+        what = f"{len(models)} materials given" if len(models) != 1 else "--fit with --ibl or --budget"
+        raise InputError(
+            what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
+        )
+    given = [f"--{name}" for name, value in options.items() if value and (short.fit or short.ibl)]
+    if given:
+        raise InputError(f"{given[0]} with {'--fit' if short.fit else '--ibl'}", "emit", "it goes with whole materials")
+    model = notation.named(models[0])[0]
+    if short.fit:
+        made, lines = curves.fitted(model, short.fit, lang, at)
+    elif short.ibl:
+        made, found = tiers.split_sum(model, lang, at, short.budget)
+        lines = [str(tier) for tier in found]
+    else:
+        model, found = tiers.cheapest(model, short.budget)
+        made, lines = bundle(model, lang, functions, placement=at, **options), [str(tier) for tier in found]
+    print("\n".join(lines), file=sys.stderr)
+    return made
 
 
 def _write_pairs(models: list[str], count: int, functions: str, single: list[Path], folders: list[Path]) -> None:

@@ -76,14 +76,14 @@ def albedo(
         raise InputError("mu is a cosine: numbers in [-1, 1] expected", "albedo: mu")
     check_uniform(model)
     if method in ("auto", "closed-form"):
-        value = _known(model, mu, phi, None)
+        value = known(model, mu, phi, None)
         if value is not None:
             return Albedo(value, np.zeros_like(value), "closed-form")
         if method == "closed-form":
             raise InputError(f"no closed form is known for {type(model).__name__}", "albedo: method", 'give "auto"')
     if method in ("auto", "quadrature"):
-        coarse = _known(model, mu, phi, NODES)
-        fine = None if coarse is None else _known(model, mu, phi, JUDGE)
+        coarse = known(model, mu, phi, NODES)
+        fine = None if coarse is None else known(model, mu, phi, JUDGE)
         if coarse is not None and fine is not None:
             return Albedo(fine, np.abs(fine - coarse), "quadrature")
     singular = model.delta != "never" or model.stochastic
@@ -113,14 +113,14 @@ def check_uniform(model: BSDF) -> None:
 NODES, JUDGE = 64, 96  # of quadratures that a material performs itself, and of those that estimate their error
 
 
-def _known(
+def known(
     model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
 ) -> NDArray[np.float64] | None:
     """The albedo known to the material itself, or by quadrature over its microsurface; nodes None requests closed forms
     only."""
 
     def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        return _known(material, mu, phi, nodes)
+        return known(material, mu, phi, nodes)
 
     value = model.known_albedo(mu, phi, inner, nodes)
     if value is not None or nodes is None or model.delta != "never":

@@ -182,7 +182,7 @@ def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, l
     """Raise InputError for options that no target supports."""
     for name in lut:
         if name not in LUTS:
-            raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
+            raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, [*LUTS, "ltc"]))
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
     if not 1 <= size <= MAX_SIZE:

@@ -49,7 +49,7 @@ def headings(manifest: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _more(manifest: Mapping[str, Any]) -> list[str]:
     """Errors that only some tables have."""
-    return ["split sum"] if any("split sum" in error for error in manifest["error"].values()) else []
+    return [name for name in ("mean", "split sum") if any(name in error for error in manifest["error"].values())]
 
 
 def title(manifest: Mapping[str, Any]) -> str:

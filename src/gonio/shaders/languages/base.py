@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from ...members import Family, instances_of
@@ -16,7 +16,8 @@ class Language:
     types                type of a recording -> its name in the language, if different
     words                operation -> template; {0}, {1} stand for the arguments
     compare              operation -> template of a comparison of vectors; absent if the operators apply to vectors
-    choice               templates of `where`: for a scalar mask, and for a mask per component
+    choice               templates of `where`: for a scalar mask, and for a mask per component; {prefix} begins names
+    helpers              functions that the templates call: name -> lines, written where a text needs them
     spread               template of a float, {1}, converted to a vector type, {0}
     mix                  name of linear interpolation
     native               functions of the vocabulary that the language provides itself
@@ -28,6 +29,7 @@ class Language:
     single               whether all values are float32
     standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
+    methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
     """
 
@@ -54,6 +56,7 @@ class Language:
     }
     compare: ClassVar[Mapping[str, str]] = {}
     choice: ClassVar[tuple[str, str]] = ("{0} ? {1} : {2}", "{0} ? {1} : {2}")
+    helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     spread: ClassVar[str] = "{0}({1})"
     mix: ClassVar[str] = "mix"
     native: ClassVar[frozenset[str]] = frozenset({"normalize", "clamp"})
@@ -65,6 +68,7 @@ class Language:
     end: ClassVar[str] = ";"
     single: ClassVar[bool] = True
     standalone: ClassVar[bool] = False
+    methods: ClassVar[bool] = False
     templates: ClassVar[bool] = False
 
     def type(self, name: str) -> str:
@@ -98,6 +102,10 @@ class Language:
     def struct(self, name: str, fields: list[tuple[str, str]]) -> list[str]:
         """The lines of a struct with fields (type, name)."""
         return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
+
+    def whole(self, lines: Sequence[str], prefix: str) -> list[str]:
+        """All declarations, as the language needs them around."""
+        return list(lines)
 
     def binding(self, name: str, dimension: int, place: int) -> list[str]:
         """The declaration of a table's texture."""

@@ -1,4 +1,4 @@
-"""HLSL 2021, shader model 6."""
+"""HLSL, shader model 6."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _RESERVED = """
     acos all any asfloat asin asint asuint atan atan2 ceil clamp clip cos cosh cross ddx ddy degrees determinant
     distance dot exp exp2 floor fma fmod frac frexp isfinite isinf isnan ldexp length lerp lit log log10 log2
     mad max min modf mul noise normalize pow radians rcp reflect refract round rsqrt saturate select sign sin
-    sincos sinh smoothstep sqrt step tan tanh transpose trunc main
+    sincos sinh smoothstep sqrt step tan tanh transpose trunc main choose
 """
 
 
 class HLSL(Language):
-    """HLSL 2021, the language of Direct3D."""
+    """HLSL of any version, the language of Direct3D."""
 
     name = "hlsl"
-    title = "HLSL 2021 (shader model 6)"
+    title = "HLSL (shader model 6)"
     suffix = ".hlsl"
     precision = "float has 32 bits: min16float is not enough."
     types: ClassVar[Mapping[str, str]] = {
@@ -47,7 +47,19 @@ class HLSL(Language):
         "exponent": "float((asint({0}) >> 23) - 127)",
         "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
     }
-    choice = ("{0} ? {1} : {2}", "select({0}, {1}, {2})")
+    choice = ("{0} ? {1} : {2}", "{prefix}choose({0}, {1}, {2})")
+    # `select` exists since HLSL 2021, whose ?: no longer chooses component by component
+    helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "choose": (
+            "float3 {name}(bool3 mask, float3 a, float3 b) {{",
+            "    return float3(mask.x ? a.x : b.x, mask.y ? a.y : b.y, mask.z ? a.z : b.z);",
+            "}}",
+            "",
+            "float2 {name}(bool2 mask, float2 a, float2 b) {{",
+            "    return float2(mask.x ? a.x : b.x, mask.y ? a.y : b.y);",
+            "}}",
+        )
+    }
     spread = "({0}){1}"
     mix = "lerp"
     reserved = frozenset(_RESERVED.split())

@@ -1,0 +1,90 @@
+"""Light from polygons by linearly transformed cosines (Heitz2016a): the formulas of shaders, in the vocabulary.
+
+A lobe is approximated by E(o) D(i), D the cosine lobe seen through a matrix W: D(i) = cos+(W i) |det W| / (pi |W i|^3).
+A polygon seen by the lobe is the polygon W P seen by the cosine, whose integral is known (Lambert).
+"""
+
+from __future__ import annotations
+
+from ... import ops
+from ...ops import (
+    Direction,
+    Scalar,
+    Table,
+    dot,
+    function,
+    inset,
+    maximum,
+    minimum,
+    norm,
+    safe_div,
+    sqrt,
+    vec3,
+    where,
+)
+
+Corners = tuple[Direction, Direction, Direction, Direction]
+
+
+@function
+def edge(a: Direction, b: Direction) -> Scalar:
+    """Integral of an edge of a polygon, times 2 pi: its angle, times the height of the unit normal of its plane."""
+    across = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+    sine = norm(across)
+    return across.z * safe_div(ops.atan2(sine, where(sine > 0.0, dot(a, b), 1.0)), sine)
+
+
+@function
+def visible_edge(a: Direction, b: Direction) -> Scalar:
+    """`edge` of the part above the horizon z = 0."""
+    cut = horizon(a, b)
+    value = edge(where(a.z > 0.0, a, cut), where(b.z > 0.0, b, cut))
+    return where(maximum(a.z, b.z) > 0.0, value, 0.0)
+
+
+@function
+def horizon(a: Direction, b: Direction) -> Direction:
+    """A vector toward the point of an edge at the horizon, if its ends lie on different sides."""
+    return a * ops.abs(b.z) + b * ops.abs(a.z)
+
+
+@function
+def leaving(a: Direction, b: Direction) -> Direction:
+    """`horizon` of an edge that leads below, else 0."""
+    return where((a.z > 0.0) & (b.z <= 0.0), horizon(a, b), 0.0 * a)
+
+
+@function
+def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scalar:
+    """Part of a cosine lobe around +z that a convex quadrilateral covers: 1 for the hemisphere.
+
+    a, b, c, d  vectors to its corners, in order; the part below z = 0 is cut off
+    """
+    total = visible_edge(a, b) + visible_edge(b, c) + visible_edge(c, d) + visible_edge(d, a)
+    out = leaving(a, b) + leaving(b, c) + leaving(c, d) + leaving(d, a)
+    back = leaving(b, a) + leaving(c, b) + leaving(d, c) + leaving(a, d)
+    return ops.abs(total + edge(out, back)) * (0.5 / ops.pi)  # the cut itself is an edge of the visible part
+
+
+@function
+def to_cosine(first: Scalar, second: Scalar, third: Scalar, fourth: Scalar, wo: Direction, p: Direction) -> Direction:
+    """W p, of unit length: first, 0, second; 0, 1, 0; third, 0, fourth are the rows of W, where wo has no y."""
+    size = sqrt(maximum(wo.x * wo.x + wo.y * wo.y, 1e-20))
+    along = where(size > 1e-8, (p.x * wo.x + p.y * wo.y) / size, p.x)
+    aside = where(size > 1e-8, (p.y * wo.x - p.x * wo.y) / size, p.y)
+    return ops.normalize(vec3(first * along + second * p.z, aside, third * along + fourth * p.z))
+
+
+def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
+    """Part of the lobe of W that a quadrilateral covers.
+
+    inverse  the four numbers of W, as the table has them
+    corners  see `cosine_quad`
+    """
+    return cosine_quad(*(to_cosine(*inverse, wo, p) for p in corners))
+
+
+def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
+    """Where a table is read: of one row only the angle counts."""
+    column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
+    return (inset(minimum(roughness, 1.0), table.shape[0]), column) if len(table.shape) == 2 else (column,)

@@ -1,0 +1,233 @@
+"""Albedos as short formulas for shaders: rational functions of roughness and cosine, fitted for the largest error.
+
+    P(x, y) / Q(x, y),  P and Q polynomials of a total degree, Q(0, 0) = 1
+
+    x is the roughness or alpha, its square; y the cosine, its root, or sqrt(mu / (mu + 4 alpha)) or
+    sqrt(mu^2 + alpha^2), in which E and B / E of microfacets are smooth: whichever fits best.
+
+Each step solves a linear problem weighted by the last denominator (Sanathanan and Koerner), and weights grow where the
+error is large (Lawson), so that the largest error falls toward the smallest possible.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...errors import InputError
+from ...material import BSDF
+from ...ops import Scalar
+from ..albedo import albedo, quadrature
+from ..albedo.quadrature import Points
+from . import ltc
+from .target import Target
+
+Array: TypeAlias = NDArray[np.float64]
+
+LEAST_ROUGHNESS, LEAST_COSINE = 0.045, 0.02  # below, the albedo has a knee that a short formula cannot follow
+ROWS, COLUMNS = 17, 33
+LARGEST_ORDER = 8
+STEPS = 30
+SAMPLES = 1 << 14  # of an albedo that only sampling gives for each roughness
+
+
+class Rational(NamedTuple):
+    """P / Q, a rational function of one or two variables.
+
+    above, below  coefficients of P and Q by powers of x (rows) and y
+    forms         "roughness" or "alpha", and "mu", "root", "bent" or "soft", of x and y
+    error, mean   the largest and the mean error over the grid of the fit
+    """
+
+    above: Array
+    below: Array
+    forms: tuple[str, str]
+    error: float
+    mean: float
+
+    def __call__(self, x: Scalar, y: Scalar) -> Scalar:
+        """The value at the forms of roughness and cosine (`variables`)."""
+        value = _horner(self.above, x, y)
+        return value / _horner(self.below, x, y) if np.count_nonzero(self.below) > 1 else value
+
+
+class Curve(NamedTuple):
+    """A quantity of a material as code: a rational function per channel, or a single one.
+
+    name, doc  of the function
+    angle      whether it depends on the cosine
+    swept      whether it depends on the roughness
+    parts      the functions of its components; of "dfg" those of A + B and B / (A + B), which both are at most 1
+    """
+
+    name: str
+    doc: str
+    angle: bool
+    swept: bool
+    parts: tuple[Rational, ...]
+
+    @property
+    def error(self) -> float:
+        """Largest error over the grid, of all components; of A and B a bound, the sum of both errors."""
+        return self._all([part.error for part in self.parts])
+
+    @property
+    def mean(self) -> float:
+        """Mean error over the grid, of the worst component; of A and B a bound."""
+        return self._all([part.mean for part in self.parts])
+
+    def _all(self, errors: list[float]) -> float:
+        return sum(errors) if self.name == "dfg" else max(errors)
+
+
+def degrees(order: str | int) -> tuple[int, int]:
+    """The degrees of numerator and denominator: "4" is 4 / 4, "4/2" both, "5/0" a polynomial."""
+    match = re.fullmatch(r"(\d)(?:/(\d))?", str(order).strip())
+    above, below = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+    if not match or not 1 <= above <= LARGEST_ORDER or below > LARGEST_ORDER:
+        hint = f"an order from 1 to {LARGEST_ORDER}, such as 4, or N/M, such as 5/0 for a polynomial"
+        raise InputError(f"'{order}' given, the order of a fit expected", "emit: fit", hint)
+    return above, below
+
+
+class Samples(NamedTuple):
+    """Values on the grid of a fit: name -> (rows, columns, channels), with one row where nothing is swept."""
+
+    roughness: Array
+    mu: Array
+    swept: bool
+    values: dict[str, Array]
+
+
+def sample(model: BSDF, names: tuple[str, ...] = ("albedo", "average_albedo", "dfg")) -> Samples:
+    """E, its average and, of a microsurface, A and B of the split sum, over roughness and cosine."""
+    path = next(ltc.roughness_paths(model), "")
+    roughness = np.maximum(np.linspace(0.0, 1.0, ROWS), LEAST_ROUGHNESS) if path else np.zeros(1)
+    mu = np.maximum(np.linspace(0.0, 1.0, COLUMNS) ** 2, LEAST_COSINE)
+    values: dict[str, Array] = {}
+    if {"albedo", "average_albedo"} & set(names):
+        x, w = quadrature.gauss(24)
+        both = _albedos(model, path, roughness, np.concatenate([mu, x**2]))
+        average = np.einsum("rmc,m->rc", both[:, len(mu) :], 4.0 * w * x**3)
+        values = {"albedo": both[:, : len(mu)], "average_albedo": average[:, None]}
+    surface = model.microsurface
+    if "dfg" in names and surface is not None and model.isotropic:
+        white = quadrature.moments(surface.ndf, surface.masking, mu, roughness[:, None] ** 2)
+        values["dfg"] = np.stack([white.white, white.schlick / white.white], axis=-1)  # smoother than A and B
+    return Samples(roughness, mu, bool(path), values)
+
+
+def _albedos(model: BSDF, path: str, roughness: Array, mu: Array) -> Array:
+    """E (rows, columns, channels)."""
+    surface = model.microsurface
+    if surface is not None and model.isotropic:
+        target = Target(model, surface.ndf, surface.masking)
+        return target.exact(Points(*np.broadcast_arrays(mu, roughness[:, None] ** 2), None, 0.0))["E"]
+    options: dict[str, Any] = {"method": "sampling", "samples": SAMPLES} if path else {}
+    return np.array([albedo(ltc.at(model, path, value), mu, **options).value for value in roughness])
+
+
+DOCS = {
+    "albedo": "Directional albedo: the part of the light toward a cosine that is scattered.",
+    "average_albedo": "Its mean under uniform illumination.",
+    "dfg": "A, B of the split sum: the albedo is F0 A + B for Schlick's Fresnel (Karis2013).",
+}
+
+
+def fit(samples: Samples, order: str | int, names: tuple[str, ...] = ()) -> list[Curve]:
+    """The curves of a material, all or those named, with their errors; `order` as in `degrees`."""
+    above, below = degrees(order)
+    curves = []
+    for name, values in samples.values.items():
+        if names and name not in names:
+            continue
+        angle = values.shape[1] > 1
+        mu = samples.mu if angle else np.ones(1)
+        equal = np.ptp(values, axis=-1).max() < 1e-12
+        channels = values[..., :1] if equal else values
+        parts = tuple(_best(samples.roughness, mu, c, above, below) for c in np.moveaxis(channels, -1, 0))
+        curves.append(Curve(name, DOCS[name], angle, samples.swept, parts))
+    return curves
+
+
+def variables(form: tuple[str, str], roughness: Any, mu: Any) -> tuple[Any, Any]:
+    """x and y of a form."""
+    alpha = roughness * roughness
+    x = alpha if form[0] == "alpha" else roughness
+    if form[1] == "bent":
+        return x, ops.sqrt(mu / (mu + 4.0 * alpha))
+    if form[1] == "soft":
+        return x, ops.sqrt(mu * mu + alpha * alpha)
+    return x, ops.sqrt(mu) if form[1] == "root" else mu
+
+
+def _best(roughness: Array, mu: Array, values: Array, above: int, below: int) -> Rational:
+    """The fit in the variables that suit it best."""
+    forms = product(
+        ("roughness", "alpha")[: len(roughness)],
+        ("mu", "root", "bent", "soft")[: 4 if len(roughness) > 1 < len(mu) else len(mu)],
+    )
+    return min((_fitted(roughness, mu, values, above, below, form) for form in forms), key=lambda made: made.error)
+
+
+def _fitted(roughness: Array, mu: Array, values: Array, above: int, below: int, forms: tuple[str, str]) -> Rational:
+    alpha = roughness[:, None] ** 2
+    x = alpha if forms[0] == "alpha" else roughness[:, None]
+    bent, soft = np.sqrt(mu / (mu + 4.0 * alpha)), np.sqrt(mu**2 + alpha**2)
+    y = {"mu": mu, "root": np.sqrt(mu), "bent": bent, "soft": soft}[forms[1]]
+    x, y = (part.ravel() for part in np.broadcast_arrays(x, y))
+    values = values.ravel()
+    up, down = (_powers(degree, len(roughness) > 1, len(mu) > 1) for degree in (above, below))
+    tops, bottoms = (np.stack([x**i * y**j for i, j in powers], axis=1) for powers in (up, down))
+    last, weight, ridge = np.ones(len(values)), np.ones(len(values)), 1e-6
+    best, error, mean = np.zeros(len(up) + len(down)), np.inf, np.inf
+    system = np.concatenate([tops, -values[:, None] * bottoms[:, 1:]], axis=1)
+    # in columns made orthogonal once, the normal equations of every step are well conditioned
+    z, r = np.linalg.qr(system)
+    back = np.linalg.inv(r + 1e-13 * np.eye(len(r)))
+    damped = back[len(up) :].T @ back[len(up) :]  # holds Q near 1
+    for _ in range(STEPS):
+        scaled = z * (weight / last**2)[:, None]
+        matrix = np.einsum("ki,kj->ij", scaled, z) + ridge**2 * damped
+        numbers = back @ np.linalg.solve(matrix, np.einsum("ki,k->i", scaled, values))
+        top, bottom = tops @ numbers[: len(up)], 1.0 + bottoms[:, 1:] @ numbers[len(up) :]
+        if np.min(bottom) < 1e-3:  # a pole
+            last, ridge = np.ones(len(values)), 10.0 * ridge
+            continue
+        rest = np.abs(top / bottom - values)
+        if rest.max() < error:
+            best, error, mean = np.concatenate([numbers[: len(up)], [1.0], numbers[len(up) :]]), rest.max(), rest.mean()
+        weight *= (rest / rest.max() + 0.03) ** 0.7 if rest.max() > 0.0 else 1.0
+        weight /= weight.mean()
+        last = bottom
+    return Rational(_array(up, best[: len(up)]), _array(down, best[len(up) :]), forms, float(error), float(mean))
+
+
+def _powers(degree: int, rows: bool, columns: bool) -> list[tuple[int, int]]:
+    """The powers of x and y up to a total degree, (0, 0) first."""
+    both = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    return [(i, j) for i, j in both if (rows or i == 0) and (columns or j == 0)]
+
+
+def _array(powers: list[tuple[int, int]], numbers: Array) -> Array:
+    made = np.zeros([max(p[axis] for p in powers) + 1 for axis in (0, 1)])
+    for place, number in zip(powers, numbers, strict=True):
+        made[place] = float(np.float32(number))  # as a shader has them
+    return made
+
+
+def _horner(coefficients: Array, x: Any, y: Any) -> Any:
+    """A polynomial in y, whose coefficients are polynomials in x."""
+    value: Any = None
+    for column in coefficients.T[::-1]:
+        inner: Any = None
+        for number in np.trim_zeros(column, "b")[::-1]:
+            inner = float(number) if inner is None else inner * x + float(number)
+        inner = 0.0 if inner is None else inner
+        value = inner if value is None else value * y + inner
+    return value

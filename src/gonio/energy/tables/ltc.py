@@ -1,0 +1,340 @@
+"""Linearly transformed cosines (Heitz2016a): the lobe of an isotropic material as E(o) D(i), for light from polygons.
+
+    D(i) = cos+(W i) |det W| / (pi |W i|^3),   W = [[a, 0, b], [0, 1, 0], [c, 0, d]]  in the plane of o and n
+
+W minimizes int |f |cos| / E - D|^3 di over the whole sphere, also below the horizon, where f is 0 and D may not be. The
+integral is a sum over fixed points: directions that the material samples, the same mirrored at the horizon, and
+directions spread evenly. The steps are those of Gauss and Newton, damped (Levenberg and Marquardt), for all cosines of
+a roughness at once, from two starts: the fit of the rougher row, and the covariance of the lobe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...material import BSDF, tree
+from ...material.parameters import pair_of
+from ...ops import backend
+from ...optics.frame import spherical_array
+from ...optics.lattice import r_sequence
+from ..albedo import direction, quadrature
+from ..albedo.directional import JUDGE, check_uniform, known
+from . import area_light
+from .bake import _sealed
+from .baked import Baked
+from .target import describe
+
+Array: TypeAlias = NDArray[np.float64]
+
+SIZE = 64
+MIN_ROUGHNESS = 0.0142  # alpha 2e-4: narrower lobes are mirrors, whose W is singular
+MIN_COSINE = 1e-3
+LOBE, SPHERE = 768, 384  # points per cell
+FINER = 24  # times as many points for the integrals over polygons
+STEPS = 30
+POLYGONS = 1024
+
+
+class Row(NamedTuple):
+    """A row of the table: the numbers of W, E in color, and the errors of each cell.
+
+    inverse   (size, 5): a, b, the middle one, c, d
+    norm      (size, channels): E; of a distribution (E, B), so that E = F0 (E - B) + B for Schlick's Fresnel
+    misplaced (size,): half of int |f cos / E - D|, the share of the light that goes elsewhere
+    cubed     (size,): int |f cos - E D|^3, which the paper minimizes
+    """
+
+    inverse: Array
+    norm: Array
+    misplaced: Array
+    cubed: Array
+
+
+class Points(NamedTuple):
+    """Directions of integration per cell, their weights and the values there.
+
+    wi (cells, K, 3); weight (cells, K); value (cells, K, channels): f |cos theta_i|
+    """
+
+    wi: Array
+    weight: Array
+    value: Array
+
+
+def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
+    """Tables of a material's linearly transformed cosines over (roughness, sqrt(1 - mu)), nodes at both ends.
+
+    schlick  store E and B in place of E in color, of a material with F = 1
+    Returns arrays ltc_inverse (..., 4), ltc_norm (..., 2 or 3), ltc_error (..., 1); the manifest states the mean and
+    the largest error of the lobe and of integrals over random quadrilaterals. A material without a roughness has one
+    row. Raises InputError if it is not isotropic, has a mirror lobe, is estimated by sampling or absorbs everything.
+    """
+    path = _check(model, size)
+    roughness = np.linspace(0.0, 1.0, size) if path else np.zeros(1)
+    mu = cosines(size)
+    rows: list[Row] = []
+    start: Array | None = None
+    for value in roughness[::-1]:
+        rows.insert(0, _row(at(model, path, value), mu, start, schlick))
+        start = rows[0].inverse
+    inverse, norm, misplaced, cubed = (np.array(part) for part in zip(*rows, strict=True))
+    arrays = {"ltc_inverse": inverse[..., (0, 1, 3, 4)] / inverse[..., 2:3], "ltc_norm": norm}
+    arrays["ltc_error"] = misplaced[..., None]
+    if not path:
+        arrays = {name: array[0] for name, array in arrays.items()}
+    polygons = polygon_errors(model, path, roughness, mu, inverse)
+    dims = ["roughness", "mu"] if path else ["mu"]
+    errors: dict[str, dict[str, float]] = {
+        "ltc_inverse": {"max": float(misplaced.max()), "rms": float(np.sqrt(np.mean(misplaced**2)))},
+        "ltc_norm": {"max": float(polygons.max()), "rms": float(np.sqrt(np.mean(polygons**2)))},
+    }
+    errors["ltc_inverse"]["mean"], errors["ltc_norm"]["mean"] = float(misplaced.mean()), float(polygons.mean())
+    errors["ltc_inverse"]["L3"] = float(np.mean(np.cbrt(cubed)))
+    nodes = {"mu": mu, **({"roughness": roughness} if path else {})}
+    text = {"mu": "column j at sqrt(1 - mu) = j / (N - 1)", **({"roughness": "row j at j / (N - 1)"} if path else {})}
+    facts = {"target": describe(model), "ndf": model.name, "masking": "", "method": "linearly transformed cosines"}
+    manifest = {**facts, "size": size, "layout": "ltc", "parameter": path, "axes": text}
+    return _sealed(arrays, nodes, dict.fromkeys(arrays, dims), errors, manifest)
+
+
+def cosines(size: int) -> Array:
+    """The cosine of each column; the last is just above the horizon."""
+    return np.maximum(1.0 - np.linspace(0.0, 1.0, size) ** 2, MIN_COSINE)
+
+
+def _check(model: BSDF, size: int) -> str:
+    """The path of the parameter that the roughness sets, or ""."""
+    check_uniform(model)
+    kind = type(model).__name__
+    if not 2 <= size <= 256:
+        raise InputError(f"linearly transformed cosines of {size} x {size} asked for", "--resolution", "give 2 to 256")
+    if not model.isotropic:
+        raise InputError(f"{kind} is anisotropic", "--lut", "ltc has one matrix per angle: give both widths one value")
+    path = next(roughness_paths(model), "")
+    if model.stochastic or at(model, path, 1.0).delta != "never":
+        what = f"{kind} is estimated by random walks" if model.stochastic else f"{kind} has a mirror lobe"
+        raise InputError(what, "--lut", "ltc approximates finite lobes that `eval` computes")
+    return path
+
+
+def roughness_paths(model: BSDF) -> Iterator[str]:
+    """Paths of the parameters that a roughness may set: widths first."""
+    leaves = list(tree.leaves(model))
+    yield from (leaf.path for leaf in leaves if leaf.parameter.kind == "alpha")
+    for name in ("roughness", "specular_roughness"):
+        yield from (leaf.path for leaf in leaves if leaf.path.rpartition(".")[2] == name)
+
+
+def at(model: BSDF, path: str, roughness: float) -> BSDF:
+    """The material of a roughness; a width is its square."""
+    if not path:
+        return model
+    value = max(roughness, MIN_ROUGHNESS)
+    kind = next(leaf.parameter.kind for leaf in tree.leaves(model) if leaf.path == path)
+    return tree.replace(model, {path: value**2 if kind == "alpha" else value}, "--lut")
+
+
+# --------------------------------------------------------------------------- values
+
+
+def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE) -> Points:
+    """Points for the integrals over a lobe and its surroundings, of a material and each cosine."""
+    kind = backend.types("float64")
+    bound, cells = model.bind(kind), len(mu)
+    wo = direction(mu, np.pi * 0.0 * mu)
+    u = np.tile(r_sequence(lobe, 3, 0.5), (cells, 1))
+    sampled = bound.sample(kind.vec3(np.repeat(wo, lobe, 0).T), kind.vec3(u.T), "importance")
+    near = np.array(sampled.wi, float).T.reshape(cells, lobe, 3)
+    lost = near[..., 2] <= 0.0  # transmitted, or without a value: no direction that f needs
+    flat = r_sequence(sphere, 3, 0.5)
+    z = 2.0 * flat[:, 0] - 1.0
+    even = spherical_array(np.sqrt(1.0 - z**2), z, 2.0 * np.pi * flat[:, 1])
+    below = near[:, ::4] * (1.0, 1.0, -1.0)
+    wi = np.concatenate([near, below, np.broadcast_to(even, (cells, sphere, 3))], axis=1)
+    lost = np.concatenate([lost, lost[:, ::4], np.zeros((cells, sphere), bool)], axis=1)
+    above = kind.vec3((wi * np.where(wi[..., 2:] < 0.0, (1.0, 1.0, -1.0), 1.0)).reshape(-1, 3).T)
+    outgoing = kind.vec3(np.repeat(wo, wi.shape[1], 0).T)
+    value = bound.eval(outgoing, above, "importance")
+    density = np.array(bound.pdf(outgoing, above), float).reshape(wi.shape[:2])
+    values = np.stack([np.array(v, float) for v in value], -1).reshape(*wi.shape[:2], -1)
+    up = wi[..., 2] > 0.0
+    values[~up] = 0.0
+    count = np.where(up, lobe, wi.shape[1] - lobe - sphere)
+    weight = np.where(lost, 0.0, 1.0 / (count * density + sphere / (4.0 * np.pi)))
+    return Points(wi, weight, values)
+
+
+def _norm(model: BSDF, mu: Array, schlick: bool) -> Array:
+    """E in color at each cosine, of the reflected light; or E and B of a distribution, F = 1."""
+    surface = model.microsurface
+    if schlick and surface is not None:
+        x, _ = pair_of(surface.alpha)
+        return np.stack(quadrature.moments(surface.ndf, surface.masking, mu, float(x)), axis=-1)
+    value = None if model.transmits else known(model, mu, 0.0 * mu, JUDGE)
+    if value is not None:
+        return value
+    points = points_of(model, mu, 8 * LOBE)
+    return np.einsum("ck,ckx->cx", points.weight, points.value)
+
+
+# --------------------------------------------------------------------------- the fit
+
+
+def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
+    points = points_of(model, mu)
+    norm = _norm(model, mu, schlick)
+    total = (norm[:, 0] if schlick else norm.mean(-1))[:, None]
+    if not np.all(total > 0.0):
+        raise InputError(f"{type(model).__name__} reflects nothing", "--lut", "ltc needs a material that reflects")
+    lobe = points.value.mean(-1) / total
+    given = points.wi, points.weight, lobe
+    best = _first(points, lobe)
+    if start is not None:
+        better = _loss(start, *given) < _loss(best, *given)
+        best = np.where(better[:, None], start, best)
+    best, loss = _fitted(*given, best)
+    for side in (1, -1):  # the fits of the neighbors, where they are better
+        start = np.roll(best, side, axis=0)
+        cells = np.flatnonzero(_loss(start, *given) < loss)
+        if len(cells):
+            best[cells], loss[cells] = _fitted(*(part[cells] for part in given), start[cells])
+    best = best / best[:, 2:3]
+    cubed, misplaced = lobe_errors(points, points.value.mean(-1), total, best)
+    return Row(best, norm, misplaced, cubed)
+
+
+def lobe_errors(points: Points, lobe: Array, total: Array, inverse: Array) -> tuple[Array, Array]:
+    """(int |f cos - E D|^3, half of int |f cos / E - D|) of each cell; total (cells, 1) is E."""
+    difference = np.abs(lobe - total * _density(inverse, points.wi))
+    shares = 0.5 * np.sum(points.weight * difference, axis=1) / total[:, 0]
+    return np.sum(points.weight * difference**3, axis=1), shares
+
+
+def _first(points: Points, lobe: Array) -> Array:
+    """W from the mean and the covariance of a lobe."""
+    weight = points.weight * lobe
+    z = np.einsum("ck,ckx->cx", weight, points.wi) * (1.0, 0.0, 1.0)
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    x = np.stack([z[:, 2], 0.0 * z[:, 0], -z[:, 0]], axis=1)
+    along, up = (np.einsum("ck,ckx,cx->ck", np.ones_like(weight), points.wi, axis) for axis in (x, z))
+    squares = [np.sum(weight * part**2, axis=1) for part in (along, points.wi[..., 1], up)]
+    # a cosine lobe has the mean squares 1/4, 1/4, 1/2
+    wide, aside = (np.sqrt(np.maximum(2.0 * part / squares[2], 1e-12)) for part in squares[:2])
+    return np.stack([x[:, 0] / wide, x[:, 2] / wide, 1.0 / aside, z[:, 0], z[:, 2]], axis=1)
+
+
+def _density(inverse: Array, wi: Array) -> Array:
+    """D at directions of each cell."""
+    a, b, c, d, e = (inverse[:, i, None] for i in range(5))
+    x, y, z = wi[..., 0], wi[..., 1], wi[..., 2]
+    height = d * x + e * z
+    square = (a * x + b * z) ** 2 + (c * y) ** 2 + height**2
+    return np.maximum(height, 0.0) * (c * (a * e - b * d) / np.pi) / square**2
+
+
+def _slopes(inverse: Array, wi: Array) -> tuple[Array, Array]:
+    """D (cells, K), and its derivatives with respect to the five numbers (cells, 5, K)."""
+    a, b, c, d, e = (inverse[:, i, None] for i in range(5))
+    x, y, z = wi[..., 0], wi[..., 1], wi[..., 2]
+    along, aside, height = a * x + b * z, c * y, d * x + e * z
+    minor = a * e - b * d
+    over = 4.0 / (along**2 + aside**2 + height**2)
+    value = np.maximum(height, 0.0) * (c * minor / (16.0 * np.pi)) * over**2
+    along, aside = over * along, over * aside
+    height = 1.0 / np.where(height > 0.0, height, 1.0) - over * height
+    slopes = np.empty((len(wi), 5, wi.shape[1]))
+    for place, log in enumerate(
+        (
+            e / minor - along * x,
+            -d / minor - along * z,
+            1.0 / c - aside * y,
+            height * x - b / minor,
+            height * z + a / minor,
+        )
+    ):
+        slopes[:, place] = value * log
+    return value, slopes
+
+
+def _loss(inverse: Array, wi: Array, weight: Array, lobe: Array) -> Array:
+    """int |f - D|^3 of each cell; infinite where W mirrors."""
+    turned = (inverse[:, 2] <= 0.0) | (inverse[:, 0] * inverse[:, 4] - inverse[:, 1] * inverse[:, 3] <= 0.0)
+    safe = np.where(turned[:, None], (1.0, 0.0, 1.0, 0.0, 1.0), inverse)
+    return np.where(turned, np.inf, np.sum(weight * np.abs(lobe - _density(safe, wi)) ** 3, axis=1))
+
+
+def _fitted(wi: Array, weight: Array, lobe: Array, start: Array) -> tuple[Array, Array]:
+    """(W, loss) of each cell from a start, by damped steps of Newton's method without second derivatives of D."""
+    inverse, damping = start.copy(), np.full(len(start), 1e-2)
+    loss = _loss(inverse, wi, weight, lobe)
+    active = np.arange(len(start))
+    for _ in range(STEPS):
+        points = wi[active]
+        value, slopes = _slopes(inverse[active], points)
+        rest = lobe[active] - value
+        pull = weight[active] * np.abs(rest)
+        gradient = slopes @ (pull * rest)[..., None]
+        matrix = (slopes * (2.0 * pull[:, None])) @ np.swapaxes(slopes, 1, 2)
+        diagonal = np.einsum("cpp->cp", matrix)  # a view
+        diagonal *= 1.0 + damping[active, None]
+        diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-300
+        tried = inverse[active] + np.linalg.solve(matrix, gradient)[..., 0]
+        its = _loss(tried, points, weight[active], lobe[active])
+        better = its < loss[active]
+        done = better & (its > loss[active] * (1.0 - 1e-6))
+        inverse[active[better]], loss[active[better]] = tried[better], its[better]
+        damping[active] *= np.where(better, 0.3, 4.0)
+        active = active[~done & (damping[active] < 1e6)]
+        if not len(active):
+            break
+    return inverse, loss
+
+
+# --------------------------------------------------------------------------- integrals over polygons
+
+
+def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse: Array) -> Array:
+    """|integral by the tables - by summing f| / E, over random quadrilaterals, at up to 8 x 8 cells: one per pair."""
+    rows, columns = (np.unique(np.linspace(0, n - 1, 8).round().astype(int)) for n in (len(roughness), len(mu)))
+    each = max(POLYGONS // (len(rows) * len(columns)), 1)
+    corners = random_quads(np.random.default_rng(1), each * len(rows) * len(columns))
+    summed: list[float] = []
+    for row in rows:
+        points = points_of(at(model, path, roughness[row]), mu[columns], LOBE * FINER, SPHERE * FINER)
+        for cell in range(len(columns)):
+            light = points.weight[cell] * points.value[cell].mean(-1)
+            quads = corners[len(summed) : len(summed) + each]
+            summed += [np.sum(light[_inside(quad, points.wi[cell])]) / np.sum(light) for quad in quads]
+    used = np.repeat(inverse[np.ix_(rows, columns)].reshape(-1, 5), each, axis=0)
+    wo = direction(np.tile(np.repeat(mu[columns], each), len(rows)), np.zeros(1))
+    return np.abs(covered(used, wo, corners) - summed)
+
+
+def random_quads(rng: np.random.Generator, count: int) -> Array:
+    """Corners (count, 4, 3) of rectangles of sides 0.2 to 2, at a distance of 1 above the surface, turned at random."""
+    z, phi = rng.random(count), 2.0 * np.pi * rng.random(count)
+    center = spherical_array(np.sqrt(1.0 - z**2), z, phi)
+    turn, _ = np.linalg.qr(rng.normal(size=(count, 3, 3)))
+    x, y = (turn[:, i] * rng.uniform(0.1, 1.0, (count, 1)) for i in (0, 1))
+    corners = np.stack([center - x - y, center + x - y, center + x + y, center - x + y], axis=1)
+    return np.asarray(corners, float)
+
+
+def _inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
+    """Whether directions pass through a quadrilateral."""
+    sides = np.cross(quad, np.roll(quad, -1, axis=0)) @ wi.T
+    ahead = quad.mean(0) @ np.cross(quad[1] - quad[0], quad[3] - quad[0])
+    return np.all(sides * np.sign(ahead) > 0.0, axis=0)
+
+
+def covered(inverse: Array, wo: Array, corners: Array) -> Array:
+    """The part of the lobe of each W (N, 5), seen along wo (N, 3), that a quadrilateral covers, as in shaders."""
+    kind = backend.types("float64")
+    numbers: Any = tuple(kind.float(part) for part in (inverse / inverse[:, 2:3])[:, (0, 1, 3, 4)].T)
+    points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))
+    return np.array(area_light.quad(numbers, kind.vec3(wo.T), points), float)

@@ -1,0 +1,166 @@
+"""Cheaper forms of a material within a number of operations, with their measured errors; split-sum code."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..energy.tables import bake as baking
+from ..energy.tables import curves as fits
+from ..errors import InputError
+from ..material import BSDF, Microsurface, tree
+from ..ops import Scalar, Spectrum, Table, function, lookup, vec2
+from ..optics.lattice import r_sequence
+from .bundle import Bundle
+from .curves import written
+from .functions import Functions, functions_bundle
+from .operations import operations
+from .placement import Placement
+from .program import Program
+
+TERMS = ("fresnel", "masking")  # choices that exist in cheaper forms
+MAX_VARIANTS = 64
+PAIRS = 4096
+TABLE = 64
+ORDERS = ("2/0", "3/0", "2", "3", "4")
+LOCATION = "emit: budget"
+
+
+class Tier(NamedTuple):
+    """A form of a material.
+
+    name   what it is, such as "fresnel = schlick"
+    cost   operations of one call
+    error  the largest error, and `mean` the mean one
+    """
+
+    name: str
+    cost: int
+    error: float
+    mean: float
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cost} operations, largest error {self.error:.1e}, mean {self.mean:.1e}"
+
+
+def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
+    """(the form of a material whose `eval` is most exact within a number of operations, all forms that were tried).
+
+    The forms differ in the choices of `TERMS`. Errors are those of `eval` over 4096 random pairs, as parts of the
+    largest channel at each pair, which counts as 1e-3 of the mean at least. The chosen form comes first.
+    Raises InputError if none is within the budget.
+    """
+    wo, wi = _pairs()
+    reference = np.asarray(model.eval(wo, wi), float)
+    tiers: list[tuple[Tier, BSDF]] = []
+    for name, variant in _variants(model):
+        program = Program(variant, ("eval",))
+        called = [routine for method, routine in program.entries.items() if method == "eval"]
+        value = np.asarray(variant.eval(wo, wi), float)
+        size = np.maximum(np.abs(reference).max(-1), 1e-3 * np.abs(reference).mean())
+        error = np.abs(value - reference).max(-1) / size
+        cost = sum(sum(operations(routine).values()) for routine in called)
+        tiers.append((Tier(name, cost, float(error.max()), float(error.mean())), variant))
+    within = [pair for pair in tiers if pair[0].cost <= budget]
+    if not within:
+        least = min(tier.cost for tier, _ in tiers)
+        what = f"{budget} operations given, and the cheapest form of {type(model).__name__} takes {least}"
+        raise InputError(what, LOCATION, f"give {least} or more")
+    best = min(within, key=lambda pair: (pair[0].mean, pair[0].cost))
+    return best[1], [best[0], *(tier for tier, _ in tiers if tier is not best[0])]
+
+
+def _variants(model: BSDF) -> Iterator[tuple[str, BSDF]]:
+    """(description, material) of each combination of cheaper terms, the material itself first."""
+    leaves = [leaf for leaf in tree.leaves(model) if leaf.path.rpartition(".")[2] in TERMS and leaf.parameter.choices]
+    options = [[leaf.value, *(c for c in leaf.parameter.choices if c != leaf.value)] for leaf in leaves]
+    for values in itertools.islice(itertools.product(*options), MAX_VARIANTS):
+        pairs = [(leaf.path, value) for leaf, value in zip(leaves, values, strict=True) if value != leaf.value]
+        name = ", ".join(f"{path} = {value}" for path, value in pairs)
+        yield name or "the material itself", tree.replace(model, dict(pairs)) if pairs else model
+
+
+def _pairs() -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of directions above the surface: a half of them within the lobe of a mirror."""
+    u = r_sequence(PAIRS, 4, 0.5)
+    z = np.sqrt(u[:, [0, 2]])
+    phi = 2.0 * np.pi * u[:, [1, 3]]
+    sine = np.sqrt(1.0 - z**2)
+    both = np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=-1)
+    wo, wi = both[:, 0], both[:, 1].copy()
+    near = wo[::2] * (-1.0, -1.0, 1.0) + 0.3 * wi[::2]
+    wi[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
+    return wo, wi
+
+
+# --------------------------------------------------------------------------- the split sum
+
+
+def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget: int = 0) -> tuple[Bundle, list[Tier]]:
+    """Code of the split sum for a material's distribution: `dfg` and `image_light`; and the forms of `dfg`, first the
+    chosen one.
+
+    budget  operations of `dfg`: the most exact form within them, of a table and of fits; 0 is the table. A lookup
+            counts its four texels and their interpolation
+    Raises InputError for a material without a microsurface, or with two widths.
+    """
+    surface = model.microsurface
+    if surface is None or not model.isotropic:
+        what = f"{type(model).__name__} has no split sum, which needs a distribution of one width"
+        raise InputError(what, "emit: ibl", "--fit writes the albedo of any material")
+    tiers = list(_forms(model, surface, budget))
+    within = [(tier, code) for tier, code in tiers if not budget or tier.cost <= budget]
+    if not within:
+        least = min(tier.cost for tier, _ in tiers)
+        raise InputError(f"{budget} operations given, and the cheapest form takes {least}", LOCATION)
+    best, dfg = min(within, key=lambda pair: (pair[0].error, pair[0].cost))
+
+    @function
+    def image_light(f0: Spectrum, roughness: Scalar, cos_theta: Scalar, radiance: Spectrum) -> Spectrum:
+        """Light of an environment that the surface reflects; radiance is that of the prefiltered environment."""
+        ab = dfg(roughness, cos_theta)
+        return (f0 * ab.x + ab.y) * radiance
+
+    types: dict[str, str | None] = {"f0": "vec3", "roughness": "float", "cos_theta": "float", "radiance": "vec3"}
+    title = (
+        f"The split sum (Karis2013) of {surface.ndf}, {surface.masking}: light = (f0 A + B) radiance, where radiance\n"
+        "is that of the environment prefiltered for the roughness (gonio bake sky.hdr), in the mirrored direction.\n"
+        f"A and B by {best}."
+    )
+    made: Functions = [(dfg, {"roughness": "float", "cos_theta": "float"}), (image_light, types)]
+    bundle = functions_bundle(made, lang, title, placement)
+    bundle.manifest["tiers"] = [tier._asdict() for tier, _ in tiers]
+    return bundle, [best, *(tier for tier, _ in tiers if tier is not best)]
+
+
+LOOKUP = 30  # operations of an interpolated lookup of two channels, beside its four texels
+
+
+def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Tier, object]]:
+    """`dfg` by a table and, if a budget is given, by fits of several orders."""
+    baked = baking.cached(surface.ndf, lut=("dfg",), masking=surface.masking, size=TABLE)
+    table = Table("dfg", baked.arrays["dfg"])
+
+    def dfg(roughness: Scalar, cos_theta: Scalar) -> object:
+        """A, B of the split sum: the albedo is F0 A + B for Schlick's Fresnel (Karis2013)."""
+        return vec2(*lookup(table, roughness, cos_theta))
+
+    samples = fits.sample(model, ("dfg",))
+    yield Tier(f"a table of {TABLE} x {TABLE}", LOOKUP + 4, *_table_error(table, samples)), function(dfg)
+    for order in ORDERS if budget else ():
+        (curve,) = fits.fit(samples, order, ("dfg",))
+        code = written(curve)
+        counted = functions_bundle([(code, {"roughness": "float", "cos_theta": "float"})], "glsl", "")
+        cost = sum(counted.manifest["operations"]["dfg"].values())
+        yield Tier(f"a fit of order {order}", cost, curve.error, curve.mean), code
+
+
+def _table_error(table: Table, samples: fits.Samples) -> tuple[float, float]:
+    """(largest, mean) error of lookups between the nodes, over the range of the fits."""
+    white, share = np.moveaxis(samples.values["dfg"], -1, 0)
+    a, b = lookup(table, samples.roughness[:, None], samples.mu)
+    error = np.maximum(np.abs(a - white * (1.0 - share)), np.abs(b - white * share))
+    return float(error.max()), float(error.mean())
