@@ -107,6 +107,8 @@ def readings(text: str) -> list[Kind]:
     """All readings of a word, the most likely first; at least one. Raises InputError for a Python file without a
     class."""
     text = text.strip()
+    if texts.summands(text):
+        return [Kind.NAME]
     head, settings = texts.split(text)
     if head.startswith("{"):
         return _described(_type_of(head), Kind.NAME)

@@ -65,6 +65,10 @@ def _material(cls: object) -> type[BSDF]:
     if family is not BSDF.family or not isinstance(cls, type):
         hint = f"use it in a material: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
         raise InputError(f"a {family.kind} given, the class of a material expected", place, hint)
+    if is_plugin(cls):
+        name = "".join(f"-{c.lower()}" if c.isupper() else c for c in cls.__name__).lstrip("-")
+        hint = f"register it, mi.register_bsdf('{name}', {cls.__name__}), and judge it: gonio verify FILE.py:{name}"
+        raise InputError(f"{cls.__name__} is a BSDF of Mitsuba's, a material of Gonio's expected", place, hint)
     if not issubclass(cls, BSDF):
         return adopt(cls, place)
     if cls.eval is BSDF.eval:
@@ -74,6 +78,12 @@ def _material(cls: object) -> type[BSDF]:
         what = f"{cls.__name__} shadows Gonio's material '{cls.name}'"
         raise InputError(what, place, f"give the class another name, such as My{cls.__name__}")
     return cls
+
+
+def is_plugin(cls: object) -> bool:
+    """Whether a class is derived from Mitsuba's BSDF, of any variant; does not load Mitsuba."""
+    bases = cls.__mro__ if isinstance(cls, type) else ()
+    return any(base.__name__ == "BSDF" and base.__module__.startswith("mitsuba") for base in bases)
 
 
 def adopt(cls: type, where: str = "") -> type[BSDF]:
