@@ -30,34 +30,18 @@ from ..errors import InputError, did_you_mean
 from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.parameters import ChoiceParameter, IndexParameter, Parameter, Value
+from ..ops import backend
 from ..optics.indices import DispersiveIndex
-from . import documents, library, outside, texts
+from . import documents, outside, texts
 from .texts import apart, assignment, class_named, split, taken_apart
 
 Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
 
 __all__ = [
     "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
-    "material", "named", "settings", "several", "shared", "spelled", "split", "taken_apart", "typed",
+    "named", "settings", "several", "shared", "spelled", "split", "taken_apart", "typed",
     "written",
 ]  # fmt: skip
-
-
-def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
-    """A named material, `material("alum-bronze")`, by one of the published fits; or one of a file, "chest.gltf:Wood".
-
-    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file that describes materials,
-                of another program or the result of a fit ("gold.json"), followed by :NAME if it contains several
-    fit         FILE/FIT; by default Bagher2012's
-    parameters  override the fitted ones
-    Raises InputError, with the closest known name, if it is unknown or missing from the paper, and for a file that
-    cannot be read; a GonioWarning names features of a file that Gonio's materials lack.
-    """
-    if documents.names_document(name) and not library.knows(name):
-        cls, given = taken_apart(name, "material")
-        return made(cls, {**given, **parameters})[0]
-    cls, preset = library.named(f"{name}:{fit}" if fit else name)
-    return cls.preset(preset, **parameters)
 
 
 def named(
@@ -218,6 +202,8 @@ def typed(parameter: Parameter, value: Value) -> object:
         return str(value).lower() == "true"
     if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
         return parameter.coerce(value.strip(' "'), where)
+    if isinstance(value, np.ndarray | DispersiveIndex) or backend.is_drjit(value):
+        return value  # one value per ray, or a curve, which a program gives
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]

@@ -212,6 +212,8 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise _no_material(value, where)
     fields = documents.from_scenes(value)
+    if fields["type"] in documents.types() and isinstance(fields.get("file"), str):
+        return taken_apart(":".join(filter(None, [str(fields["file"]), str(fields.get("material", ""))])), where)
     name = named_by(fields)
     cls, preset = class_and_preset(name, where)
     return cls, {"preset": preset, **fields} if preset else fields

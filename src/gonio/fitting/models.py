@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ..catalog import notation, texts
+from ..catalog.material import MaterialLike
+from ..catalog.material import material as named
 from ..errors import InputError
 from ..material import BSDF, tree
 from ..materials.combined.sum import Sum
@@ -60,17 +63,17 @@ def modelled(text: str, lobes: int = 1) -> Model:
 
 
 def moving_of(
-    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
+    model: MaterialLike, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
 ) -> tuple[BSDF, list[Free]]:
     """A model with the values of `fixed` set, and its free parameters; arguments as in `fit`."""
     return moving_with_notes(model, lobes, fixed, free)[:2]
 
 
 def moving_with_notes(
-    model: str | BSDF, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
+    model: MaterialLike, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
 ) -> tuple[BSDF, list[Free], list[str]]:
     """Like `moving_of`, with notes for the reader of the result."""
-    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
+    material, stays, least = modelled(str(model), lobes) if isinstance(model, str | Path) else Model(named(model))
     given = {notation.path_of(material, path): value for path, value in (fixed or {}).items()}
     if given:
         written = {path: value for path, value in given.items() if isinstance(value, str)}

@@ -14,6 +14,7 @@ import numpy as np
 from ... import files
 from ...arguments import renamed
 from ...catalog import operands
+from ...catalog.material import MaterialLike
 from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
 from ...material import BSDF
@@ -152,7 +153,7 @@ def _table_format(path: Path) -> Format:
 @public
 def capture(
     photographs: str | Path | Sequence[str],
-    model: str | BSDF | Sequence[str | BSDF] | None = None,
+    model: MaterialLike | Sequence[MaterialLike] | None = None,
     *,
     calibration: str | Path | None = None,
     grazing: float = GRAZING,
@@ -193,7 +194,7 @@ def capture(
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
     results = []
-    for one in [model] if isinstance(model, str | BSDF) else model or ():
+    for one in model if isinstance(model, list | tuple) else () if model is None else (model,):
         progress("fits")
         results.append(fitting.fitted(scene, chosen, one, uncertainty, fixed=param, free=free))
     results.sort(key=lambda one: one.fit.criterion)
@@ -209,7 +210,7 @@ def capture(
 @public
 def plan(
     calibration: str | Path,
-    model: str | BSDF,
+    model: MaterialLike,
     count: int = 4,
     *,
     places: Sequence[Sequence[float]] | None = None,
