@@ -42,11 +42,12 @@ _PLACES = {
         *("spectrum", "width"),
     ),
     "catalog.library": ("fits", "materials"),
-    "catalog.notation": ("material",),
+    "catalog.material": ("material",),
     "catalog.shaders": ("Shader",),
     "measure.compression.compress": ("compress",),
     "fitting.fit": ("fit",),
-    "energy": ("Albedo", "albedo"),
+    "energy": ("Albedo",),
+    "viewer.albedos": ("albedo",),
     "instruments.capture.run": ("capture",),
     "instruments.goniometer.run": ("measure",),
     "instruments.pictures": ("fit_picture",),
@@ -73,11 +74,11 @@ _ALIASES = {"cluster": "Cluster", "mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import ops
-    from .catalog import notation as _notation
+    from .catalog import material as _catalog_material
     from .catalog.library import fits, materials
     from .catalog.shaders import Shader
     from .check import check
-    from .energy.albedo import Albedo, albedo
+    from .energy.albedo import Albedo
     from .errors import GonioError, GonioWarning, InputError
     from .fitting.fit import fit
     from .instruments.capture.run import capture
@@ -134,6 +135,7 @@ if TYPE_CHECKING:
     from .transport.integrators import Integrator
     from .verify import verify
     from .verify.laws import Law
+    from .viewer.albedos import albedo
     from .viewer.compensations import compensation
     from .viewer.contact_sheet import study
     from .viewer.conversion import convert
@@ -146,7 +148,7 @@ if TYPE_CHECKING:
     from .work.cluster import Cluster
     from .work.cluster import Cluster as cluster
 
-    material = _notation.material  # after `from .material`, which type checkers read as the subpackage
+    material = _catalog_material.material  # after `from .material`, which type checkers read as the subpackage
 
 
 if not TYPE_CHECKING:  # a type checker would accept every misspelt name

@@ -11,6 +11,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.catalog import notation
+from gonio.cli import options
 from gonio.errors import InputError
 from gonio.material import BSDF, number, spectrum
 from gonio.material.parameters import Value
@@ -183,3 +184,27 @@ def test_naming_a_material_finds_no_tables(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert not list(tmp_path.rglob("*.np*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "expected"),
+    [
+        ("lambert+conductor(alpha=.2)", [], "sum(a=lambert,b=conductor(alpha=.2))"),
+        ("lambert+ggx", ["k=1"], "sum(a=lambert,b=conductor(fresnel=schlick,eta=1.5,k=1))"),
+        ("lambert+ggx(alpha=.2)", ["b.k=1"], "sum(a=lambert,b=conductor(fresnel=schlick,eta=1.5,k=1,alpha=.2))"),
+        ("lambert+phong+ggx", ["k=2"], "sum(a=sum(a=lambert,b=phong),b=conductor(fresnel=schlick,eta=1.5,k=2))"),
+        ("two-sided(base=lambert+phong)", ["p=9"], "two-sided(base=sum(a=lambert,b=phong(p=9)))"),
+        ("lambert(albedo=1e-1)", [], "lambert(albedo=0.1)"),
+    ],
+)
+def test_a_sum_stands_wherever_a_material_can(text: str, given: list[str], expected: str) -> None:
+    assert same(notation.named(text, given)[0], notation.named(expected)[0])
+    if given:  # the command line appends its options to the text
+        assert same(notation.named(options.Material(given).text(text))[0], notation.named(expected)[0])
+
+
+def test_a_name_in_several_parts_of_a_sum_is_ambiguous() -> None:
+    with pytest.raises(InputError, match=r"ambiguous: a\.albedo and b\.albedo"):
+        notation.named("lambert+ggx", ["albedo=.3"])
+    with pytest.raises(InputError, match="no parameter 'kk'"):
+        notation.named("lambert+ggx", ["kk=0"])

@@ -27,6 +27,17 @@ def gonio(*words: object) -> int:
     return int(ended.value.code or 0)
 
 
+def test_several_models_are_ranked_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = rehearsal.take(RIG, go.Lambert((0.5, 0.4, 0.3)), tmp_path / "photographs", noise=0.01)
+    output = tmp_path / "chalk.json"
+    assert gonio("capture", folder, "-m", "mirror-phong", "-m", "lambert") == 2
+    assert gonio("capture", folder, "-m", "oren-nayar(albedo=.2,.2,.2)", "-m", "lambert", "-o", output) == 0
+    assert "2. " in capsys.readouterr().out
+    fits = json.loads(output.read_text())["fits"]
+    assert len(fits) == 2 and fits[0]["criterion"] <= fits[1]["criterion"]
+    assert {type(go.material(f"{output}:{rank}")) for rank in (1, 2)} == {go.Lambert, go.OrenNayar}
+
+
 def test_photographs_become_a_table_a_figure_and_a_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = rehearsal.take(RIG, go.Lambert((0.5, 0.4, 0.3)), tmp_path / "photographs", noise=0.01)
     output = tmp_path / "chalk.gonio"

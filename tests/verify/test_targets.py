@@ -168,3 +168,38 @@ def test_mitsubas_plugins_and_descriptions(tmp_path: Path) -> None:
     own = tmp_path / "own.json"
     own.write_text(json.dumps({"type": "gonio_conductor", "alpha": 0.3, "preset": "Au"}))
     assert verify(str(own), quick=True, law=["energy", "weight"]).passed
+
+
+PLUGIN = """import mitsuba as mi
+
+class MyBlack(mi.BSDF):
+    def __init__(self, props=None):
+        mi.BSDF.__init__(self, props)
+        self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide]
+        self.m_flags = self.m_components[0]
+    def eval(self, ctx, si, wo, active=True):
+        return mi.Color3f(0.0)
+"""
+
+
+def test_a_class_of_a_plugin_names_it_or_says_what_to_type(tmp_path: Path) -> None:
+    path = tmp_path / "black.py"
+    path.write_text(PLUGIN + "mi.register_bsdf('my-black', lambda props: MyBlack(props))\n")
+    assert targets.resolve(f"{path}:MyBlack")[0].model.description == {"type": "my-black"}
+    other = tmp_path / "unregistered.py"
+    other.write_text(PLUGIN)
+    with pytest.raises(go.InputError) as caught:
+        targets.resolve(f"{other}:MyBlack")
+    assert "mi.register_bsdf('NAME', MyBlack)" in caught.value.hint
+    with pytest.raises(go.InputError, match="MyBlack is a BSDF of Mitsuba's"):
+        go.plot(f"{other}:MyBlack")
+
+
+def test_properties_of_a_plugin_stand_in_brackets_too() -> None:
+    one = targets.resolve("mitsuba:roughconductor(alpha=0.3,distribution=ggx)", ["alpha=0.2"])[0]
+    assert one.model.description["alpha"] == 0.2 and one.model.description["distribution"] == "ggx"
+    assert one.command().startswith("gonio verify mitsuba:roughconductor --param")
+
+
+def test_a_parameter_of_a_sum_is_varied_by_its_name() -> None:
+    assert [one.model.b.k for one in targets.resolve("lambert+ggx", vary="k=0,1")] == [0.0, 1.0]

@@ -37,13 +37,11 @@ def test_what_was_set_is_not_varied() -> None:
 
 
 def test_wrong_arguments_are_clear_errors() -> None:
-    with pytest.raises(InputError, match="a material or its name expected"):
+    with pytest.raises(InputError, match="a material expected"):
         go.view(3.0)  # type: ignore[arg-type]
     for height in (5, "400", 400.5, None, float("nan")):
         with pytest.raises(InputError, match=f"height {height!r}"):
             go.view("lambert", height=height)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"view\(Lambert\(\)\)"):
-        go.view(go.Lambert)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="one by one"):
         go.view([go.Lambert(), "lambert"])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="unknown material"):

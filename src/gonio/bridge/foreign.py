@@ -9,6 +9,7 @@ Numbers and albedos among the properties of a plugin become parameters of the ma
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -228,7 +229,7 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
     the file registers none of that name."""
     path = Path(os.path.expanduser(target.rpartition(":")[0])).resolve()
     name = target.rpartition(":")[2]
-    if not path.is_file() or b"register_bsdf" not in path.read_bytes():
+    if not path.is_file() or b"mitsuba" not in path.read_bytes():
         return None
     mi = mitsuba()
     register, registered = mi.register_bsdf, _registered.setdefault(path, {})
@@ -242,12 +243,26 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
         module = outside.module_of(path, "TARGET")
     finally:
         vars(mi)["register_bsdf"] = register
-    kind = (
-        name
-        if name in registered
-        else next((k for k, make in registered.items() if make is vars(module).get(name)), None)
-    )
-    return None if kind is None else load({"type": kind, **properties})
+    cls = vars(module).get(name)
+    if name not in registered and not outside.is_plugin(cls):
+        return None
+    kind = name if name in registered else _name_of(cls, registered, target.rpartition(":")[0])
+    return load({"type": kind, **properties})
+
+
+def _name_of(cls: type, registered: Mapping[str, object], file: str) -> str:
+    """The name under which a file registers a class of plugins, itself or by a function that constructs it. Raises
+    InputError if there is none."""
+    by_class = next((kind for kind, make in registered.items() if make is cls), "")
+    if by_class:
+        return by_class
+    for kind in registered:
+        with contextlib.suppress(InputError):  # it may need properties
+            if type(_built({"type": kind})) is cls:
+                return kind
+    known = [f"{file}:{kind}" for kind in registered]
+    hint = f"name a registered plugin: {', '.join(known)}" if known else f"add mi.register_bsdf('NAME', {cls.__name__})"
+    raise InputError(f"no plugin that the file registers is a {cls.__name__}", file, hint)
 
 
 def mitsuba() -> ModuleType:

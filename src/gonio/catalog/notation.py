@@ -5,10 +5,12 @@
     gold.binary                                 a file of measured values
     chest.gltf:Wood                             a material of a glTF file, numbers only (`documents`)
     gold.json                                   a result of `gonio fit`, or JSON as below
+    lambert+ggx                                 a sum; ggx and beckmann are lobes of Schlick's Fresnel term
     alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
     alum-bronze:low2012/lowsmooth_E2            the same by another published fit
     conductor(alpha=0.3,preset=Au)              all in one; a comma separates where a name and = follow
     kulla-conty(base=conductor,base.alpha=0.3)  a value of an inner material, by its path; in any order
+    gold.json(k=0)                              the same by its name, if one inner material alone has it: b.k of a sum
     {"type": "conductor", "alpha": [0.1, 0.4]}  as in a scene
 
 Values are numbers, "0.9,0.8,0.7" or [0.9, 0.8, 0.7] for several, names, true or false, and materials. The default inner
@@ -28,34 +30,18 @@ from ..errors import InputError, did_you_mean
 from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.parameters import ChoiceParameter, IndexParameter, Parameter, Value
+from ..ops import backend
 from ..optics.indices import DispersiveIndex
-from . import documents, library, outside, texts
+from . import documents, outside, texts
 from .texts import apart, assignment, class_named, split, taken_apart
 
 Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
 
 __all__ = [
     "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
-    "material", "named", "settings", "several", "shared", "spelled", "split", "taken_apart", "typed",
+    "named", "settings", "several", "shared", "spelled", "split", "taken_apart", "typed",
     "written",
 ]  # fmt: skip
-
-
-def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
-    """A named material, `material("alum-bronze")`, by one of the published fits; or one of a file, "chest.gltf:Wood".
-
-    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file that describes materials,
-                of another program or the result of a fit ("gold.json"), followed by :NAME if it contains several
-    fit         FILE/FIT; by default Bagher2012's
-    parameters  override the fitted ones
-    Raises InputError, with the closest known name, if it is unknown or missing from the paper, and for a file that
-    cannot be read; a GonioWarning names features of a file that Gonio's materials lack.
-    """
-    if documents.names_document(name) and not library.knows(name):
-        cls, given = taken_apart(name, "material")
-        return made(cls, {**given, **parameters})[0]
-    cls, preset = library.named(f"{name}:{fit}" if fit else name)
-    return cls.preset(preset, **parameters)
 
 
 def named(
@@ -87,7 +73,7 @@ def shared(named: Sequence[Settings], assignments: Sequence[str]) -> list[dict[s
     wanted = dict(map(assignment, assignments))
     assigned, known = [], set()
     for cls, own in named:
-        fits = [name for name in wanted if _has(cls, {**wanted, **own}, name)]
+        fits = [name for name in wanted if _has(cls, {**wanted, **own}, name) or _inside(cls, {**own}, name)]
         assigned.append({name: wanted[name] for name in fits})
         known |= {*fits, *cls.parameters(), *(["preset"] if cls.presets() else [])}
     for name in wanted:
@@ -112,6 +98,35 @@ def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
     below = {key.removeprefix(f"{name}."): value for key, value in given.items() if key.startswith(f"{name}.")}
     inner, own = apart(given.get(name, _inner_default(parameter)), f"--param {name}")
     return _has(inner, {**own, **below}, rest)
+
+
+def _inside(cls: type[BSDF], given: Mapping[str, object], name: str) -> list[str]:
+    """The paths of the parameters of that name in the inner materials of a class; `given` as for `made`. A parameter
+    hides those of the same name inside its material."""
+    paths: list[str] = []
+    for key, parameter in cls.parameters().items() if "." not in name else ():
+        if parameter.inner:
+            inner, own = apart(given.get(key, _inner_default(parameter)), f"--param {key}")
+            places = [name] if name in inner.parameters() else _inside(inner, own, name)
+            paths += [f"{key}.{place}" for place in places]
+    return paths
+
+
+def _one_of(owner: str, paths: Sequence[str], name: str) -> str:
+    """The only path; "" if there is none. Raises InputError for several."""
+    if len(paths) > 1:
+        what = f"'{name}' of {owner} is ambiguous: {' and '.join(paths)}"
+        raise InputError(what, f"--param {name}", f"give one of them, such as --param {paths[0]}=...")
+    return paths[0] if paths else ""
+
+
+def path_of(material: BSDF, name: str) -> str:
+    """The path of the parameter that a path, or the name of a parameter of one inner material alone, refers to; the
+    text itself if there is none. Raises InputError if several inner materials have it."""
+    if "." in name or name in material.parameters():
+        return name
+    here = {key: getattr(material, key) for key, parameter in material.parameters().items() if parameter.inner}
+    return _one_of(material.name, _inside(type(material), here, name), name) or name
 
 
 def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
@@ -160,6 +175,9 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
                 what = f"'{name}' of {cls.name} is not a material, and has no '{rest}'"
                 raise InputError(what, f"--param {path}", f"give --param {name}=...")
             below.setdefault(name, {})[rest] = value
+        elif path != "preset" and (inner := _one_of(cls.name, _inside(cls, given, path), path)):
+            name, _, rest = inner.partition(".")
+            below.setdefault(name, {}).setdefault(rest, value)
         elif path != "preset":
             hint = did_you_mean(name, [*known, *(["preset"] if cls.presets() else [])])
             raise InputError(f"{cls.name} has no parameter '{name}'", f"--param {path}", hint)
@@ -184,6 +202,8 @@ def typed(parameter: Parameter, value: Value) -> object:
         return str(value).lower() == "true"
     if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
         return parameter.coerce(value.strip(' "'), where)
+    if isinstance(value, np.ndarray | DispersiveIndex) or backend.is_drjit(value):
+        return value  # one value per ray, or a curve, which a program gives
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
@@ -291,7 +311,11 @@ def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
         return (
             value
             if not below
-            else tree.replace(value, {path: _typed_at(value, path, v) for path, v in below.items()}, where)
+            else tree.replace(
+                value,
+                {path_of(value, path): _typed_at(value, path_of(value, path), v) for path, v in below.items()},
+                where,
+            )
         )
     cls, own = apart(value, where)
     return made(cls, {**own, **below})[0]

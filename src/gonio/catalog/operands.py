@@ -100,6 +100,8 @@ def is_material(word: str) -> bool:
     if kinds[0] is Kind.CODE:
         cls = outside.thing(texts.split(word)[0], where="MODEL")
         return (isinstance(cls, type) and issubclass(cls, BSDF)) or callable(getattr(cls, "eval", None))
+    if texts.summands(word):
+        return True
     return kinds[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in kinds)
 
 
@@ -107,6 +109,8 @@ def readings(text: str) -> list[Kind]:
     """All readings of a word, the most likely first; at least one. Raises InputError for a Python file without a
     class."""
     text = text.strip()
+    if texts.summands(text):
+        return [Kind.NAME]
     head, settings = texts.split(text)
     if head.startswith("{"):
         return _described(_type_of(head), Kind.NAME)
@@ -139,7 +143,12 @@ def readings(text: str) -> list[Kind]:
 def _described(name: str, kind: Kind) -> list[Kind]:
     """The readings of a description by its type: Gonio's, or a Mitsuba plugin's. Names that both have are Gonio's;
     `twosided` and `thindielectric`, which other verbs read as two-sided and thin-dielectric, are plugins."""
-    known = re.sub("^gonio-", "", name) in models() or library.knows(name) or outside.names_code(name)
+    known = (
+        re.sub("^gonio-", "", name) in models()
+        or library.knows(name)
+        or outside.names_code(name)
+        or name in documents.types()
+    )
     plugins = [Kind.PLUGIN] if name else []
     return [kind, *plugins] if known or not plugins else [*plugins, kind]
 

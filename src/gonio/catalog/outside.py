@@ -34,8 +34,8 @@ from ..owner import exclusive
 from . import shaders
 
 __all__ = [
-    "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
-    "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
+    "PREFIX", "adopt", "as_material", "check_operators", "files_in", "forget", "is_outside", "load", "member",
+    "module_of", "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
 ]  # fmt: skip
 
 
@@ -55,33 +55,45 @@ def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BS
     folder  the base of a relative path; by default the current folder
     Raises InputError, with file and line, if the file cannot be run or has no such class.
     """
-    return _material(thing(text, folder, where))
+    return as_material(thing(text, folder, where))
 
 
-def _material(cls: object) -> type[BSDF]:
-    """The class as a material; raises InputError if it cannot be one."""
+def as_material(cls: object) -> type[BSDF]:
+    """A class as that of a material; raises InputError if it cannot be one."""
     place = place_of(cls)
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
         hint = f"use it in a material: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
         raise InputError(f"a {family.kind} given, the class of a material expected", place, hint)
+    if is_plugin(cls):
+        name = "".join(f"-{c.lower()}" if c.isupper() else c for c in cls.__name__).lstrip("-")
+        hint = f"register it, mi.register_bsdf('{name}', {cls.__name__}), and judge it: gonio verify FILE.py:{name}"
+        raise InputError(f"{cls.__name__} is a BSDF of Mitsuba's, a material of Gonio's expected", place, hint)
     if not issubclass(cls, BSDF):
         return adopt(cls, place)
     if cls.eval is BSDF.eval:
         raise InputError(f"{cls.__name__} has no eval", place, "write eval(self, wo, wi, mode): f |cos theta_i|")
     known = BSDF.family.all().get(cls.name)
-    if known is not None and known.__module__.startswith("gonio.") and not known.overridable:
+    if known not in (None, cls) and known.__module__.startswith("gonio.") and not known.overridable:
         what = f"{cls.__name__} shadows Gonio's material '{cls.name}'"
         raise InputError(what, place, f"give the class another name, such as My{cls.__name__}")
     return cls
 
 
-def adopt(cls: type, where: str = "") -> type[BSDF]:
-    """A class with `eval` that is not a gonio.BSDF, as one: `pdf` and `sample` use a guide computed from it."""
+def is_plugin(cls: object) -> bool:
+    """Whether a class is derived from Mitsuba's BSDF, of any variant; does not load Mitsuba."""
+    bases = cls.__mro__ if isinstance(cls, type) else ()
+    return any(base.__name__ == "BSDF" and base.__module__.startswith("mitsuba") for base in bases)
+
+
+def adopt(thing: object, where: str = "") -> type[BSDF]:
+    """A class with `eval` that is not a gonio.BSDF, or an instance, as one: `pdf` and `sample` use a guide computed
+    from it."""
+    cls = thing if isinstance(thing, type) else type(thing)
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
     try:
-        inner = cls()
+        inner = cls() if thing is cls else thing
     except Exception as error:
         raise InputError(f"{cls.__name__}() fails: {type(error).__name__}: {error}", where, "give defaults") from None
     members: dict[str, object] = {}

@@ -1,6 +1,7 @@
 """Parsing of a material's text: its name and its settings.
 
     taken_apart("conductor(alpha=0.3,preset=Au)")    (Conductor, {"alpha": "0.3", "preset": "Au"})
+    taken_apart("lambert+ggx")                       (Sum, {"a": "lambert", "b": "conductor(fresnel=schlick,...)"})
 
 `notation` interprets the settings.
 """
@@ -17,6 +18,11 @@ from ..material.bsdf import BSDF
 from ..material.parameters import Value
 from . import documents, library, outside, shaders
 
+# lobes as parts of a sum, "lambert+ggx": Schlick's Fresnel term of an index without absorption
+LOBES = {
+    "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
+    "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
+}
 SHADER = "shader"  # the type of shaders in scenes and JSON: {"type": "shader", "file": "my.glsl"}
 RANGE_STEPS = 5  # values of a range
 _RANGE = re.compile(r"(.+?)\.\.(.+)", re.DOTALL)
@@ -38,6 +44,8 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
     allowed."""
     if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
         raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
+    if parts := summands(text):
+        return model("sum"), {"a": as_call("+".join(parts[:-1])), "b": parts[-1]}
     head, inside = split(text)
     given: dict[str, object] = {**assignments(inside, where)}
     if head.startswith("{"):
@@ -63,6 +71,8 @@ def split(text: str) -> tuple[str, str]:
     """Name and settings of NAME(parameter=value,...): ("conductor", "alpha=0.3"); the settings are "" if there are
     none. File names and JSON may contain brackets."""
     text = text.strip()
+    if summands(text):
+        return text, ""
     if text.startswith("{"):
         try:
             end = json.JSONDecoder().raw_decode(_with_zeros(text))[1]
@@ -79,6 +89,49 @@ def split(text: str) -> tuple[str, str]:
             break
     match = _CALL.fullmatch(text)
     return (match[1].strip(), match[2] or "") if match else (text, "")
+
+
+def summands(text: str) -> list[str]:
+    """The parts of a sum of materials, "lambert+ggx", with the lobes of `LOBES` written out; empty for any other text.
+    A + inside brackets, as in 1e+5, or in the name of a file belongs to that."""
+    parts, depth = [""], 0
+    for letter in text if "+" in text else "":
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "+" and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    parts = [part.strip() for part in parts]
+    if len(parts) < 2 or not all(parts) or documents.names_document(text) or outside.names_data(text):
+        return []
+    return list(map(expanded, parts)) if any(_is_known(split(part)[0]) for part in parts) else []
+
+
+def as_call(text: str) -> str:
+    """A sum as a text to which settings can be added, "sum(a=lambert,b=...)"; any other text unchanged."""
+    parts = summands(text)
+    return f"sum(a={as_call('+'.join(parts[:-1]))},b={parts[-1]})" if parts else text
+
+
+def expanded(part: str) -> str:
+    """A part of a sum with its lobe written out: "ggx(alpha=0.2)" as a conductor of alpha 0.2."""
+    head, bracket, rest = part.partition("(")
+    if head.strip() not in LOBES:
+        return part
+    lobe = LOBES[head.strip()].removesuffix(")")
+    return f"{lobe},{rest}" if bracket and rest.strip() != ")" else f"{lobe})"
+
+
+def _is_known(head: str) -> bool:
+    """Whether a text without settings names a material, or a lobe of a sum."""
+    return (
+        head in LOBES
+        or is_model(head)
+        or library.knows(head)
+        or outside.names_code(head)
+        or outside.names_data(head)
+        or documents.names_document(head)
+    )
 
 
 def assignments(inside: str, where: str = "MODEL") -> dict[str, str]:
@@ -159,6 +212,8 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise _no_material(value, where)
     fields = documents.from_scenes(value)
+    if fields["type"] in documents.types() and isinstance(fields.get("file"), str):
+        return taken_apart(":".join(filter(None, [str(fields["file"]), str(fields.get("material", ""))])), where)
     name = named_by(fields)
     cls, preset = class_and_preset(name, where)
     return cls, {"preset": preset, **fields} if preset else fields

@@ -82,6 +82,7 @@ class Material:
         settings = self.settings()
         if not settings:
             return list(models)
+        models = [texts.as_call(one) for one in models]
         apart = [notation.split(one) for one in models]
         if len(models) == 1:
             return [_text(apart[0][0], dict(map(notation.assignment, settings)), apart[0][1])]

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arguments import renamed
 from ..catalog import notation
+from ..catalog.material import MaterialLike
 from ..errors import InputError
 from ..material import BSDF
 from ..measure import read
@@ -113,7 +114,7 @@ class Fit:
 @public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
-    model: str | BSDF = "conductor",
+    model: MaterialLike = "conductor",
     *,
     lobes: int = 1,
     loss: str = "relative",
@@ -128,7 +129,7 @@ def fit(
         found.material, found.values, found.errors
 
     data      a measurement file, a table, or `Data`
-    model     a material, its name, or a sum of names such as "lambert+ggx"; the fit starts from its parameter values
+    model     anything that `go.material` takes, such as the sum "lambert+ggx"; the fit starts from its parameter values
     lobes     number of copies of the last part in the sum
     loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
     param     path -> value of parameters that stay fixed

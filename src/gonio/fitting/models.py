@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..catalog import notation
+from ..catalog import notation, texts
+from ..catalog.material import MaterialLike
+from ..catalog.material import material as named
 from ..errors import InputError
 from ..material import BSDF, tree
 from ..materials.combined.sum import Sum
@@ -19,10 +22,6 @@ from .parameters import Free, free_of, start_of
 from .solver import Problem, normal_equations
 from .starts import random_starts
 
-SHORT = {
-    "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
-    "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
-}
 FIXED = {"ggx": ("k",), "beckmann": ("k",)}
 AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
 GENERIC = 512  # directions at which the effects of parameters are compared
@@ -51,12 +50,8 @@ def modelled(text: str, lobes: int = 1) -> Model:
     parts += parts[-1:] * (lobes - 1)
     made: list[Model] = []
     for part in parts:
-        head, bracket, rest = part.partition("(")
-        spelled = SHORT.get(head, head)
-        if bracket:
-            own = spelled.partition("(")[2].rstrip(")")
-            spelled = f"{spelled.partition('(')[0]}({','.join(filter(None, [own, rest.removesuffix(')')]))})"
-        material = notation.named(spelled)[0]
+        head, _, rest = part.partition("(")
+        material = notation.named(texts.expanded(part))[0]
         given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
         made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
     combined = made[0]
@@ -68,22 +63,23 @@ def modelled(text: str, lobes: int = 1) -> Model:
 
 
 def moving_of(
-    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
+    model: MaterialLike, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
 ) -> tuple[BSDF, list[Free]]:
     """A model with the values of `fixed` set, and its free parameters; arguments as in `fit`."""
     return moving_with_notes(model, lobes, fixed, free)[:2]
 
 
 def moving_with_notes(
-    model: str | BSDF, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
+    model: MaterialLike, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
 ) -> tuple[BSDF, list[Free], list[str]]:
     """Like `moving_of`, with notes for the reader of the result."""
-    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
-    given = dict(fixed or {})
+    material, stays, least = modelled(str(model), lobes) if isinstance(model, str | Path) else Model(named(model))
+    given = {notation.path_of(material, path): value for path, value in (fixed or {}).items()}
     if given:
-        texts = {path: value for path, value in given.items() if isinstance(value, str)}
-        others = {path: value for path, value in given.items() if path not in texts}
-        material = tree.replace(notation.changed(material, texts), others)
+        written = {path: value for path, value in given.items() if isinstance(value, str)}
+        others = {path: value for path, value in given.items() if path not in written}
+        material = tree.replace(notation.changed(material, written), others)
+    free = [notation.path_of(material, path) for path in free]
     moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
     moving = [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
     return without_duplicates(material, moving, tuple(free))

@@ -330,7 +330,8 @@ class MaterialParameter(Parameter):
 
     def check(self, value: object, location: str) -> None:
         if not isinstance(value, Material):
-            raise InputError(f"{type(value).__name__} given, a material expected", location)
+            hint = "give an instance: go.material(...) makes one of a text, a file, a description or a class"
+            raise InputError(f"{type(value).__name__} given, a material expected", location, hint)
 
 
 def pair_of(value: object, location: str = "") -> tuple[Value, Value]:

@@ -197,6 +197,9 @@ def _located(error: BaseException, path: Path) -> GonioError:
     if isinstance(error, GonioError):
         return InputError(error.what, f"{place}: {error.where}" if error.where else place, error.hint)
     text = str(error).strip().partition("\n")[0]
+    if "before setting a variant" in text:  # a file of plugins: the verifier sets one
+        hint = f"a class of Mitsuba's is judged by its registered name: gonio verify {path.name}:NAME"
+        return InputError(f"{type(error).__name__}: {text.partition('.')[0]}", place, hint)
     return InputError(f"{type(error).__name__}: {text}" if text else type(error).__name__, place, "the file must run")
 
 

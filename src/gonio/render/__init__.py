@@ -10,6 +10,7 @@ from ..owner import public
 from .options import RenderKeywords, takes_render_options
 
 if TYPE_CHECKING:
+    from ..catalog.material import MaterialLike
     from ..material import BSDF
     from ..pictures.exposures import RGB
     from .request import Request
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 @public
 @takes_render_options
 def render(
-    scene: str | Path | BSDF,
+    scene: MaterialLike,
     *,
     output: str | Path | None = None,
     timeout: float | None = None,
@@ -34,8 +35,8 @@ def render(
         picture = go.render("gold.json")        # the result of a fit, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
-    scene          a scene's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; an
-                   option below that is None takes the scene's value
+    scene          a scene's folder or .json, a Mitsuba .xml, or a material, as `go.material` takes it, which is shown
+                   on a ball; an option below that is None takes the scene's value
     output         file to write: .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
@@ -83,17 +84,19 @@ def _path(named: str | Path | None) -> Path | None:
     return None if named is None else Path(named)
 
 
-def _shown(scene: str | Path | BSDF, allow_code: bool) -> tuple[Path, BSDF | None]:
+def _shown(scene: MaterialLike, allow_code: bool) -> tuple[Path, BSDF | None]:
     """The path of a scene and None, or a material's name and the material, which may be given as text."""
     from ..catalog import notation, operands
-    from ..material import BSDF
+    from ..catalog.material import material
 
-    if not isinstance(scene, BSDF):
+    if isinstance(scene, str | Path):
         accepted = {operands.Kind.SCENE, *operands.MATERIALS}
         if operands.kind_of(scene, accepted, "render: scene") is operands.Kind.SCENE:
             return Path(scene), None
-        scene = notation.named(str(scene), allow_code=allow_code)[0]
-    return Path(scene.name), scene
+        shown = notation.named(str(scene), allow_code=allow_code)[0]
+    else:
+        shown = material(scene)
+    return Path(shown.name), shown
 
 
 @public

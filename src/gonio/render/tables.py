@@ -20,7 +20,8 @@ import numpy as np
 
 from .. import files
 from ..arguments import renamed
-from ..catalog import library, notation, operands, outside
+from ..catalog import library, notation, operands, outside, texts
+from ..catalog.material import MaterialLike, material
 from ..catalog.operands import Kind
 from ..energy.tables import bake as baking
 from ..energy.tables import ltc, prefilter
@@ -40,7 +41,7 @@ BAKED = frozenset({Kind.DISTRIBUTION, Kind.PICTURE, *operands.MATERIALS})
 @renamed(size="resolution", spp="samples", points="sampler")
 @public
 def bake(
-    target: str | Path | BSDF = "ggx",
+    target: MaterialLike = "ggx",
     output: str | Path | None = None,
     *,
     preset: str | None = None,
@@ -176,7 +177,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def _preset(
-    target: str | Path | BSDF, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
+    target: MaterialLike, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
     flip: bool,
 ) -> Baked:  # fmt: skip
     """E and E_avg as the homework's text, or its figures, have them. E_avg of the figures is free of noise, and their
@@ -212,9 +213,9 @@ def _check_default(options: dict[str, object], hint: str) -> None:
             raise InputError(f"--{name} {value} does not go with this target", f"--{name}", hint)
 
 
-def _is_picture(target: str | Path | BSDF, lut: Sequence[str] | None) -> bool:
+def _is_picture(target: MaterialLike, lut: Sequence[str] | None) -> bool:
     """Whether the target is an environment, by its suffix or by the requested tables."""
-    pictured = not isinstance(target, BSDF) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
+    pictured = isinstance(target, str | Path) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
     others = [name for name in lut or () if name != "prefiltered"]
     if pictured and others:
         raise InputError(f"table '{others[0]}' of a picture", "--lut", "of an environment: --lut prefiltered")
@@ -250,10 +251,10 @@ def _write(baked: Baked, folder: Path, contents: dict[str, bytes]) -> None:
     files.write_all(folder, contents)
 
 
-def _target(target: str | Path | BSDF) -> str | BSDF:
+def _target(target: MaterialLike) -> str | BSDF:
     """A distribution's name, or a material."""
-    if isinstance(target, BSDF):
-        return target
+    if not isinstance(target, str | Path):
+        return material(target)
     target = str(target)
     kind, (name, settings) = operands.kind_of(target, BAKED, "TARGET"), notation.split(target)
     if kind is Kind.DISTRIBUTION:
@@ -263,7 +264,9 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
         return target
     if kind is Kind.CODE:
         return _own(target, name)
-    if kind is Kind.NAME and not (is_model(name) or library.resembles(name) or name.startswith("{")):
+    if kind is Kind.NAME and not (
+        is_model(name) or library.resembles(name) or name.startswith("{") or texts.summands(target)
+    ):
         known = [*distributions(), *models()]
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))
     return notation.named(target)[0]

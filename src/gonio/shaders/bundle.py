@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import files
-from ..catalog import notation
+from ..catalog.material import MaterialLike, material
 from ..errors import InputError
-from ..material import BSDF
 from ..material.recording import switched_off
 from ..ops import graph
 from ..owner import exclusive
@@ -56,7 +55,7 @@ class Bundle:
 
 @exclusive
 def emit(
-    model: BSDF | str | Sequence[BSDF | str],
+    model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
     functions: Sequence[str] = ("eval", "pdf", "sample"),
     *,
@@ -70,7 +69,7 @@ def emit(
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
 
-    model          a material, or its text as on the command line: "conductor(preset=Au)"; a list of them for a module
+    model          anything that `go.material` takes, such as "conductor(preset=Au)"; a list of them for a module
                    that holds them all, with common functions once
     lang           name of a language, such as "glsl"; `gonio.shaders.languages()` has all of them
     functions      of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
@@ -90,7 +89,7 @@ def emit(
 
 @exclusive
 def bundle(
-    model: BSDF | str | Sequence[BSDF | str],
+    model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
     functions: Sequence[str] = ("eval", "pdf", "sample", "terms"),
     *,
@@ -106,7 +105,7 @@ def bundle(
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
-    models = [model] if isinstance(model, BSDF | str) or not isinstance(model, Sequence) else list(model)
+    models = [model] if isinstance(model, str) or not isinstance(model, Sequence) else list(model)
     if not models:
         raise InputError("no material given", "emit", "name at least one, such as conductor")
     if language.standalone:
@@ -120,7 +119,7 @@ def bundle(
 
 
 def _file(
-    models: Sequence[BSDF | str], language: Language, functions: Sequence[str], lean: bool, place: Placement
+    models: Sequence[MaterialLike], language: Language, functions: Sequence[str], lean: bool, place: Placement
 ) -> Bundle:
     """A file that runs by itself, which holds its tables."""
     if place.prefix or place.first_binding:
@@ -137,11 +136,10 @@ def _file(
 
 
 def _recorded(
-    model: BSDF | str, functions: Sequence[str], lean: bool, on: Collection[str], single: bool = True
+    model: MaterialLike, functions: Sequence[str], lean: bool, on: Collection[str], single: bool = True
 ) -> tuple[Program, dict[str, Json]]:
     """The parts of a material's shader, and the values of its numeric parameters by path."""
-    if isinstance(model, str):
-        model = notation.named(model)[0]
+    model = material(model)
     functions = programs.check(model, functions, "emit")
     numbers = dict(numbers_of(model))  # raises for arrays of materials
     try:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import ops
-from ..catalog import notation
+from ..catalog.material import MaterialLike, material
 from ..errors import InputError
-from ..material import BSDF
 from ..owner import exclusive
 from . import program as programs
 from .manifest import Json, numbers_of
@@ -19,11 +18,11 @@ LIMIT = 1_000_000  # pairs: some 300 MB of text
 
 @exclusive
 def vectors(
-    model: BSDF | str, count: int = 10_000, functions: Sequence[str] = ("eval", "pdf", "sample"), seed: int = 1
+    model: MaterialLike, count: int = 10_000, functions: Sequence[str] = ("eval", "pdf", "sample"), seed: int = 1
 ) -> dict[str, Json]:
     """Random pairs and what a shader should return for them, as plain data for JSON.
 
-    model      a material, or its text as on the command line
+    model      anything that `go.material` takes
     count      number of pairs, at most a million
     functions  of "eval", "pdf", "sample"; other names are ignored, as is "terms"
     Returns {"model", "seed", "fields": values of the struct by path, "wo", "wi", "u": (count, 3), "eval": (count, 3),
@@ -31,8 +30,7 @@ def vectors(
     that a shader receives exactly these; the results are computed in float64 from them. A tenth of the pairs are
     mirrored within 6 degrees, a tenth graze. Raises InputError for a stochastic material.
     """
-    if isinstance(model, str):
-        model = notation.named(model)[0]
+    model = material(model)
     asked = programs.check(model, functions, "emit")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= LIMIT:
         raise InputError(f"{count!r} given, a whole number from 1 to {LIMIT:,} expected", "emit: check")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import sys
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from .. import members
 from ..arguments import renamed
+from ..catalog.material import MaterialLike, material
 from ..errors import GonioWarning, InputError
 from ..material import BSDF
 from ..owner import public
@@ -31,7 +34,7 @@ DEFAULT_SEED = 1
 PLACES, QUALITY = "other values", "sampling quality"
 GUIDES = 2  # other values at which the laws of sampling judge a guide: each takes seconds
 CONFIRMATION = 0.001  # p-value of the test with a second seed, below which a rejection is confirmed
-Target = BSDF | Subject | str
+Target: TypeAlias = "MaterialLike | Subject"
 Begin = Callable[[str], None]
 
 
@@ -61,7 +64,7 @@ def verify(
 
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
-    target    a material; or a target's name as `gonio verify` takes it; or a list of either
+    target    anything that `go.material` takes; or a target's name as `gonio verify` takes it; or a list of them
     vary      of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
     quick     a fast first check
     deep      more samples, more directions, more widths
@@ -86,7 +89,7 @@ def verify(
     outputs = Outputs(output, junit, sarif, baseline, write_baseline, tolerate)
     known = outputs.check()
     names = None if law is None else [law] if isinstance(law, str) else list(law)
-    all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
+    all_ = [_target(one) for one in (target if isinstance(target, list | tuple) else [target])]
     if isolated or (isolated is None and _isolable(all_)):
         from . import trials
         from .isolation import child
@@ -100,6 +103,16 @@ def verify(
     return result
 
 
+def _target(given: Target) -> BSDF | Subject | str:
+    """A target as a text, which may name a plugin, or as a material."""
+    if isinstance(given, str | Path | Subject):
+        return given if isinstance(given, Subject) else str(given)
+    if isinstance(given, Mapping):
+        with contextlib.suppress(TypeError):  # it contains materials, or arrays
+            return json.dumps(given)
+    return material(given)
+
+
 def _effort(quick: bool, deep: bool) -> str:
     """The key of `EFFORTS`."""
     if quick and deep:
@@ -107,7 +120,7 @@ def _effort(quick: bool, deep: bool) -> str:
     return "quick" if quick else "deep" if deep else "default"
 
 
-def _isolable(targets: list[Target]) -> bool:
+def _isolable(targets: Sequence[BSDF | Subject | str]) -> bool:
     """Whether another process can load the targets by their names, without registrations of this program."""
     if not all(isinstance(one, str) for one in targets) or not sys.executable:
         return False
@@ -348,7 +361,7 @@ def _exceeds(finding: Finding) -> str:
     return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
 
 
-def _subjects(targets: Sequence[Target], vary: str) -> list[Subject]:
+def _subjects(targets: Sequence[BSDF | Subject | str], vary: str) -> list[Subject]:
     subjects: list[Subject] = []
     for target in targets:
         if isinstance(target, str):

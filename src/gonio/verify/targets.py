@@ -3,7 +3,8 @@
 conductor                a model's name; a material in it is a name again: --param a=lambert
 glass.py:Glass           a class in a Python file, which runs because the user named it
 glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that name or by its class
-mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS, with its properties as parameters
+mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS, with its properties as parameters,
+                         also as in mitsuba:roughplastic(alpha=0.3)
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
@@ -13,7 +14,7 @@ gold.json                the result of a fit, or a material in Gonio's notation
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,18 +46,18 @@ def _values(text: str) -> tuple[str, list[str]]:
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:
-    kind, (head, _) = operands.kind_of(target, JUDGED, "TARGET"), notation.split(target)
+    kind, (head, inside) = operands.kind_of(target, JUDGED, "TARGET"), notation.split(target)
     if kind is Kind.PLUGIN and head.startswith("mitsuba:"):
         from ..bridge import foreign
 
-        values = {key: _property(value) for key, value in given.items()}
-        return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
+        values = _properties({**texts.assignments(inside, "TARGET"), **given})
+        return Subject(foreign.plugin(head.removeprefix("mitsuba:"), values), head, values)
     if kind is Kind.PLUGIN:
         return _from_file(target, given)
     if kind is Kind.CODE:
         from ..bridge import foreign
 
-        properties = {key: _property(value) for key, value in given.items()}
+        properties = _properties({**texts.assignments(inside, "TARGET"), **given})
         plugin = foreign.plugin_in(head, properties)
         if plugin is not None:
             return Subject(plugin, head, properties)
@@ -66,11 +67,15 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     if kind is Kind.NAME:
         return Subject(bsdf, cls.name, values)
     # The file documents its own values; the title shows those that were assigned in addition.
-    assigned = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
+    assigned = {*(name.partition(".")[0] for name in given), *texts.assignments(inside)}
     return Subject(bsdf, head, {name: value for name, value in values.items() if name in assigned})
 
 
 # --------------------------------------------------------------------------- Mitsuba
+
+
+def _properties(given: Mapping[str, str]) -> dict[str, Any]:
+    return {key: _property(value) for key, value in given.items()}
 
 
 def _property(text: str) -> Any:
@@ -88,7 +93,7 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     from ..bridge import foreign
     from ..scene import mitsuba_scene
 
-    values = {key: _property(value) for key, value in given.items()}
+    values = _properties(given)
     path = None if target.lstrip().startswith("{") else Path(target)
     text = target
     if path is not None:

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import files
-from ..catalog import notation
-from ..material import BSDF
+from ..catalog.material import MaterialLike, material
 from ..materials.compensated import comparison
 from ..owner import public
 from . import energy_figures
@@ -16,7 +15,7 @@ SAMPLES = 200_000
 
 
 @public
-def compensation(*models: BSDF | str, output: str | Path | None = None, samples: int = SAMPLES) -> dict[str, Any]:
+def compensation(*models: MaterialLike, output: str | Path | None = None, samples: int = SAMPLES) -> dict[str, Any]:
     """Compare the ways to restore the light lost by single-scattering models: furnace, error, reciprocity, cost.
 
         go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
@@ -28,7 +27,7 @@ def compensation(*models: BSDF | str, output: str | Path | None = None, samples:
     the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`, and the `cost`.
     """
     folder = None if output is None else files.check_folder(Path(output))
-    own = [model if isinstance(model, BSDF) else notation.named(model)[0] for model in models]
+    own = [material(model) for model in models]
     result = comparison.compare(walks=samples, own=own)
     if folder is not None:
         energy_figures.plot_comparison(result, folder)

@@ -20,9 +20,9 @@ from typing import Unpack
 
 from ..bridge import engine
 from ..catalog import notation, operands
+from ..catalog.material import MaterialLike, material
 from ..catalog.operands import Kind
 from ..errors import GonioWarning, InputError, encodable
-from ..material import BSDF
 from ..owner import public
 from ..pictures import exposures, images
 from ..render.execute import execute, execute_all
@@ -75,7 +75,7 @@ class Sheet:
 @public
 @takes_render_options
 def study(
-    scene: str | Path | BSDF,
+    scene: MaterialLike,
     vary: Mapping[str | tuple[str, ...], Sequence[object]],
     *,
     output: str | Path | None = None,
@@ -87,7 +87,7 @@ def study(
         go.study("examples/phong", {"shapes.1.material.p": [4, 16, 64]}, output="p.png")
         go.study("phong", {"p": [4, 16], ("kd", "ks"): [(0.2, 0.8), (0.5, 0.5)]})
 
-    scene     as in `go.render`; a material, or its text, is shown on a ball
+    scene     as in `go.render`; a material, as `go.material` takes it, is shown on a ball
     vary      values by their path in the scene, by the path of a material's parameter ("base.alpha"), or by the name of
               a parameter of a Mitsuba XML. One path gives a row, two a grid (rows by the first, columns by the second),
               more several grids. Paths may vary together, such as values with a constant sum:
@@ -108,10 +108,11 @@ def study(
         return render_sheet(request, variations, None if output is None else Path(output), title, named, tell=tell)
 
 
-def _named(scene: str | Path | BSDF) -> notation.Settings | None:
+def _named(scene: MaterialLike) -> notation.Settings | None:
     """The material that is studied, None for a scene."""
-    if isinstance(scene, BSDF):
-        return type(scene), {name: getattr(scene, name) for name in scene.parameters()}
+    if not isinstance(scene, str | Path):
+        shown = material(scene)
+        return type(shown), {name: getattr(shown, name) for name in shown.parameters()}
     kind = operands.kind_of(scene, {Kind.SCENE, *operands.MATERIALS}, "study: scene")
     return None if kind is Kind.SCENE else notation.taken_apart(str(scene), "study: scene")
 

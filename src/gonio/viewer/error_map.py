@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..catalog import notation
+from ..catalog import operands
+from ..catalog.material import HasEval, MaterialLike, is_material, material, title_of
 from ..energy.difference import Difference, difference
 from ..errors import InputError
 from ..material import BSDF
@@ -27,8 +29,8 @@ _TITLES = {
 
 @overload
 def compare(
-    test: BSDF,
-    reference: BSDF | str,
+    test: BSDF | Mapping[str, Any] | type[Any] | HasEval,
+    reference: MaterialLike,
     *,
     metric: str | None = ...,
     tolerance: float | None = ...,
@@ -47,8 +49,8 @@ def compare(
 ) -> metrics.Comparison: ...
 @public
 def compare(
-    test: str | Path | ArrayLike | BSDF,
-    reference: str | Path | ArrayLike | BSDF,
+    test: ArrayLike | MaterialLike,
+    reference: ArrayLike | MaterialLike,
     *,
     metric: str | None = None,
     tolerance: float | None = None,
@@ -61,7 +63,7 @@ def compare(
         go.compare(go.OrenNayar(sigma=0.5), "lambert").largest
 
     test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top; or two materials,
-                     of which the second may be text
+                     as `go.material` takes them
     metric           for `tolerance` and the map: for pictures "relmse", "rmse" or "flip", for materials "mean",
                      "largest" or "albedo"; None is the first of these
     tolerance        the largest value that passes
@@ -73,7 +75,7 @@ def compare(
     """
     if output is not None:
         figures.check_output(Path(output))
-    if isinstance(test, BSDF):
+    if _is_material(test):
         return compare_materials(test, reference, metric or "mean", tolerance, output)
     judged = metrics.Tolerance(metric or "relmse", tolerance)
     a, b = _picture(test, "test", encoding), _picture(reference, "reference", encoding)
@@ -92,10 +94,10 @@ def compare_materials(
     """As `compare`, for two materials, both of which may be text."""
     named = []
     for one in (test, reference):
-        if not isinstance(one, BSDF | str):
+        if not _is_material(one):
             what, hint = f"{type(one).__name__} given, a material expected", "compare two materials or two pictures"
             raise InputError(what, "compare", hint)
-        named.append((notation.written(one), one) if isinstance(one, BSDF) else (one, notation.named(one)[0]))
+        named.append((title_of(one), material(one)))
     (name_a, a), (name_b, b) = named
     compared = difference(a, b, metric, tolerance)
     if output is not None:
@@ -103,8 +105,15 @@ def compare_materials(
     return compared
 
 
-def _picture(given: str | Path | ArrayLike | BSDF, name: str, encoding: str) -> images.Picture:
-    if isinstance(given, BSDF):
+def _is_material(given: object) -> bool:
+    """Whether a material is given; a word that may be a picture is one."""
+    if not isinstance(given, str | Path):
+        return is_material(given)
+    return operands.readings(str(given))[0] in operands.MATERIALS
+
+
+def _picture(given: object, name: str, encoding: str) -> images.Picture:
+    if _is_material(given):
         raise InputError("a picture and a material", "compare", "compare two materials or two pictures")
     if isinstance(given, str | Path):
         return images.read(given, encoding)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..catalog import notation, operands
+from ..catalog import operands
+from ..catalog.material import MaterialLike, material
 from ..owner import public
 from . import families, manual
 
@@ -29,18 +30,18 @@ class Explanation:
 
 
 @public
-def explain(name: str = "") -> Explanation:
+def explain(name: MaterialLike = "") -> Explanation:
     """The manual page of a material, or of any other member of a family: formula, parameters, limits, source.
 
         print(go.explain("conductor"))
         print(go.explain("ggx"))
 
-    name  a material, a distribution of normals, a masking term, an integrator, a law, ...; or a family, such as
-          "fresnel", whose members are listed; "" lists the families
+    name  a material, as `go.material` takes it, a distribution of normals, a masking term, an integrator, a law, ...;
+          or a family, such as "fresnel", whose members are listed; "" lists the families
     Raises InputError, with the nearest known name.
     """
     if not name:
         return Explanation((families.index(),))
-    if operands.is_material(name):
-        return Explanation((manual.page(notation.taken_apart(name)[0]),))
+    if not isinstance(name, str) or operands.is_material(name):
+        return Explanation((manual.page(type(material(name))),))
     return Explanation(tuple(families.pages(name)))

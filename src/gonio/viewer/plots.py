@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..catalog import notation, operands
+from ..catalog import operands
+from ..catalog.material import MaterialLike, material, title_of
 from ..catalog.operands import Kind
 from ..errors import InputError, did_you_mean
 from ..material import BSDF
@@ -31,7 +32,7 @@ _LONGEST = 70  # letters of a title or a label
 
 @public
 def plot(
-    *materials: BSDF | str | Path,
+    *materials: MaterialLike,
     kind: str = "lobe",
     angles: Sequence[float] | None = None,
     eta: float | None = None,
@@ -44,7 +45,7 @@ def plot(
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
         go.plot("fresnel", eta=1.5)
 
-    materials  materials, or their text as on the command line; or one folder written by `go.bake`; or "fresnel",
+    materials  anything that `go.material` takes; or one folder written by `go.bake`; or "fresnel",
                the reflectance of an interface over angle, from both sides, with its approximations and their errors
     kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
                vector and difference angle)
@@ -61,7 +62,7 @@ def plot(
         drawing = fresnel_figure.draw(eta, k, metal)
     elif eta is not None or k or metal is not None:
         raise InputError("an index is given without fresnel", "plot", "plot fresnel, or use -p eta=1.5")
-    elif len(materials) == 1 and not isinstance(materials[0], BSDF) and is_tables(materials[0]):
+    elif len(materials) == 1 and isinstance(materials[0], str | Path) and is_tables(materials[0]):
         drawing = energy_figures.draw_tables(materials[0])
     else:
         named = [_named(material) for material in materials]
@@ -74,11 +75,11 @@ def is_tables(text: str | Path) -> bool:
     return operands.kind_of(text, {Kind.TABLES, *operands.MATERIALS}, "MODEL") is Kind.TABLES
 
 
-def _named(material: BSDF | str | Path) -> tuple[str, BSDF]:
+def _named(given: MaterialLike) -> tuple[str, BSDF]:
     """A material and its label."""
-    if isinstance(material, BSDF):
-        return notation.written(material), material
-    return str(material), notation.named(str(material))[0]
+    if isinstance(given, str | Path):
+        operands.kind_of(given, operands.MATERIALS, "MODEL")  # of another kind it is an error that says so
+    return title_of(given), material(given)
 
 
 def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) -> tuple[float, ...]:

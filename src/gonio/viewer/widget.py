@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from numbers import Integral
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..catalog import notation
+from ..catalog.material import MaterialLike, material
 from ..errors import InputError, MachineError
 from ..material import BSDF, tree
 from ..owner import exclusive
@@ -41,10 +43,10 @@ export default { render };
 
 
 @exclusive
-def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
+def view(*models: MaterialLike, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 
-    models  materials or their names; without any, the two rows of Kulla-Conty and plain balls
+    models  anything that `go.material` takes; without any, the two rows of Kulla-Conty and plain balls
     height  of the cell, CSS pixels
     Returns a widget, which the notebook shows. The page runs in the notebook's browser without a server, so there is no
     live reference. Raises InputError if a model cannot be shown, MachineError if anywidget is missing.
@@ -67,27 +69,21 @@ def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     return type("GonioView", (anywidget.AnyWidget,), members)()
 
 
-def _stage(models: tuple[object, ...]) -> stage.Stage:
+def _stage(models: tuple[MaterialLike, ...]) -> stage.Stage:
     if not models:
         return stage.homework()
     bsdfs: list[BSDF] = []
     given: list[Collection[str]] = []
     for model in models:
-        if isinstance(model, BSDF):
-            bsdfs.append(model)
-            given.append(_own(model))
-        elif isinstance(model, str):
-            (one,), _ = stage.shown([model])
+        if isinstance(model, str | Path):
+            (one,), _ = stage.shown([str(model)])
             bsdfs.append(one.bsdf)
             given.append(one.given)
+        elif isinstance(model, list | tuple):
+            raise InputError("a list given, a material expected", "go.view", "give them one by one: go.view(a, b)")
         else:
-            name = model.__name__ if isinstance(model, type) else type(model).__name__
-            hint = ""
-            if isinstance(model, type) and issubclass(model, BSDF):
-                hint = f"create an instance: go.view({name}())"
-            elif isinstance(model, list | tuple):
-                hint = "give them one by one: go.view(a, b)"
-            raise InputError(f"{name} given, a material or its name expected", "go.view", hint)
+            bsdfs.append(material(model))
+            given.append(_own(bsdfs[-1]))
     return stage.of_models(bsdfs, given)
 
 

@@ -81,6 +81,11 @@ Document.family = Family(
 )
 
 
+def types() -> list[str]:
+    """The types of such files in scenes: {"type": "gltf", "file": ...}."""
+    return list(Document.family.all())
+
+
 def parted(text: str) -> tuple[Document, Path, str] | None:
     """Format, file and material of FILE or FILE:MATERIAL; None if the text names no such file."""
     for document in Document.family.all().values():

@@ -28,7 +28,8 @@ def capture(
         Path | None, output_option("FILE", "A table (.gonio, .binary, ...) or .json; a .png is written next to it.")
     ] = None,
     model: Annotated[
-        str | None, Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx".')
+        list[str] | None,
+        Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; several are ranked.'),
     ] = None,
     how: Fitting,
     calibration: Annotated[
@@ -47,18 +48,19 @@ def capture(
     Examples:
       gonio capture photographs -o paint.gonio
       gonio capture photographs -m lambert+ggx -o paint.json --next 2
+      gonio capture photographs -m lambert+ggx -m lambert+ward
       gonio capture a.png b.png --calibration rig.json -o paint.binary
     """
     from ...instruments.capture import run
 
     target = None if output is None else run.check_output(output)
-    if model is None and (next_ or how.preset or (target is not None and target.suffix.lower() == ".json")):
-        model = "lambert+ggx"
-    named = None if model is None else how.models([model])[0]
+    if not model and (next_ or how.preset or (target is not None and target.suffix.lower() == ".json")):
+        model = ["lambert+ggx"]
+    named = how.models(model or ())
     fixed, free = how.fixed(), tuple(how.free or ())
     if next_ and run.is_blank(photographs, calibration):
         path = run.calibration_of(photographs, calibration)
-        _print_plan(run.plan(path, named or "lambert+ggx", next_, fixed=fixed, free=free), as_json)
+        _print_plan(run.plan(path, named[0] if named else "lambert+ggx", next_, fixed=fixed, free=free), as_json)
         return
     with Bar("capture") as bar:
         result = run.capture(
@@ -103,6 +105,10 @@ def _print(result: Capture) -> None:
     print(f"{result.counts['used']} pixels in {len(result.samples.count)} samples; left out: {left}")
     if result.fitted is None:
         return
-    print(result.fit.text)
-    print_intervals(result.fit.names, result.fit.values, result.fit.interval)
-    print(f"{100.0 * result.fit.relative:.3g} % off on average, pixels by {100.0 * result.fitted.noise:.3g} %")
+    ranks = [f"{rank}. " for rank in range(1, len(result.others) + 2)] if result.others else [""]
+    for rank, one in zip(ranks, (result.fit, *result.others), strict=True):
+        print(rank + one.text)
+        print_intervals(one.names, one.values, one.interval)
+        ranked = f", criterion {one.criterion:.0f}" if rank else ""
+        noise = f", pixels by {100.0 * result.fitted.noise:.3g} %" if one is result.fit else ""
+        print(f"{100.0 * one.relative:.3g} % off on average{noise}{ranked}")

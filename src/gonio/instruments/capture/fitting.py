@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...catalog.material import MaterialLike
 from ...fitting import fit as tables
 from ...fitting.certainty import groups_of, null_space
 from ...fitting.data import Data
 from ...fitting.fit import Fit
 from ...fitting.parameters import ranges, start_of, with_values
 from ...fitting.solver import solve
-from ...material import BSDF
 from .calibration import Floats, Uncertainty
 from .pixels import Chosen, Pixels, Scene, directions
 from .problem import Faults, Problem, across, inverse_of, middle_of
@@ -49,7 +49,7 @@ class Fitted:
 def fitted(
     scene: Scene,
     chosen: Chosen,
-    model: str | BSDF,
+    model: MaterialLike,
     stated: Uncertainty,
     *,
     fixed: Mapping[str, object] | None = None,

@@ -14,6 +14,7 @@ import numpy as np
 from ... import files
 from ...arguments import renamed
 from ...catalog import operands
+from ...catalog.material import MaterialLike
 from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
 from ...material import BSDF
@@ -40,6 +41,7 @@ class Capture:
     counts    pixels of the sample: used, saturated, shadowed, grazing
     fitted    the material fitted to the pixels; None without a model
     warnings  defects of the pictures, and parameters that they do not determine
+    others    the other models that were fitted, by their criterion, best first
     """
 
     scene: Scene
@@ -49,6 +51,7 @@ class Capture:
     warnings: tuple[str, ...]
     photographs: tuple[Photograph, ...]
     chosen: Chosen
+    others: tuple[Fit, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -115,6 +118,7 @@ class Capture:
         if self.fitted is not None:
             entries |= {
                 "fit": self.fitted.fit.as_dict(),
+                **({"fits": [one.as_dict() for one in (self.fit, *self.others)]} if self.others else {}),
                 "noise": self.fitted.noise,
                 "faults": {
                     name: {"deviations": value, "error": error} for name, (value, error) in self.fitted.faults.items()
@@ -126,7 +130,7 @@ class Capture:
         counts = self.counts
         left = ", ".join(f"{counts[why]} {why}" for why in ("saturated", "shadowed", "grazing"))
         lines = [f"{counts['used']} pixels in {len(self.samples.count)} samples; left out: {left}"]
-        lines += [str(self.fitted.fit)] if self.fitted is not None else []
+        lines += [str(one) for one in (self.fitted.fit, *self.others)] if self.fitted is not None else []
         return "\n".join([*lines, *(f"  warning: {text}" for text in self.warnings)])
 
 
@@ -149,7 +153,7 @@ def _table_format(path: Path) -> Format:
 @public
 def capture(
     photographs: str | Path | Sequence[str],
-    model: str | BSDF | None = None,
+    model: MaterialLike | Sequence[MaterialLike] | None = None,
     *,
     calibration: str | Path | None = None,
     grazing: float = GRAZING,
@@ -164,7 +168,7 @@ def capture(
         result.save("paint.gonio")
 
     photographs  a folder with a calibration.json, or files that the calibration lists
-    model        model to fit, as in `go.fit`; None: samples only
+    model        model to fit, as in `go.fit`; several are ranked by their criterion; None: samples only
     calibration  the calibration file; None: calibration.json in the folder of the photographs
     grazing      degrees; pixels viewed or lit beyond this angle are excluded
     param        path -> value of parameters that stay fixed
@@ -189,20 +193,24 @@ def capture(
     chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
-    result = None
-    if model is not None:
+    results = []
+    for one in model if isinstance(model, list | tuple) else () if model is None else (model,):
         progress("fits")
-        result = fitting.fitted(scene, chosen, model, uncertainty, fixed=param, free=free)
+        results.append(fitting.fitted(scene, chosen, one, uncertainty, fixed=param, free=free))
+    results.sort(key=lambda one: one.fit.criterion)
+    result = results[0] if results else None
+    if result is not None:
         scene = result.problem.corrected(result.numbers)
     gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     warnings = advice.on(scene, chosen, result)
-    return Capture(scene, gathered, chosen.counts, result, warnings, tuple(shots), chosen)
+    others = tuple(one.fit for one in results[1:])
+    return Capture(scene, gathered, chosen.counts, result, warnings, tuple(shots), chosen, others)
 
 
 @public
 def plan(
     calibration: str | Path,
-    model: str | BSDF,
+    model: MaterialLike,
     count: int = 4,
     *,
     places: Sequence[Sequence[float]] | None = None,

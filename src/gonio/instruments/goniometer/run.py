@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from ... import files
 from ...arguments import renamed, shown
 from ...catalog import notation, outside
+from ...catalog.material import MaterialLike
+from ...catalog.material import material as named
 from ...errors import InputError
 from ...material import BSDF, is_model
 from ...measure import colours
@@ -155,11 +157,11 @@ class _Scout(Measurement):
 @renamed(kind="table", rays="samples")
 @public
 def measure(
-    material: BSDF | str | None = None,
+    material: MaterialLike | None = None,
     output: str | Path | None = None,
     *,
     surface: Surface | str | None = None,
-    facet: BSDF | str = "mirror",
+    facet: MaterialLike = "mirror",
     table: str = "",
     theta_i: Sequence[float] | None = None,
     theta_r: Sequence[float] | None = None,
@@ -179,7 +181,7 @@ def measure(
         go.measure("conductor(alpha=0.2)", "gold.binary")                     # any material into any format
         go.measure(surface="gaussian:alpha=0.3", facet="mirror", output="rough.gonio")
 
-    material     the material to evaluate, as text or object; None to measure a surface
+    material     the material to evaluate, as `go.material` takes it; None to measure a surface
     output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
     surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
     facet        material of the facets, as text or object: "mirror", "lambert:albedo=0.8", "conductor:Au"; given as
@@ -231,12 +233,12 @@ def _check_numbers(detector: Detector, tracing: Tracing) -> None:
             raise InputError(f"{getattr(tracing, name)} given, {low} to {most} expected", f"--{name}")
 
 
-def _rough(surface: Surface | str, facet: BSDF | str, detector: Detector, tracing: Tracing, plan: Plan) -> Rough:
+def _rough(surface: Surface | str, facet: MaterialLike, detector: Detector, tracing: Tracing, plan: Plan) -> Rough:
     """The surface of facets, measured at the angles of incidence of the planned table."""
     built = surface_of(surface) if isinstance(surface, str) else surface
     if not isinstance(built, Surface):
         raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=0.3"')
-    name, material = (facet, facet_of(facet)) if isinstance(facet, str) else ("", facet)
+    name, material = (facet, facet_of(facet)) if isinstance(facet, str) else ("", named(facet))
     solid_angle = DETECTOR if detector.solid_angle is None else detector.solid_angle
     specimen = Rough(built, material, solid_angle, tracing, name)
     scout = _Scout()
@@ -245,15 +247,14 @@ def _rough(surface: Surface | str, facet: BSDF | str, detector: Detector, tracin
     return specimen
 
 
-def _model(material: BSDF | str | None, detector: Detector) -> Model:
+def _model(material: MaterialLike | None, detector: Detector) -> Model:
     if material is None:
         raise InputError("nothing to measure", "MODEL", "name a material, or a surface by --surface")
     if detector.bounces != "all":
         what = f"{detector.bounces} bounces of a material requested"
         raise InputError(what, "--bounces", "use it with --surface only")
-    if isinstance(material, str):
-        return Model(notation.named(material)[0], detector.solid_angle, material)
-    return Model(material, detector.solid_angle)
+    name = (str(material),) if isinstance(material, str | Path) else ()
+    return Model(named(material), detector.solid_angle, *name)
 
 
 def _written(measured: Measurement, plan: Plan, target: Path) -> list[str]:
