@@ -1,4 +1,4 @@
-"""Emit, read back, compare: GLSL written by Gonio, read as a shader, has the values of the material it came from.
+"""Emit, read back, compare: GLSL and WGSL written by Gonio, read as shaders, have the values of their material.
 
 Constants of a shader have 32 bits, and sines are polynomials, so the reference is the material's own recording for
 shaders, with its constants rounded likewise.
@@ -56,20 +56,22 @@ def _values(material: go.BSDF, method: str, arguments: dict[str, np.ndarray], fo
     return [np.asarray(part) for part in parts]
 
 
+@pytest.mark.parametrize("language", ["glsl", "wgsl"])
 @pytest.mark.parametrize("name", MODELS)
-def test_glsl_read_back_has_the_values_of_its_material(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_text_read_back_has_the_values_of_its_material(
+    name: str, language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # steps of the logarithm for shaders, which a material itself never takes
     monkeypatch.setitem(graph.NUMPY, "exponent", lambda x: np.frexp(x)[1] - 1.0)
     monkeypatch.setitem(graph.NUMPY, "scaled", lambda x, e: np.ldexp(x, np.asarray(e, int)))
-    try:
-        compiler()
-    except Exception as error:
-        pytest.skip(f"NOT TRIED: {error}")
+    if language == "glsl":
+        try:
+            compiler()
+        except Exception as error:
+            pytest.skip(f"NOT TRIED: {error}")
     material = go.material(name) if name not in go.models() else go.models()[name]()
-    file = tmp_path / f"{name}.glsl"
-    file.write_text(go.emit(material, "glsl"))
+    file = tmp_path / f"{name}.{language}"
+    file.write_text(go.emit(material, language))
     (tmp_path / f"{name}.toml").write_text(f"transmits = {str(material.transmits).lower()}\n")
     cls = type(go.Shader(file))
     values = {}
