@@ -60,10 +60,10 @@ class Program:
     ) -> None:
         self.model, self.without = model, tuple(without)
         self.bound = recording.symbols(model, self.without)
-        recorded = _record(self.bound, functions, single)
-        simplified = routines(recorded, guarded=not single)
+        graph_of_all = recorded(self.bound, functions, single)
+        simplified = routines(graph_of_all, guarded=not single)
         self.driver = simplified.pop()
-        functions_of = dict(zip((r.name for r in simplified), recorded.functions, strict=False))
+        functions_of = dict(zip((r.name for r in simplified), graph_of_all.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
         self.entries: dict[str, Routine] = {}
         stem = graph.class_name(model)
@@ -183,7 +183,12 @@ class Program:
         return list(tables.values())
 
 
-def _record(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
+def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
+    """A recording of the functions of a material of symbols, whose result is theirs in order.
+
+    single  whether for a language of float32 values, which lacks some functions of the vocabulary
+    """
+
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
         """The driver of a recording; not part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):

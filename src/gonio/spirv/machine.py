@@ -282,7 +282,7 @@ class Machine:
             count = composites.LITERAL[name]
             values = [self._get(frame, id) for id in one.operands[:count]]
             return composites.literal(name, values, one.operands[count:])
-        arguments = one.operands[:2] if name == "ImageSample" else one.operands
+        arguments = one.operands[:2] if name in ("ImageSample", "ImageFetch") else one.operands  # no literals
         values = [self._get(frame, id) for id in arguments]
         if name in _IMAGES:
             return sampled(name, values)

@@ -43,6 +43,7 @@ class Emitter:
         self._last, self._leaves = STANDARD, 0
         self._ids: dict[Type, int] = {}
         self._constants: dict[tuple[Type, str], int] = {}
+        self._abstract: dict[int, Type] = {}  # constants whose type is abstract
         self._machine = Machine(self.module)
 
     def fresh(self) -> int:
@@ -93,6 +94,8 @@ class Emitter:
             raise self.error(f"constants of more than {MAX_CONSTANTS} numbers", "use a texture")
         id = self.fresh()
         self.module.constants[id] = number
+        if concrete(type) != type:
+            self._abstract[id] = type
         return id
 
     def _rounded(self, number: Number, type: Type) -> Number:
@@ -121,12 +124,16 @@ class Emitter:
 
         literals  how many of the last operands are numbers, not ids
         """
-        ids = operands[: len(operands) - literals]
-        one = Instruction(name, self.type_id(type), self.fresh(), operands, self.line, self.where)
-        if all(id in self.module.constants for id in (ids if name != "ExtInst" else ids[2:])):
+        first, last = 2 * (name == "ExtInst"), len(operands) - literals
+        if all(id in self.module.constants for id in operands[first:last]):
+            one = Instruction(name, self.type_id(type), self.fresh(), operands, self.line, self.where)
             return self.constant(self._machine.folded(one), type)
-        self._append(one)
-        return Value(one.result, type)
+        settled = [self._settled(id) for id in operands[first:last]]
+        return self.always(name, concrete(type), *operands[:first], *settled, *operands[last:])
+
+    def _settled(self, id: int) -> int:
+        """An operand whose type is not abstract."""
+        return self.settled(Value(id, self._abstract[id])).id if id in self._abstract else id
 
     def standard(self, number: int, type: Type, *operands: int) -> Value:
         """A function of GLSL.std.450."""
