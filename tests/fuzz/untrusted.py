@@ -212,3 +212,52 @@ def environment(data: bytes, folder: Path) -> object:
         return [
             app.run(_ASKED[(zlib.crc32(data) + at) % len(_ASKED)].split()) for at in range(len(_ASKED) if first else 1)
         ]
+
+
+# ---------------------------------------------------------------------- shaders
+
+_WGSL = (
+    b"""struct M { base: vec3<f32>, rough: f32, }
+@group(0) @binding(0) var<uniform> m: M;
+const PI = 3.14159;
+const t = array<f32, 4>(1.0, 2, 3.5, 0x1p2);
+fn sq(p: ptr<function, f32>) { *p = *p * *p; }
+fn brdf(L: vec3f, V: vec3f, N: vec3f) -> vec3f {
+    var s = 0.0;
+    for (var i = 0u; i < 4; i++) { s += t[i]; if s > 5 { break; } }
+    sq(&s);
+    let h = normalize(L + V);
+    let q = mat3x3f(L, V, N) * h.zyx;
+    switch i32(h.z) { case 0, 1 { s *= 2; } default { return m.base; } }
+    return select(m.base / PI, q, h.z < m.rough && s >= 1) * pow(s, 0.5);
+}""",
+    b"""#define_import_path a::b
+#import a::{c as d, e}
+#ifdef X
+fn
+#else if Y == 2
+}
+#else
+alias R = f32;
+#endif
+override k: R = 2.0;
+const_assert true;
+fn brdf(L: vec3<f32>, V: vec3<f32>) -> R {
+    var x: R;
+    loop { x += k; continuing { break if x > 9; } }
+    while x > 0 { x -= 1; }
+    return x;
+}""",
+)
+
+
+@target("wgsl", lambda: _WGSL, [
+    b"array<f32, 65536>", b"array<vec4f, 9999999>", b"loop { }", b"brdf(L, V)", b"(((((((((", b"f16", b"/*",
+    b"const a = a;", b"<", b">>", b"atomicAdd", b"discard;", b"1e999", b"0x", b"-2147483648", b"#import a::b",
+    b"#endif",
+])  # fmt: skip
+def wgsl(data: bytes, folder: Path) -> object:
+    """A WGSL shader as a material, recorded."""
+    from gonio.catalog.shaders import Shader
+
+    return Shader(saved(folder / "a.wgsl", data))

@@ -11,6 +11,7 @@ from gonio.catalog import notation, operands, shaders
 from gonio.errors import InputError
 from gonio.scene.materials import described
 from gonio.spirv.compiler import compiler
+from gonio.spirv.replay import Replayed
 
 
 @pytest.fixture(autouse=True)
@@ -214,3 +215,13 @@ def test_missing_compiler_says_what_to_install(tmp_path: Path, monkeypatch: pyte
             go.Shader(written(tmp_path, "matte.glsl", LAMBERT))
     finally:
         module.compiler.cache_clear()
+
+
+def test_replayed_recording_has_the_bits_of_the_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = written(tmp_path, "ggx.brdf", GGX)
+    replayed = [go.Shader(file, alpha=0.2).eval(WO, WI, precision=p) for p in ("float32", "float64")]
+    dark = go.Shader(file, lit=False).eval(WO, WI)
+    monkeypatch.setattr(Replayed, "__call__", lambda self, **inputs: self.function(**inputs))
+    direct = [go.Shader(file, alpha=0.2).eval(WO, WI, precision=p) for p in ("float32", "float64")]
+    np.testing.assert_array_equal(replayed, direct)
+    assert not np.any(dark)

@@ -1,90 +1,63 @@
-"""Emit, read back, compare: GLSL written by Gonio, read as a shader, has the values of the material it came from.
+"""Emit, read back, compare: the text of every model has its values in 64 bits, and a changed text has not."""
 
-Constants of a shader have 32 bits, and sines are polynomials, so the reference is the material's own recording for
-shaders, with its constants rounded likewise.
-"""
-
-from pathlib import Path
+import dataclasses
+import re
 
 import gonio as go
 import numpy as np
 import pytest
-from gonio import ops
-from gonio.material import recording, tree
-from gonio.ops import graph
-from gonio.shaders.polyfills import POLYFILLS
+import variants
+from gonio.errors import GonioError
+from gonio.shaders import bundle
+from gonio.shaders.read_back import LANGUAGES, difference
 from gonio.spirv.compiler import compiler
 
-MODELS = ["lambert", "conductor", "phong", "blinn-phong", "eon", "dielectric", "ward", "ashikhmin-shirley", "lafortune"]
-METHODS = {"eval": "wi", "pdf": "wi", "sample": "u"}
+TOLERANCE = 1e-9
 
 
-def _rounded(recorded: graph.Graph) -> None:
-    """Round the recording's constants to 32 bits."""
-
-    def single(value: object) -> object:
-        return float(np.float32(value)) if isinstance(value, float) else value
-
-    for function in recorded.functions:
-        for node in function.nodes:
-            node.args = tuple(map(single, node.args))
-            if node.op == "constant":
-                node.static = single(node.static)
-
-
-def _values(material: go.BSDF, method: str, arguments: dict[str, np.ndarray], for_shaders: bool) -> list[np.ndarray]:
-    """A method's results in NumPy, component first.
-
-    for_shaders  whether with constants of 32 bits, and with the functions that replace those of a language
-    """
-    into = graph.Graph(POLYFILLS, single=True) if for_shaders else graph.Graph()
-    inner = type(material).__dict__.get(method) or getattr(type(material), method)
-    inner = inner.__wrapped__ if hasattr(inner, "__wrapped__") else inner
-    more = {} if method == "pdf" else {"mode": "radiance"}
-    kinds = {"wo": "vec3", METHODS[method]: "vec3"}
-    recorded = ops.record(inner, types=kinds, name=method, into=into, self=recording.symbols(material), **more)
-    if for_shaders:
-        _rounded(recorded)
-    given = {}
-    for leaf in tree.leaves(material):
-        if leaf.parameter.numeric:
-            value = np.asarray(leaf.value, float)
-            size = {"spectrum": 3, "alpha": 2}.get(leaf.parameter.kind, 0)
-            given[f"self_{leaf.path}"] = np.broadcast_to(value, (size,))[:, None] if size else value
-    result = recorded.evaluate(**given, **arguments)
-    parts = result[:3] if method == "sample" else [result]
-    return [np.asarray(part) for part in parts]
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_glsl_read_back_has_the_values_of_its_material(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # steps of the logarithm for shaders, which a material itself never takes
-    monkeypatch.setitem(graph.NUMPY, "exponent", lambda x: np.frexp(x)[1] - 1.0)
-    monkeypatch.setitem(graph.NUMPY, "scaled", lambda x, e: np.ldexp(x, np.asarray(e, int)))
-    try:
-        compiler()
-    except Exception as error:
-        pytest.skip(f"NOT TRIED: {error}")
-    material = go.material(name) if name not in go.models() else go.models()[name]()
-    file = tmp_path / f"{name}.glsl"
-    file.write_text(go.emit(material, "glsl"))
-    (tmp_path / f"{name}.toml").write_text(f"transmits = {str(material.transmits).lower()}\n")
-    cls = type(go.Shader(file))
-    values = {}
-    for field in cls.parameters():
-        path, _, letter = field.rpartition("_") if field.endswith(("_x", "_y")) else (field, "", "")
-        value = getattr(material, path)
-        values[field] = value if not letter or np.ndim(value) == 0 else value["xy".index(letter)]
-    read_back = cls(**values)
+def inputs(count: int, transmits: bool) -> list[np.ndarray]:
     random = np.random.default_rng(5)
-    wo, wi = (v / np.linalg.norm(v, axis=0) for v in random.normal(size=(2, 3, 500)))
-    if not material.transmits:
-        wo, wi = (v * [[1.0], [1.0], [1.0]] * np.where(v[2] < 0, -1.0, 1.0) for v in (wo, wi))
-    for method, other in METHODS.items():
-        arguments = {"wo": wo, other: wi if other == "wi" else random.random((3, 500))}
-        for ours, theirs in zip(
-            _values(read_back, method, arguments, False), _values(material, method, arguments, True), strict=True
-        ):
-            np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-13)
+    wo, wi = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in random.normal(size=(2, count, 3)))
+    if not transmits:
+        wo, wi = (v * np.where(v[:, 2:] < 0.0, -1.0, 1.0) for v in (wo, wi))
+    return [wo, wi, random.random((count, 3))]
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", variants.SHAPES)
+def test_text_read_back_has_the_values_of_its_material(name: str, language: str) -> None:
+    if language != "wgsl":
+        try:
+            compiler()
+        except GonioError as error:
+            pytest.skip(f"NOT TRIED: {error}")
+    material = variants.SHAPES[name]
+    for one in difference(material, bundle(material, language), *inputs(256, material.transmits)):
+        assert one.figure <= TOLERANCE, one
+
+
+def test_functions_of_a_struct_with_text_inside_are_read_back() -> None:
+    # what its `derive` returns holds names beside numbers
+    material = variants.EVERY["turquin"]
+    assert max(one.figure for one in difference(material, bundle(material, "wgsl"), *inputs(64, False))) <= TOLERANCE
+
+
+MUTATIONS = [
+    (r"\bmax\(", "min("), (r" \* ", " + "), (r" - ", " + "), (r"\b0\.5\b", "0.51"), (r"\b1\.0 / ", "1.01 / "),
+    (r"m\.z > 0\.0", "m.z < 0.0"), (r"2\.0 \* cos_i", "2.1 * cos_i"), (r"sqrt\(", "abs("), (r"\.xy\b", ".yx"),
+    (r"0\.31830987", "0.3183"),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_mutated_text_is_caught() -> None:
+    material = go.Conductor.preset("Au", alpha=(0.3, 0.1))
+    made, given = bundle(material, "wgsl"), inputs(64, False)
+    code = re.sub(r"//[^\n]*", lambda comment: " " * len(comment[0]), made.text)
+    for pattern, other in MUTATIONS:
+        match = re.search(pattern, code)
+        assert match is not None, pattern
+        text = made.text[: match.start()] + other + made.text[match.end() :]
+        found = difference(material, dataclasses.replace(made, text=text), *given)
+        assert max(one.figure for one in found) > TOLERANCE, pattern

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from gonio import ops
 from gonio.errors import InputError
+from gonio.ops.table import Table
 from gonio.spirv import Machine, compile_text, parse
 from gonio.spirv.compiler import compiler
+from gonio.spirv.images import Texture
 
 X = np.linspace(0.05, 0.95, 7)
 
@@ -79,6 +81,11 @@ def test_hlsl_equals_its_closed_form() -> None:
     np.testing.assert_allclose(value(text, language="hlsl"), np.minimum(2 * X, 1) * X + 3 + (X + 1) / 2, rtol=1e-6)
 
 
+def test_hlsl_of_2021_selects_by_a_function() -> None:
+    text = "float f(float x) { return dot(select(float2(x, 1) > 0.5, float2(x, 2), float2(0, 0)), float2(1, 1)); }"
+    np.testing.assert_allclose(value(text, language="hlsl"), np.where(X > 0.5, X, 0.0) + 2.0)
+
+
 REFUSED = {
     "discard": "float f(float x) {\n if (x > 0.5) discard;\n return x; }",
     "derivative": "float f(float x) {\n return dFdx(x); }",
@@ -114,3 +121,14 @@ def test_include_reads_named_folders_only(tmp_path) -> None:
     (tmp_path / "a.glsl").write_text('#include "a.glsl"\n#include "a.glsl"\n')
     with pytest.raises(InputError, match="includes"):
         compile_text(text, "test", folders=[tmp_path])
+
+
+def test_texels_are_fetched_by_integers() -> None:
+    text = "uniform sampler2D t;\nfloat f(float x) { return texelFetch(t, ivec2(int(2.0 * x), 1), 0).r; }"
+    module = parse(compile_text(text, "test"), "test")
+    table = Texture("t", Table("t", np.arange(4.0).reshape(2, 2, 1)))
+
+    def formula(x: ops.Scalar) -> ops.Scalar:
+        return Machine(module, {}, {"t": table}).call(module.function("f")[0], [x])
+
+    np.testing.assert_array_equal(ops.record(formula, x="float").evaluate(x=X), np.where(X < 0.5, 2.0, 3.0))

@@ -394,7 +394,10 @@ def _run(function: Function, arguments: list) -> Value:
         elif node.op == "call":
             values.append(_run(node.static, args))
         elif node.op == "element":
-            values.append(list(leaves(args[0]))[node.static])
+            # results may hold text and None too, which are not counted
+            kinds = leaves(node.args[0].static.result)
+            parts = [part for part, kind in zip(leaves(args[0]), kinds, strict=True) if isinstance(kind, Node)]
+            values.append(parts[node.static])
         else:
             values.append(operate(node.op, node.static, args))
     return rebuild(function.result, get, Node)

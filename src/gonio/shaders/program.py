@@ -57,10 +57,10 @@ class Routines:
     bound: BSDF | None = None
     derives: str = ""  # name of the routine that computes derived values
 
-    def __init__(self, recorded: graph.Graph, single: bool) -> None:
-        simplified = routines(recorded, guarded=not single)
+    def __init__(self, whole: graph.Graph, single: bool) -> None:
+        simplified = routines(whole, guarded=not single)
         self.driver = simplified.pop()
-        functions_of = dict(zip((r.name for r in simplified), recorded.functions, strict=False))
+        functions_of = dict(zip((r.name for r in simplified), whole.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
         self.entries: dict[str, Routine] = {}
         self._parameters: dict[tuple, Struct] = {}
@@ -154,7 +154,7 @@ class Program(Routines):
     ) -> None:
         self.model, self.without = model, tuple(without)
         self.bound = recording.symbols(model, self.without)
-        super().__init__(_record(self.bound, functions, single), single)
+        super().__init__(recorded(self.bound, functions, single), single)
         stem = graph.class_name(model)
         self.derives = f"{stem}_derive"
         for routine in self.routines:
@@ -203,7 +203,12 @@ class Program(Routines):
         self.routines = self._reachable(self.routines)  # without routines that only unused fields needed
 
 
-def _record(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
+def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
+    """A recording of the functions of a material of symbols, whose result is theirs in order.
+
+    single  whether for a language of float32 values, which lacks some functions of the vocabulary
+    """
+
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
         """The driver of a recording; not part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):

@@ -1,5 +1,6 @@
-"""Shaders read: text to SPIR-V by glslang (`compiler`), SPIR-V to a checked module (`module`), and its instructions run
-with the vocabulary of `gonio.ops` (`machine`), on Dr.Jit values or on symbols of a recording.
+"""Shaders read: GLSL and HLSL to SPIR-V by glslang (`compiler`), SPIR-V to a checked module (`module`), WGSL to such a
+module (`wgsl`), and its instructions run with the vocabulary of `gonio.ops` (`machine`), on Dr.Jit values or on symbols
+of a recording.
 
     module = parse(compile_text("float sqr(float x) { return x * x; }", "sqr.glsl"))
     Machine(module).call("sqr", [x])
@@ -9,3 +10,4 @@ from .compiler import compile_text as compile_text
 from .machine import Machine as Machine
 from .module import Module as Module
 from .module import parse as parse
+from .wgsl import translated as translated

@@ -77,6 +77,8 @@ def compile_text(
         entry = "\n#undef main\nvoid main() {}\n"
         head = f"#version 450\n{head}{old}"
     else:
+        if re.search(r"\bselect\s*\(", expanded) and not re.search(r"\w\s+select\s*\([^;]*?\)\s*\{", expanded):
+            head += "#define select(mask, a, b) ((mask) ? (a) : (b))\n"  # HLSL 2021's, which glslang lacks
         entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(expanded)} return 0; }}\n"
     return _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
 

@@ -72,6 +72,13 @@ class Machine:
         ]
         return self._run(function, given, True)
 
+    def folded(self, one: Instruction) -> Value:
+        """The value of an instruction whose operands are constants."""
+        try:
+            return self._value(Frame(Function(0, 0), Flow({}, {}), True), one)
+        except InputError as error:
+            raise InputError(error.what, error.where or f"{one.file}:{one.line}", error.hint) from error
+
     def variable(self, name: str) -> Value:
         """The value of a global now."""
         for id, one in self._globals.items():
@@ -111,6 +118,8 @@ class Machine:
     def _run(self, function: Function, arguments: Sequence[Value], outer: Value) -> Value:
         if function.id in self._stack or len(self._stack) >= MAX_DEPTH:
             raise refuse(f"recursion of '{self.module.names.get(function.id, function.id)}'", "a loop of known length")
+        if function.id in self.module.refused:
+            raise self.module.refused[function.id]
         if not function.blocks:
             raise refuse(f"the function '{self.module.names.get(function.id, function.id)}' has no body")
         if function.id not in self._flows:
@@ -273,7 +282,7 @@ class Machine:
             count = composites.LITERAL[name]
             values = [self._get(frame, id) for id in one.operands[:count]]
             return composites.literal(name, values, one.operands[count:])
-        arguments = one.operands[:2] if name == "ImageSample" else one.operands
+        arguments = one.operands[:2] if name in ("ImageSample", "ImageFetch") else one.operands  # no literals
         values = [self._get(frame, id) for id in arguments]
         if name in _IMAGES:
             return sampled(name, values)

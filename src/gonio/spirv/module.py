@@ -72,6 +72,7 @@ class Module:
     variables  id -> its instruction, outside functions
     constants  id -> value
     sets       ids of instruction sets -> their names
+    refused    ids of functions that a front end could not translate -> why
     """
 
     types: dict[int, Type] = field(default_factory=dict)
@@ -82,6 +83,7 @@ class Module:
     functions: dict[int, Function] = field(default_factory=dict)
     sets: dict[int, str] = field(default_factory=dict)
     strings: dict[int, str] = field(default_factory=dict)
+    refused: dict[int, InputError] = field(default_factory=dict)
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""

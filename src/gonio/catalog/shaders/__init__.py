@@ -1,4 +1,4 @@
-"""Shaders of the user as materials: GLSL, HLSL, SPIR-V and the .brdf files of Disney's BRDF Explorer.
+"""Shaders of the user as materials: GLSL, HLSL, WGSL, SPIR-V and the .brdf files of Disney's BRDF Explorer.
 
     my.glsl                 read by its adapter my.glsl.toml, or by names of functions and arguments (`adapter`)
     disney.brdf             parameters and shader in one file (`explorer`)

@@ -128,8 +128,8 @@ def read(path: Path) -> Adapter:
     content["defines"] = {str(key): str(value) for key, value in content.get("defines", {}).items()}
     content["parameters"] = {key: _uniform(key, value, path) for key, value in content.get("parameters", {}).items()}
     content["textures"] = {key: _texture(key, value, path) for key, value in content.get("textures", {}).items()}
-    if content.get("language", "glsl") not in ("glsl", "hlsl"):
-        raise InputError(f"unknown language '{content['language']}'", str(path), "glsl or hlsl")
+    if content.get("language", "glsl") not in ("glsl", "hlsl", "wgsl"):
+        raise InputError(f"unknown language '{content['language']}'", str(path), "glsl, hlsl or wgsl")
     return Adapter(**content)
 
 

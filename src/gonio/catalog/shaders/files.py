@@ -20,7 +20,7 @@ from ...errors import InputError
 from ...material import parameters as kinds
 from ...material.bsdf import BSDF
 from ...ops.table import Table
-from ...spirv import compile_text, parse
+from ...spirv import Module, compile_text, parse, translated
 from ...spirv.images import Texture
 from . import adapter as adapters
 from . import explorer
@@ -28,7 +28,8 @@ from .adapter import Adapter
 from .material import _SampledShaderFile, _ShaderFile
 from .program import Declared, Program
 
-SUFFIXES = (".glsl", ".frag", ".hlsl", ".spv", ".brdf")
+SUFFIXES = (".glsl", ".frag", ".hlsl", ".wgsl", ".spv", ".brdf")
+_LANGUAGES = {".hlsl": "hlsl", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
 MAX_TABLE = 1 << 28
 MAX_CLASSES = 64  # in memory
@@ -52,7 +53,7 @@ def names_shader(text: str) -> bool:
 
 
 def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:
-    """A material from a shader: GLSL, HLSL, SPIR-V, or a .brdf file of the BRDF Explorer.
+    """A material from a shader: GLSL, HLSL, WGSL, SPIR-V, or a .brdf file of the BRDF Explorer.
 
         go.Shader("my.glsl", roughness=0.3)
 
@@ -112,11 +113,18 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None) -> P
         if path.suffix.lower() == ".brdf":
             text, described = explorer.read(text, where)
             adapter = described if adapter_file is None else adapter
-        language = adapter.language or ("hlsl" if path.suffix.lower() == ".hlsl" else "glsl")
+        language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
-        module = parse(compile_text(text, where, language=language, defines=adapter.defines, folders=folders), where)
+        module = _compiled(text, where, language, adapter.defines, [path.parent, *folders])
     textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
     return Program(module, adapter, textures, where)
+
+
+def _compiled(text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path]) -> Module:
+    """The module of a text; `folders` begin with the shader's own, in which #include of GLSL and HLSL does not look."""
+    if language == "wgsl":
+        return translated(text, where, defines, folders)
+    return parse(compile_text(text, where, language=language, defines=defines, folders=folders[1:]), where)
 
 
 def _confined(path: Path, inside: Path | None) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ from ...spirv import Machine, Module
 from ...spirv.arithmetic import elementwise
 from ...spirv.images import Texture
 from ...spirv.module import Function
+from ...spirv.replay import Replayed
 from ...spirv.standard import normalize
 from ...spirv.values import Value, leaves, numeric
 from .adapter import Adapter, Uniform, meaning_of
@@ -29,6 +31,7 @@ class Program:
 
     def __init__(self, module: Module, adapter: Adapter, textures: dict[str, Texture], where: str) -> None:
         self.module, self.textures, self.where = module, textures, where
+        self._replayed: dict[str, Replayed] = {}
         self.adapter = _completed(module, adapter, where)
         self.eval = _one(module, self.adapter.function, where)
         self.formulas = {"eval": (self.eval, self.adapter.arguments)}
@@ -96,6 +99,11 @@ class Program:
         values      by parameter: a scalar, or a tuple of scalars
         directions  "light", "view", "u": tuples of three scalars
         """
+        if formula not in self._replayed:
+            self._replayed[formula] = Replayed(functools.partial(self._run, formula))
+        return self._replayed[formula](values=values, directions=directions)
+
+    def _run(self, formula: str, values: dict[str, Value], directions: dict[str, Value]) -> Value:
         machine = Machine(self.module, values, self.textures)
         for start in self.module.function("main") or self.module.function("gonio_entry"):
             if not start.parameters:  # it assigns the initial values of globals

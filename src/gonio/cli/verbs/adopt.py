@@ -15,7 +15,7 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=10)
 def adopt(
-    file: Annotated[Path, Argument(metavar="FILE", help="A shader: .glsl, .frag, .hlsl, .spv or .brdf.")],
+    file: Annotated[Path, Argument(metavar="FILE", help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf.")],
     *,
     force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
     as_json: Json = False,

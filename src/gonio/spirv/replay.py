@@ -1,0 +1,104 @@
+"""A shader's function recorded once, and its operations repeated on Dr.Jit values: the same operations in the same
+order as the machine's, without decoding instructions, masks and pointers at each call.
+
+Only time is saved: without it, `Program.run` gives the same values.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from .. import ops
+from ..ops import graph
+from ..ops.structure import leaves as parts_of
+from ..ops.structure import rebuild
+from .values import Value, leaves, static, where
+
+_OPERATIONS: dict[str, Callable[..., Value]] = {
+    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg,
+    "lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
+    "and": operator.and_, "or": operator.or_, "not": operator.invert, "where": where, "sqrt": ops.sqrt,
+    "abs": ops.abs, "minimum": ops.minimum, "maximum": ops.maximum, "exp": ops.exp, "log": ops.log, "sin": ops.sin,
+    "cos": ops.cos, "atan2": ops.atan2, "floor": ops.floor, "copysign": ops.copysign, "isfinite": ops.isfinite,
+}  # fmt: skip
+MAX_RECORDED = 16  # of one function, by values that shape the code
+
+Inputs = Mapping[str, Mapping[str, Value]]
+
+
+class Replayed:
+    """A function of named scalars and tuples of scalars, recorded for each choice of those that are plain numbers.
+
+    function  of mappings from names to values, as `Program.run`
+    """
+
+    def __init__(self, function: Callable[..., Value]) -> None:
+        self.function = function
+        self._recorded: dict[tuple[object, ...], graph.Function] = {}
+
+    def __call__(self, **inputs: Mapping[str, Value]) -> Value:
+        """The function's value. Symbols of a recording are passed on: their recording keeps the shader's functions."""
+        scalars = list(_scalars(inputs))
+        if any(isinstance(scalar, graph.Node) for _, scalar in scalars):
+            return self.function(**inputs)
+        key = tuple((name, type(one), one) if static(one) else (name,) for name, one in scalars)
+        if key not in self._recorded:
+            self._recorded[key] = self._record(inputs)
+            while len(self._recorded) > MAX_RECORDED:
+                self._recorded.pop(next(iter(self._recorded)))
+        return _run(self._recorded[key], [scalar for _, scalar in scalars if not static(scalar)])
+
+    def _record(self, inputs: Inputs) -> graph.Function:
+        def formula(symbols: Mapping[str, Value]) -> Value:
+            given = {
+                group: {name: _filled(value, f"{group}.{name}", symbols) for name, value in values.items()}
+                for group, values in inputs.items()
+            }
+            return self.function(**given)
+
+        symbols = {name: graph.symbol("float") for name, scalar in _scalars(inputs) if not static(scalar)}
+        return ops.record(formula, name="shader", into=graph.Graph(), symbols=symbols).entry
+
+
+def _scalars(inputs: Inputs) -> Iterator[tuple[str, Value]]:
+    """Every scalar with its path."""
+    for group, values in inputs.items():
+        for name, value in values.items():
+            for place, scalar in enumerate(leaves(value)):
+                yield f"{group}.{name}.{place}", scalar
+
+
+def _filled(value: Value, path: str, symbols: Mapping[str, Value]) -> Value:
+    """A value with symbols in place of the scalars that are no plain numbers."""
+    filled = tuple(symbols.get(f"{path}.{place}", scalar) for place, scalar in enumerate(leaves(value)))
+    return filled if isinstance(value, tuple) else filled[0]
+
+
+def _run(function: graph.Function, arguments: list[Value]) -> Value:
+    values: list[Any] = []
+    remaining, read = iter(arguments), dict[tuple[object, ...], Any]()
+
+    def get(value: Value) -> Value:
+        return values[value.index] if isinstance(value, graph.Node) else value
+
+    for node in function.nodes:
+        given = [get(one) for one in node.args]
+        if node.op == "parameter":
+            values.append(next(remaining))
+        elif node.op == "constant":
+            values.append(node.static)
+        elif node.op == "call":
+            values.append(_run(node.static, given))
+        elif node.op == "element":
+            values.append(list(parts_of(given[0]))[node.static])
+        elif node.op in ("lookup", "fetch"):
+            table, channel = node.static
+            key = node.op, id(table), *[one.index if isinstance(one, graph.Node) else one for one in node.args]
+            if key not in read:
+                read[key] = (ops.lookup if node.op == "lookup" else ops.fetch)(table, *given)
+            values.append(read[key][channel])
+        else:
+            values.append(_OPERATIONS[node.op](*given))
+    return rebuild(function.result, get, graph.Node)

@@ -1,0 +1,199 @@
+"""The parts of a WGSL text: expressions, statements and declarations, each with its line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(slots=True)
+class Node:
+    """Any part of a text."""
+
+    line: int
+
+
+@dataclass(slots=True)
+class Expression(Node):
+    """An expression, or a type."""
+
+
+@dataclass(slots=True)
+class Literal(Expression):
+    """A number or `true`, as it is written."""
+
+    text: str
+
+
+@dataclass(slots=True)
+class Name(Expression):
+    """A name, `a::b` too, with the arguments in `<>` of a type."""
+
+    text: str
+    arguments: list[Expression] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Call(Expression):
+    """A call of a function or of a type's constructor."""
+
+    function: Name
+    arguments: list[Expression]
+
+
+@dataclass(slots=True)
+class Index(Expression):
+    """base[index]."""
+
+    base: Expression
+    index: Expression
+
+
+@dataclass(slots=True)
+class Member(Expression):
+    """base.name, a member or a swizzle."""
+
+    base: Expression
+    name: str
+
+
+@dataclass(slots=True)
+class Unary(Expression):
+    """-x, !x, ~x, &x or *x."""
+
+    sign: str
+    inside: Expression
+
+
+@dataclass(slots=True)
+class Chain(Expression):
+    """A chain of binary operations from the left, (first sign right) sign right ..., so that long sums are not deep."""
+
+    first: Expression
+    rest: list[tuple[str, Expression, int]]  # sign, right operand, line
+
+
+@dataclass(slots=True)
+class Statement(Node):
+    """A statement."""
+
+
+@dataclass(slots=True)
+class Block(Statement):
+    """{ ... }."""
+
+    statements: list[Statement]
+
+
+@dataclass(slots=True)
+class Declared(Statement):
+    """let, var, const or override, in a function or outside.
+
+    space  "uniform", "private", ..., of module-scope variables
+    """
+
+    kind: str
+    name: str
+    type: Expression | None
+    value: Expression | None
+    space: str = ""
+
+
+@dataclass(slots=True)
+class Assign(Statement):
+    """target sign value; the target is None for `_ = value`."""
+
+    target: Expression | None
+    sign: str
+    value: Expression
+
+
+@dataclass(slots=True)
+class Evaluate(Statement):
+    """A call whose result is dropped."""
+
+    value: Expression
+
+
+@dataclass(slots=True)
+class If(Statement):
+    """if, else if, else: (condition, block) in order; the last condition is None for `else`."""
+
+    clauses: list[tuple[Expression | None, Block]]
+
+
+@dataclass(slots=True)
+class Loop(Statement):
+    """Any loop: initial statement, condition, body, what continues it, and the condition that then ends it."""
+
+    start: Statement | None
+    condition: Expression | None
+    body: Block
+    after: list[Statement]
+    until: Expression | None
+
+
+@dataclass(slots=True)
+class Switch(Statement):
+    """switch: (selectors, block); a selector None is `default`."""
+
+    selector: Expression
+    cases: list[tuple[list[Expression | None], Block]]
+
+
+@dataclass(slots=True)
+class Return(Statement):
+    """return value."""
+
+    value: Expression | None
+
+
+@dataclass(slots=True)
+class Jump(Statement):
+    """break, continue or discard."""
+
+    kind: str
+
+
+@dataclass(slots=True)
+class Parameter(Node):
+    """A parameter of a function, or a member of a struct."""
+
+    name: str
+    type: Expression
+
+
+@dataclass(slots=True)
+class Function(Node):
+    """A function; `entry` if it is a stage's entry point."""
+
+    name: str
+    parameters: list[Parameter]
+    result: Expression | None
+    body: Block
+    entry: bool
+
+
+@dataclass(slots=True)
+class Struct(Node):
+    """A struct."""
+
+    name: str
+    members: list[Parameter]
+
+
+@dataclass(slots=True)
+class Alias(Node):
+    """Another name of a type."""
+
+    name: str
+    type: Expression
+
+
+@dataclass(slots=True)
+class Assertion(Node):
+    """const_assert."""
+
+    condition: Expression
+
+
+Declaration = Function | Struct | Alias | Declared

@@ -1,0 +1,151 @@
+"""The words of a WGSL text, with their lines.
+
+    tokens("let x = 2.0f;", "a.wgsl")   let, x, =, 2.0f, ;
+
+`<` and `>` around the arguments of a type are told from comparisons by the specification's own rule: a `<` after a
+name opens a list if a `>` follows at the same depth of brackets before the expression ends.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from ...errors import InputError
+from ..values import refuse
+
+MAX_TOKENS = 400_000  # of a file
+MAX_NESTING = 64  # brackets and blocks within one another
+
+_TOKEN = re.compile(
+    r"""(?P<space>[ \t\r\f\v\u0085\u200e\u200f\u2028\u2029]+|//[^\n]*)
+    |(?P<line>\n)
+    |(?P<comment>/\*)
+    |(?P<number>0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*(?:[pP][+-]?[0-9]+[fh]?)?[iu]?
+        |(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+)(?:[eE][+-]?[0-9]+)?[fhiu]?)
+    |(?P<name>[^\W\d]\w*(?:::[^\W\d]\w*)*)
+    |(?P<sign><<=|<<|<=|>=|->|&&|\|\||==|!=|\+\+|--|[-+*/%&|^]=|[-+*/%&|^~!<>=.,;:@(){}\[\]])""",
+    re.VERBOSE,
+)
+_COMMENT = re.compile(r"/\*|\*/|\n")
+
+
+class Token(NamedTuple):
+    """One word: kind is "name", "number", "sign", "open" and "close" (of a list of a type's arguments), or "end".
+
+    joined  whether the next word follows without a space, as in `>>`
+    """
+
+    kind: str
+    text: str
+    line: int
+    joined: bool = False
+
+
+def tokens(text: str, where: str) -> list[Token]:
+    """The words of a text. Raises InputError, with file and line, for other characters, and for too many words."""
+    found: list[Token] = []
+    for token in _words(text, where):
+        found.append(token)
+        if len(found) > MAX_TOKENS:
+            raise refuse(f"more than {MAX_TOKENS} words", "a shader is shorter", f"{where}:{token.line}")
+    _mark_lists(found)
+    line = found[-1].line if found else 1
+    return [*found, Token("end", "the end of the file", line)]
+
+
+def _words(text: str, where: str) -> Iterator[Token]:
+    at, line = 0, 1
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            raise refuse(f"the character {text[at]!r}", "WGSL has none such", f"{where}:{line}")
+        kind, at = str(match.lastgroup), match.end()
+        if kind == "line":
+            line += 1
+        elif kind == "comment":
+            at, more = _after_comment(text, at, f"{where}:{line}")
+            line += more
+        elif kind != "space":
+            for word in (">", "=") if match[0] == ">=" else (match[0],):  # `array<f32>=` closes a list
+                yield Token(kind, word, line, at < len(text) and (text[at] in ">=" or word != match[0]))
+
+
+def _after_comment(text: str, at: int, where: str) -> tuple[int, int]:
+    """Where a block comment ends, and its line ends; comments nest."""
+    depth, lines = 1, 0
+    while depth:
+        match = _COMMENT.search(text, at)
+        if match is None:
+            raise refuse("a comment without an end", "*/", where)
+        depth += {"/*": 1, "*/": -1}.get(match[0], 0)
+        lines += match[0] == "\n"
+        at = match.end()
+    return at, lines
+
+
+def _mark_lists(found: list[Token]) -> None:
+    """Mark the `<` and `>` that enclose lists of a type's arguments."""
+    pending: list[tuple[int, int]] = []  # place of `<`, depth of brackets
+    depth = 0
+    for place, token in enumerate(found):
+        text = token.text
+        if text == "<" and place and found[place - 1].kind == "name":
+            pending.append((place, depth))
+        elif text == ">" and pending and pending[-1][1] == depth:
+            start = pending.pop()[0]
+            found[start] = found[start]._replace(kind="open")
+            found[place] = token._replace(kind="close")
+        elif text in ("(", "["):
+            depth += 1
+        elif text in (")", "]", "&&", "||"):
+            while pending and pending[-1][1] >= depth:
+                pending.pop()
+            depth = max(0, depth - 1) if text in (")", "]") else depth
+        elif text in (";", "{", ":") or (
+            text == "=" and not (found[place - 1].text == ">" and found[place - 1].joined)
+        ):
+            pending.clear()
+            depth = 0
+
+
+class Words:
+    """The words of a text, taken one by one."""
+
+    def __init__(self, text: str, where: str) -> None:
+        self.where, self.words, self.at, self.depth = where, tokens(text, where), 0, 0
+
+    @property
+    def word(self) -> Token:
+        return self.words[self.at]
+
+    def take(self) -> Token:
+        word = self.words[self.at]
+        self.at = min(self.at + 1, len(self.words) - 1)
+        return word
+
+    def error(self, expected: str) -> InputError:
+        return refuse(f"'{self.word.text[:40]}' where {expected} is expected", "", f"{self.where}:{self.word.line}")
+
+    def expect(self, text: str) -> Token:
+        if self.word.text != text:
+            raise self.error(f"'{text}'")
+        return self.take()
+
+    def accept(self, text: str) -> bool:
+        if self.word.text != text or self.word.kind == "end":
+            return False
+        self.take()
+        return True
+
+    def name(self) -> str:
+        if self.word.kind != "name":
+            raise self.error("a name")
+        return self.take().text
+
+    def deeper(self) -> None:
+        self.depth += 1
+        if self.depth > MAX_NESTING:
+            what = f"more than {MAX_NESTING} brackets or blocks within one another"
+            raise refuse(what, "name the parts by let", f"{self.where}:{self.word.line}")
