@@ -57,6 +57,7 @@ _PLACES = {
     "verify": ("verify",),
     "verify.laws": ("Law",),
     "check": ("check",),
+    "report": ("report",),
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
@@ -130,6 +131,7 @@ if TYPE_CHECKING:
     from .optics.ndf import NDF, Stretched
     from .render import render, resume
     from .render.tables import bake
+    from .report import report
     from .shaders import emit
     from .transport.integrators import Integrator
     from .verify import verify
@@ -274,6 +276,7 @@ __all__ = [
     "refractive_index",
     "register",
     "render",
+    "report",
     "resume",
     "set_precision",
     "spectrum",
