@@ -69,7 +69,7 @@ def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
 
 def _stage(models: tuple[object, ...]) -> stage.Stage:
     if not models:
-        return stage.homework()
+        return stage.opening()
     bsdfs: list[BSDF] = []
     given: list[Collection[str]] = []
     for model in models:
