@@ -29,7 +29,7 @@ SETTINGS = """() => gonio.setState((state) => {
 def main() -> None:
     engine.load()  # first of all: with an LLVM that works
     access = server.AccessControl("127.0.0.1")
-    one = server.Server(server.Application(stage.opening(), access), "127.0.0.1", 0, quiet=True)
+    one = server.Server(server.Application(stage.homework("Au"), access), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
     while not one.started:
