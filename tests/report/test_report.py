@@ -45,6 +45,7 @@ def rows_of_lambert(folder: Path) -> None:
     (folder / "f.csv").write_text("0,0,1,0,0,1,0.15915494\n0,0,1,0.6,0,0.8,0.15915494\n")
 
 
+@pytest.mark.slow
 def test_a_list_becomes_one_document_whose_words_are_never_lost(scene: Path, capsys: pytest.CaptureFixture) -> None:
     (scene / "report.toml").write_text(LIST)
     rows_of_lambert(scene)
@@ -77,6 +78,17 @@ def test_a_list_becomes_one_document_whose_words_are_never_lost(scene: Path, cap
     (scene / "scene.json").write_text(json.dumps(raw))
     assert app.run(["report", str(scene)]) == 0
     assert (folder / "figures/powers.png").stat().st_mtime_ns != picture
+
+
+def test_edited_words_are_never_lost(tmp_path: Path) -> None:
+    rows_of_lambert(tmp_path)
+    (tmp_path / "mine.toml").write_text('[[figure]]\ntype = "check"\nwork = "f.csv"\nagainst = "lambert(albedo=0.5)"\n')
+    made = go.report(tmp_path / "mine.toml", output=tmp_path / "r", title="T")
+    assert made.new_words and made.words.read_text().startswith("# T\n") and "<td>right</td>" in made.output.read_text()
+    made.words.write_text("# Mine\n\nMy words.\n")
+    again = go.report(tmp_path / "mine.toml", output=tmp_path / "r", title="T")
+    assert not again.new_words and again.words.read_text() == "# Mine\n\nMy words.\n"
+    assert "My words." in again.output.read_text() and len(again.unused) == 1
 
 
 @pytest.mark.slow

@@ -96,8 +96,9 @@ class _Reader:
         return ""
 
     def _words(self, children: Sequence[Token], location: str) -> str:
+        renderer: Any = self.markdown.renderer  # its protocol lacks this method
         options: Any = self.markdown.options
-        return str(self.markdown.renderer.renderInline(children, options, {"location": location}))
+        return str(renderer.renderInline(children, options, {"location": location}))
 
     def _data(self, target: str, location: str) -> str:
         """A picture as a data URI."""

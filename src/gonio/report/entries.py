@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -56,12 +56,12 @@ class Facts:
 class PictureKeys(Part):
     """Options of pictures, of a figure or of all; they are those of `gonio render`."""
 
-    spp: Whole | None = Field(None, ge=1)
+    spp: Whole | None = Field(default=None, ge=1)
     size: str | None = None
     integrator: str | None = None
-    max_depth: Whole | None = Field(None, alias="max-depth", ge=1)
+    max_depth: Whole | None = Field(default=None, alias="max-depth", ge=1)
     sampler: str | None = None
-    seed: Whole | None = Field(None, ge=0)
+    seed: Whole | None = Field(default=None, ge=0)
     spectral: bool | None = None
     denoise: bool | None = None
     exposure: Number | Literal["auto"] | None = None
@@ -85,7 +85,7 @@ class Figure(Part):
 
     suffix: ClassVar[str] = ".png"
     type: str
-    name: str = Field("", pattern=r"^([A-Za-z0-9][A-Za-z0-9_.-]*)?$")
+    name: str = Field(default="", pattern=r"^([A-Za-z0-9][A-Za-z0-9_.-]*)?$")
     heading: str = ""
     caption: str = ""
     text: str = ""
@@ -256,10 +256,10 @@ class Bake(Figure):
     type: Literal["bake"]
     target: Words = "ggx"
     lut: list[Literal["E", "Eavg", "dfg", "glass"]] | None = None
-    resolution: Whole = Field(128, ge=1, le=4096)
+    resolution: Whole = Field(default=128, ge=1, le=4096)
     method: Words = "quadrature"
     masking: str | None = None
-    samples: Whole = Field(1024, ge=1)
+    samples: Whole = Field(default=1024, ge=1)
     layout: Literal["linear", "stretched"] = "linear"
 
     def title(self) -> str:
@@ -269,10 +269,10 @@ class Bake(Figure):
         return f"Directional albedo E and its average for {self.target}, by {self.method}."
 
     def command(self, given: RenderOptions) -> str:
-        given = {"method": self.method, "masking": self.masking, "resolution": self.resolution, "layout": self.layout}
-        given |= {"samples": self.samples, "lut": ",".join(self.lut) if self.lut else None}
+        own = {"method": self.method, "masking": self.masking, "resolution": self.resolution, "layout": self.layout}
+        own |= {"samples": self.samples, "lut": ",".join(self.lut) if self.lut else None}
         defaults = {name: field.default for name, field in type(self).model_fields.items()}
-        words = [word for name, value in given.items() if value != defaults[name] for word in (f"--{name}", str(value))]
+        words = [word for name, value in own.items() if value != defaults[name] for word in (f"--{name}", str(value))]
         return shlex.join(["gonio", "bake", self.target, *words])
 
     def identity(self, making: Making) -> str:
@@ -296,7 +296,7 @@ class Check(Figure):
     type: Literal["check"]
     work: Words
     against: str = ""
-    picture_of: str = Field("", alias="picture-of")
+    picture_of: str = Field(default="", alias="picture-of")
     """The scene that a picture shows, `--scene` of `gonio check`."""
     up: Literal["z", "y", "x"] = "z"
     sheet: str | None = None
@@ -319,23 +319,26 @@ class Check(Figure):
         return ""
 
     def make(self, making: Making, file: Path) -> Facts:
-        allowed = {"allow_outside": making.options.allow_outside, "allow_code": making.options.allow_code}
         result = check(
-            self.work, self.against or None, scene=self.picture_of or None, up=self.up, sheet=self.sheet, **allowed
+            self.work,
+            self.against or None,
+            scene=self.picture_of or None,
+            up=self.up,
+            sheet=self.sheet,
+            allow_outside=making.options.allow_outside,
+            allow_code=making.options.allow_code,
         )
+        rows: list[tuple[str, ...]]
         if isinstance(result, Submissions):
             rows = [("submission", "task", "file", "judgment", "points", "probable mistake"), *result.rows()]
         else:
-            measured = "; ".join(result.facts)
-            rows = [
-                ("work", "judgment", "probable mistake", "measured"),
-                (result.name, result.status, result.cause, measured),
-            ]
+            rows = [("work", "judgment", "probable mistake", "measured")]
+            rows.append((result.name, result.status, result.cause, "; ".join(result.facts)))
         file.write_text(as_csv(rows), encoding="utf-8")
         return Facts("")
 
 
-def as_csv(rows: list[tuple[str, ...]]) -> str:
+def as_csv(rows: Iterable[Sequence[str]]) -> str:
     """Rows as the text of a .csv file."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
