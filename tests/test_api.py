@@ -29,6 +29,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "measure": go.measure,
     "plot": go.plot,
     "render": render,
+    "report": go.report,
     "study": go.study,
     "verify": verify,
 }
@@ -46,7 +47,7 @@ ONLY_TYPED = {
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
 OTHER_DEFAULTS |= {"bake target"}  # typed, a preset of the homework may stand without one
-OTHER_DEFAULTS |= {"convert exposure", "capture free", "fit free", "fit model"}
+OTHER_DEFAULTS |= {"convert exposure", "report exposure", "capture free", "fit free", "fit model"}
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))

@@ -20,6 +20,7 @@ DEEP = 100_000
 COMMANDS = {
     "render": "render {} -o o.exr --spp 1 --size 4x4",
     "resume": "resume {}",
+    "report": "report {} -o r --spp 1 --size 4x4",
     "study": "study {} --vary alpha=.1 -o s.png --spp 1 --size 4x4",
     "convert": "convert {} c.exr",
     "convert to json": "convert {} c.json",

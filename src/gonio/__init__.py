@@ -58,6 +58,7 @@ _PLACES = {
     "verify": ("verify",),
     "verify.laws": ("Law",),
     "check": ("check",),
+    "report": ("report",),
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
@@ -131,6 +132,7 @@ if TYPE_CHECKING:
     from .optics.ndf import NDF, Stretched
     from .render import render, resume
     from .render.tables import bake
+    from .report import report
     from .shaders import emit
     from .transport.integrators import Integrator
     from .verify import verify
@@ -276,6 +278,7 @@ __all__ = [
     "refractive_index",
     "register",
     "render",
+    "report",
     "resume",
     "set_precision",
     "spectrum",

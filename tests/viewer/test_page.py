@@ -43,6 +43,17 @@ def test_the_homework_is_two_rows_of_five_balls(homework: dict[str, Any]) -> Non
     assert math.hypot(*homework["scene"]["lights"][0]["direction"]) == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_page_of_nothing_named_opens_on_gold_in_a_studio() -> None:
+    opening = stage.opening()
+    assert stage.of_models([]) == opening
+    base = opening.materials["m1"].bsdf
+    assert base.eta == go.Conductor.preset("Au").eta  # type: ignore[attr-defined]
+    (light,) = opening.lights
+    assert light["type"] == "environment" and light["image"]["data"] == "studio"  # type: ignore[index]
+    text = (Path(__file__).parents[2] / "web/src/studio.ts").read_text()
+    assert re.findall(r"(?:width|height): (\d+)", text)[:2] == [str(light["image"][key]) for key in ("width", "height")]  # type: ignore[index]
+
+
 def test_both_maskings_are_there_for_the_toggle(homework: dict[str, Any]) -> None:
     for material in homework["materials"]:
         names = [next(iter(variant["choices"].values())) for variant in material["variants"]]

@@ -81,6 +81,7 @@ def test_every_light_is_listed_and_can_be_added_and_removed(page: Page) -> None:
     for name, kind in (("point", "point"), ("area", "area"), ("environment", "environment")):
         page.tab.get_by_title(f"Add a light: {name}").click()
         assert page.state("lights.at(-1).type") == kind
+    assert page.state("lights.at(-1).image.width") == 256  # of the studio
     assert lights.count() == 4
     bright = page.picture(16)[..., 1].sum()
     page.set("for (const light of s.lights) light.on = false")

@@ -2,6 +2,7 @@
 import { attachCamera } from "./camera";
 import type { PageData, Values, Vec3 } from "./data";
 import { type EnvironmentPicture, environmentFromData } from "./environment";
+import { STUDIO, studio } from "./studio";
 import { Evaluator } from "./evaluator";
 import { type Flaw, described } from "./flaws";
 import { Inspector } from "./inspector";
@@ -90,7 +91,7 @@ export class PageApp implements App {
     this.ready.catch(() => {}); // reported on the page
     const pictured = data.scene.lights.find((l) => l.type === "environment" && l.image?.data);
     if (pictured?.type === "environment" && pictured.image?.data)
-      this.environment = environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
+      this.environment = pictured.image.data === STUDIO.data ? studio(gl) : environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
     attachCamera(canvas, this.store, (x, y) => this.pick(x, y));
     this.store.subscribe((change) => this.respond(change));
     canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has lost the page's pictures: reload the page.", "error"));

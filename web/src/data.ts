@@ -127,7 +127,7 @@ export interface Row {
 export interface EnvironmentImage {
   width: number;
   height: number;
-  /** Base64 float16 RGBA, top row first; a light that refers to an uploaded picture has its key instead. */
+  /** Base64 float16 RGBA, top row first, or "studio", which the page computes; a light that refers to an uploaded picture has its key instead. */
   data: string | null;
 }
 

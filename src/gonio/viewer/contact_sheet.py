@@ -135,17 +135,7 @@ def render_sheet(
     started = time.perf_counter()
     if output is not None:
         figures.check_output(output)
-    names = [path for variation in variations for path in variation.paths]
-    if len(set(names)) < len(names):
-        raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
-    if not variations or not all(variation.values for variation in variations):
-        raise InputError("nothing is varied", "--vary", "such as shapes.1.material.p=4,16,64")
-    count = math.prod(len(variation.values) for variation in variations)
-    if count > MAX_CELLS:
-        what = f"{count} pictures are more than a sheet holds ({MAX_CELLS})"
-        raise InputError(what, "--vary", "give fewer values")
-    settings = [[variation.settings(value) for value in variation.values] for variation in variations]
-    cells = tuple({p: v for one in combination for p, v in one.items()} for combination in itertools.product(*settings))
+    cells = cells_of(variations)
     pictures: list[exposures.RGB] = []
     notices: dict[str, None] = {}
     identity = _identity(with_cell(request, cells[0], named)), [(one.path, repr(one.values)) for one in variations]
@@ -174,6 +164,22 @@ def render_sheet(
             drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
+
+
+def cells_of(variations: Sequence[Variation]) -> tuple[dict[str, object], ...]:
+    """The values of each picture, in the order of `itertools.product`. Raises InputError if there are none, or too many
+    for a sheet."""
+    names = [path for variation in variations for path in variation.paths]
+    if len(set(names)) < len(names):
+        raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
+    if not variations or not all(variation.values for variation in variations):
+        raise InputError("nothing is varied", "--vary", "such as shapes.1.material.p=4,16,64")
+    count = math.prod(len(variation.values) for variation in variations)
+    if count > MAX_CELLS:
+        what = f"{count} pictures are more than a sheet holds ({MAX_CELLS})"
+        raise InputError(what, "--vary", "give fewer values")
+    settings = [[variation.settings(value) for value in variation.values] for variation in variations]
+    return tuple({p: v for one in combination for p, v in one.items()} for combination in itertools.product(*settings))
 
 
 def _identity(request: Request) -> Sequence[object]:

@@ -46,6 +46,14 @@ LARGEST_ROW = 5
 
 # From the upper left; pi, so that a white Lambert ball has value 1 where it faces the light.
 SUN: Light = {"type": "directional", "direction": [-0.4364358, 0.4364358, 0.7867958], "irradiance": [math.pi] * 3}
+# A picture that the page computes: web/src/studio.ts
+STUDIO: Light = {
+    "type": "environment",
+    "image": {"width": 256, "height": 128, "data": "studio"},
+    "constant": [0.5] * 3,
+    "rotation": 0.0,
+    "scale": 1.0,
+}
 CAMERA: Camera = {"target": [0.0, 0.0, 0.0], "azimuth": 0.0, "elevation": 0.0, "fov": 30.0}
 SPACING = 2.4
 
@@ -191,6 +199,11 @@ def homework(metal: str = "Ag") -> Stage:
     return Stage("Kulla-Conty and plain, side by side", materials, rows)
 
 
+def opening() -> Stage:
+    """What a page shows if nothing is named: the homework's two rows in gold, in a studio."""
+    return replace(homework("Au"), title="Gold, with and without Kulla-Conty", lights=(STUDIO,))
+
+
 RIM = (
     "the low roughness of the upper row has a false rim: with k = (roughness + 1)^2 / 8 masking does not vanish on a "
     "smooth surface (E_avg is 0.835 at roughness 0.05), and compensation returns what is not lost; schlick-ibl, "
@@ -260,7 +273,7 @@ def of_models(bsdfs: Sequence[BSDF], given: Sequence[Collection[str]] | None = N
     given  per model, the paths of parameters that the user has set
     """
     if not bsdfs:
-        return homework()
+        return opening()
     free = [
         [leaf for leaf in tree.leaves(bsdf) if leaf.path not in fixed]
         for bsdf, fixed in zip(bsdfs, given or [()] * len(bsdfs), strict=True)

@@ -71,7 +71,7 @@ def view(*models: MaterialLike, height: int = 640) -> AnyWidget:
 
 def _stage(models: tuple[MaterialLike, ...]) -> stage.Stage:
     if not models:
-        return stage.homework()
+        return stage.opening()
     bsdfs: list[BSDF] = []
     given: list[Collection[str]] = []
     for model in models:

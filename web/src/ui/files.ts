@@ -1,11 +1,12 @@
 /** Files dropped on the page or opened: a picture becomes the environment, a mesh the shape. */
 import type { PageApp } from "../app";
-import { environmentFromFloats } from "../environment";
+import { type EnvironmentPicture, environmentFromFloats } from "../environment";
 import { readFactors, applyFactors } from "../gltf-material";
 import { newLight } from "../lights";
 import { readMesh } from "../meshes";
 import { readRadiance } from "../radiance";
 import type { Light } from "../state";
+import { studio } from "../studio";
 import { element } from "./dom";
 
 const ENVIRONMENT = ".hdr,.pic";
@@ -39,18 +40,24 @@ export async function useFiles(app: PageApp, files: readonly File[]): Promise<vo
 }
 
 export function useEnvironment(app: PageApp, width: number, height: number, floats: Float32Array): void {
-  app.environment = environmentFromFloats(app.gl, width, height, floats, 3);
-  const { width: w, height: h } = app.environment;
+  setPicture(app, environmentFromFloats(app.gl, width, height, floats, 3));
+  app.store.set("view.background", "environment");
+}
+
+/** The page's own studio as the environment. */
+export const useStudio = (app: PageApp): void => setPicture(app, studio(app.gl));
+
+function setPicture(app: PageApp, picture: EnvironmentPicture): void {
+  app.environment = picture;
   app.store.update(["lights", "view"], (state) => {
     let light = state.lights.find((l) => l.type === "environment");
     if (!light) {
       light = newLight("environment") as Extract<Light, { type: "environment" }>;
       state.lights.push(light);
     }
-    light.image = { width: w, height: h, data: null };
+    light.image = { width: picture.width, height: picture.height, data: null };
     light.on = true;
     state.furnace = false;
-    state.view.background = "environment";
   });
 }
 

@@ -7,6 +7,7 @@ import type { EnvironmentMethod, Light } from "../state";
 import { normalize } from "../vectors";
 import { ChoiceControl, type Field, RangeControl, TickControl, TripleControl, addRow } from "./controls";
 import { button, element } from "./dom";
+import { useStudio } from "./files";
 
 const DEGREES = 180 / Math.PI;
 const MAX_LIGHTS = 8;
@@ -46,9 +47,10 @@ export class LightSection {
     app.state.lights.forEach((light, index) => this.addLight(light, index));
     if (app.state.furnace) addRow(gui, element("p", { class: "note" }, "The furnace is the only light: radiance 1 from every direction. The lights above are off."));
     const add = (type: Light["type"], label: string) =>
-      button(`+ ${label}`, `Add a light: ${label}`, () => {
+      button(`+ ${label}`, `Add a light: ${label}${type === "environment" ? ", a studio; a picture can replace it" : ""}`, () => {
         if (app.state.lights.length >= MAX_LIGHTS) return app.say(`No more than ${MAX_LIGHTS} lights are possible.`);
         if (type === "environment" && app.state.lights.some((l) => l.type === "environment")) return app.say("The scene already has an environment.");
+        if (type === "environment") return useStudio(app);
         app.store.update("lights", (state) => state.lights.push(newLight(type)));
       });
     addRow(gui, element("div", { class: "buttons" }, add("directional", "sun"), add("point", "point"), add("area", "area"), add("environment", "environment")));

@@ -9,6 +9,33 @@ import { button, element, short } from "./dom";
 
 const letter = (slot: number) => String.fromCharCode(65 + slot);
 
+interface Group {
+  title: string;
+  prefix: string;
+  members: Parameter[];
+}
+
+/** Parameters whose names start with the same words, such as `coat_weight` and `coat_color`, under a heading each, in the order of
+ * their first; those without such a name, or with one of less than three, come first. */
+function grouped(parameters: Parameter[], rest: string): Group[] {
+  const first = (p: Parameter) => /^([a-z\d]+)_/.exec(edits.bare(p.path))?.[1] ?? "";
+  const others: Group = { title: rest, prefix: "", members: [] };
+  const groups = new Map<string, Group>();
+  for (const parameter of parameters) {
+    const word = first(parameter);
+    const family = word ? parameters.filter((p) => first(p) === word) : [];
+    if (family.length < 3) others.members.push(parameter);
+    else if (!groups.has(word)) {
+      let prefix = `${word}_`;
+      // "thin_film_weight", "thin_film_ior", ...: the common words are two.
+      const second = /^[a-z\d]+_/.exec(edits.bare(parameter.path).slice(prefix.length))?.[0] ?? "";
+      if (second && family.every((p) => edits.bare(p.path).startsWith(prefix + second))) prefix += second;
+      groups.set(word, { title: prefix.replaceAll("_", " ").trim(), prefix, members: family });
+    }
+  }
+  return [others, ...groups.values()].filter((group) => group.members.length);
+}
+
 export class ModelsSection {
   private built = "";
   private readonly chips = element("div", { class: "chips" });
@@ -70,6 +97,7 @@ export class ModelsSection {
     const numeric = manifest.parameters.filter(isNumeric);
     const row = app.state.slots[slot];
     const varying = numeric.filter((p) => row && edits.perBall(row, p.path));
+    const groups = grouped(numeric.filter((p) => !varying.includes(p)), varying.length ? "Whole row" : "Parameters");
     if (varying.length) {
       const ball = Math.min(app.state.selection.ball, (row?.balls.length ?? 1) - 1);
       const head = element("div", { class: "subhead", title: "Click another ball to edit it." }, `Ball ${ball + 1} of ${row?.balls.length ?? 1}`);
@@ -80,11 +108,11 @@ export class ModelsSection {
         });
       head.append(element("span", { class: "spacer" }), button("‹", "Ball to the left", step(-1), "mini"), button("›", "Ball to the right", step(1), "mini"));
       addRow(gui, head);
-      for (const parameter of varying) this.addParameter(slot, parameter);
+      for (const parameter of varying) this.addParameter(slot, parameter, groups.length > 1);
     }
-    if (numeric.length > varying.length) {
-      addRow(gui, element("div", { class: "subhead" }, varying.length ? "Whole row" : "Parameters"));
-      for (const parameter of numeric) if (!varying.includes(parameter)) this.addParameter(slot, parameter);
+    for (const { title, prefix, members } of groups) {
+      addRow(gui, element("div", { class: "subhead" }, title));
+      for (const parameter of members) this.addParameter(slot, parameter, groups.length > 1, prefix);
     }
     const choices = manifest.parameters.filter((p) => (p.kind === "choice" || p.kind === "flag") && this.isOpen(slot, p));
     if (choices.length) {
@@ -152,13 +180,16 @@ export class ModelsSection {
     );
   }
 
-  private addParameter(slot: number, parameter: Parameter): void {
+  /** `inWords`: labels of many long names, which wrap; `prefix` is said by the heading of the group. */
+  private addParameter(slot: number, parameter: Parameter, inWords: boolean, prefix = ""): void {
     const { app, gui } = this;
     const { path, kind } = parameter;
-    const name = edits.bare(path);
-    const field = <T extends Value>(label: string, read: (value: Value) => T, write: (value: T, old: Value) => Value, symbol = parameter.symbol) => ({
+    const declared = edits.bare(path);
+    const name = inWords ? declared.slice(prefix.length).replaceAll("_", " ") : declared;
+    const own = parameter.symbol === declared ? "" : parameter.symbol; // of a paper
+    const field = <T extends Value>(label: string, read: (value: Value) => T, write: (value: T, old: Value) => Value, symbol = own) => ({
       label,
-      doc: parameter.doc,
+      doc: label === declared ? parameter.doc : `${declared}: ${parameter.doc}`,
       symbol,
       unit: parameter.unit,
       get: () => read(edits.currentValue(app, slot, parameter)),

@@ -35,7 +35,7 @@ def view(
         list[str] | None,
         Argument(
             metavar="SCENE|MODEL",
-            help="A lab scene, or materials; by default metals with and without Kulla-Conty.",
+            help="A lab scene, or materials; by default gold with and without Kulla-Conty.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -111,4 +111,4 @@ def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_cod
         return stage.of_targets(target, settings)
     if settings:
         raise InputError("parameters for no model", "--param", "name one: gonio view conductor --param alpha=0.3")
-    return stage.homework()
+    return stage.opening()

@@ -1,0 +1,98 @@
+"""report.md: the words of a report and the places of its figures.
+
+It is written once; then it belongs to its author, and Gonio only reads it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from urllib.parse import unquote
+
+from ..errors import InputError
+from . import formulas
+from .entries import Figure
+
+if TYPE_CHECKING:
+    from markdown_it import MarkdownIt
+
+WORDS_FILE, FOLDER, SETTINGS = "report.md", "figures", "settings.csv"
+PICTURES = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".gif": "gif", ".webp": "webp", ".svg": "svg+xml"}
+
+
+class Reference(NamedTuple):
+    """A picture, or a table, that the words show."""
+
+    line: int
+    target: str
+
+
+def first_words(title: str, author: str, figures: Sequence[tuple[str, Figure]]) -> str:
+    """The text of a new report.md.
+
+    figures  each with the name of its file
+    """
+    blocks = [f"# {title}", author or "*Your name, the date*"]
+    if not any(figure.text for _, figure in figures):
+        blocks.append("*What was asked, and what you did, in a few sentences.*")
+    for name, figure in figures:
+        blocks += [
+            f"## {figure.heading or figure.title()}",
+            figure.text.strip() or "*What can be seen, and why?*",
+            inclusion(name, figure),
+        ]
+    blocks += ["## How the figures were made", f"[Each figure with its command]({FOLDER}/{SETTINGS})"]
+    return "\n\n".join(blocks) + "\n"
+
+
+def inclusion(file: str, figure: Figure) -> str:
+    """The line of report.md that shows a figure."""
+    caption = figure.caption.strip() or re.sub(r"([][*_`$\\])", r"\\\1", figure.description())
+    return f"{'' if file.endswith('.csv') else '!'}[{' '.join(caption.split())}]({FOLDER}/{file})"
+
+
+def parser() -> MarkdownIt:
+    """Markdown with tables and formulas; HTML in it is text."""
+    from markdown_it import MarkdownIt
+
+    markdown = MarkdownIt("commonmark", {"html": False}).enable(["table", "strikethrough"])
+    formulas.plugin(markdown)
+    return markdown
+
+
+def references(text: str) -> Iterator[Reference]:
+    """The pictures and tables that the words show, with their lines."""
+    for token in parser().parse(text):
+        for child in token.children or ():
+            target = str(child.attrs.get("src" if child.type == "image" else "href", ""))
+            if child.type == "image" or (child.type == "link_open" and target.lower().endswith(".csv")):
+                yield Reference(token.map[0] + 1 if token.map else 1, unquote(target))
+
+
+def check_references(text: str, folder: Path, made: Collection[str], allow_outside: bool) -> None:
+    """Raise InputError for a picture or table that is neither there nor made.
+
+    made  files of the folder `figures` that the list makes
+    """
+    for line, target in references(text):
+        if target not in {f"{FOLDER}/{name}" for name in made}:
+            local(folder, target, f"{folder / WORDS_FILE}:{line}", allow_outside)
+
+
+def local(folder: Path, target: str, location: str, allow_outside: bool) -> Path:
+    """The file of a picture or table that the words show. Raises InputError."""
+    if re.match(r"[a-zA-Z][a-zA-Z+.-]+:", target):
+        raise InputError(f"'{target}' is not a file", location, "save it in the report's folder, and name it there")
+    path = folder / target
+    if path.suffix.lower() not in (*PICTURES, ".csv"):
+        raise InputError(f"'{target}' is no picture", location, f"give {', '.join(PICTURES)} or .csv")
+    if not path.is_file():
+        hint = f"the list makes no such figure: add it there, or remove it from {WORDS_FILE}"
+        raise InputError(f"no file '{target}'", location, hint)
+    if not allow_outside and not path.resolve().is_relative_to(folder.resolve()):
+        raise InputError(
+            f"'{target}' is outside the report's folder", location, "copy it there, or add --allow-outside"
+        )
+    return path
