@@ -208,13 +208,15 @@ def _below(value: float) -> str:
 class NeubeltSheen(go.BSDF):
     """Charlie's distribution (Estevez2017) with Neubelt's visibility, as glTF's KHR_materials_sheen proposes it."""
 
-    alpha: float = go.width(0.25, doc="Width: the square of the roughness.")
+    color: go.Colour = go.spectrum(1.0, doc="Color of the sheen.")
+    alpha: go.Number = go.number(0.25, low=0.01, high=1.0, doc="Width: the square of the roughness.")
 
     def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
         h = ops.normalize(wo + wi)
         sine = ops.sqrt(ops.maximum(1.0 - h.z * h.z, 0.0))
         d = (2.0 + 1.0 / self.alpha) * ops.pow(sine, 1.0 / self.alpha) / (2.0 * np.pi)
-        return ops.where((wo.z > 0) & (wi.z > 0), d / (4.0 * (wi.z + wo.z - wi.z * wo.z)) * wi.z, 0.0)
+        value = d / (4.0 * (wi.z + wo.z - wi.z * wo.z)) * wi.z
+        return self.color * ops.where((wo.z > 0) & (wi.z > 0), value, 0.0)
 
 
 def sheen() -> str:
@@ -226,7 +228,7 @@ def sheen() -> str:
     headings = ["roughness", *(f"n.v = {cosine:g}" for cosine in cosines)]
     return f"""A curve for the albedo of sheen was off by 62 % in the mean, and was fitted again. The values to
 fit, **Computed** from the formula as a
-material of twelve lines (`NeubeltSheen` in `docs/make_errata.py`), for a white sheen color:
+short material (`NeubeltSheen` in `docs/make_errata.py`), for a white sheen color:
 
 {table(headings, rows)}
 
