@@ -184,3 +184,17 @@ def test_a_guide_cannot_be_found_inside_a_loop_and_says_so() -> None:
     with pytest.raises(RuntimeError) as caught:
         dr.while_loop((types.module.UInt32(0), types.float(0.0)), lambda i, total: i < 2, body, mode="symbolic")
     assert isinstance(caught.value.__cause__, InputError) and "before the loop" in caught.value.__cause__.hint
+
+
+def test_a_lent_guide_is_the_lenders() -> None:
+    class Gray(go.BSDF):
+        """A matte material."""
+
+        albedo: go.Spectrum = go.spectrum(0.5, "reflectance", high=1.0)
+
+        def eval(self, wo, wi, mode="radiance"):
+            return go.ops.where((wo.z > 0) & (wi.z > 0), self.albedo * wi.z / 3.0, 0.0)
+
+    lender, other = Gray(), Gray(albedo=np.linspace(0.0, 1.0, 8)[:, None] * np.ones(3))
+    guide_search.lend(lender, other)
+    assert guide_search.guide_of(other) is guide_search.guide_of(lender)

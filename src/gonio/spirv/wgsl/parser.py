@@ -344,7 +344,7 @@ class _Parser(Words):
     def loop(self, line: int) -> Loop:
         self.attributes()
         self.deeper()
-        body, after, until = Block(self.expect("{").line, []), [], None
+        body, after, until = Block(self.expect("{").line, []), list[Statement](), None
         while not self.accept("}"):
             if self.word.text == "continuing":
                 self.take()

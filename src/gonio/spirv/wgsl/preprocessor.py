@@ -12,6 +12,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..values import refuse
 
@@ -19,7 +20,7 @@ MAX_DEPTH = 64  # of conditions within one another
 _DIRECTIVE = re.compile(r"\s*#\s*([a-z_]+)\b(.*)", re.DOTALL)
 _VALUE = re.compile(r"#\{(\w+)\}|#([A-Z]\w*)")
 _PATH = re.compile(r'"[^"\n]+"(?:::\w+)*|\w+(?:::\w+)*')
-_ORDERS: dict[str, Callable[[object, object], bool]] = {
+_ORDERS: dict[str, Callable[[Any, Any], Any]] = {
     "==": operator.eq, "!=": operator.ne, ">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le,
 }  # fmt: skip
 
@@ -80,8 +81,8 @@ class _Conditions:
                 return False
             given = (self.defines[match[1]], match[3])
             if all(re.fullmatch(r"-?\d{1,18}", one) for one in given):
-                return _ORDERS[match[2]](*map(int, given))
-            return match[2] in ("==", "!=") and _ORDERS[match[2]](*given)
+                return bool(_ORDERS[match[2]](*map(int, given)))
+            return match[2] in ("==", "!=") and bool(_ORDERS[match[2]](*given))
         return (rest.split("//")[0].strip() in self.defines) == (word == "ifdef")
 
 
@@ -137,7 +138,7 @@ def _add(result: Preprocessed, text: str, line: int, place: str) -> None:
     listed = re.fullmatch(r"\s*([\w:]+)\s+(?!as\b)(\w+(?:\s*,\s*\w+)*)\s*", text)  # the old form, `path a, b`
     text = f"{listed[1]}::{{{listed[2]}}}" if listed else text
     words = re.findall(r'"[^"]*"|\w+|::|[{},]', text)
-    prefixes, parts, name = [""], [], ""
+    prefixes, parts, name = [""], list[str](), ""
 
     def finish() -> None:
         if parts:

@@ -89,10 +89,9 @@ class _Translation:
 
     def value(self, unit: Unit, name: str, line: int) -> Value | Place | None:
         """The constant or variable of a name, None if there is none."""
-        found = self.sources.find(unit, name, line)
-        if found is None or not isinstance(found[1], Declared):
+        home, declared = self.sources.find(unit, name, line) or (unit, None)
+        if not isinstance(declared, Declared):
             return None
-        home, declared = found
         key = home.where, declared.name
         if key not in self._values:
             with _Entered(self, key, home, declared.line):
@@ -102,10 +101,9 @@ class _Translation:
 
     def signature(self, unit: Unit, name: str, line: int) -> Signature | None:
         """The function of a name, None if there is none."""
-        found = self.sources.find(unit, name, line)
-        if found is None or not isinstance(found[1], Function):
+        home, function = self.sources.find(unit, name, line) or (unit, None)
+        if not isinstance(function, Function):
             return None
-        home, function = found
         key = home.where, function.name
         if key not in self._signatures:
             with _Entered(self, key, home, function.line):
@@ -129,10 +127,9 @@ class _Translation:
             return self._generated(unit, expression)
         if declared is None and (name in REFUSED or name.startswith("texture_")):
             raise refuse(REFUSED.get(name, f"the texture type {name}"), "", f"{unit.where}:{expression.line}")
-        found = self.sources.find(unit, name, expression.line)
-        if found is None or not isinstance(found[1], Struct | Alias):
+        home, one = self.sources.find(unit, name, expression.line) or (unit, None)
+        if not isinstance(one, Struct | Alias):
             return None
-        home, one = found
         key = home.where, one.name
         if key not in self._types:
             with _Entered(self, key, home, one.line):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...material import BSDF, binding
+from ...material import BSDF, binding, guide_search
 from ...ops import Precision, backend
 from .. import box, directions, severity
 from ..effort import Effort
@@ -163,6 +163,8 @@ def _batches(
     if isinstance(subject.model, BSDF) and columns:
         try:
             together = subject.replace(**columns)
+            # a guide of its own, for parameters that vary, takes seconds; signs do not depend on it
+            guide_search.lend(subject.model, together.model)
             probe = directions.at(np.full(len(changes) * count, 30.0), 10.0)
             together.eval(probe, probe)
             return [(changes, together)]

@@ -16,7 +16,7 @@ from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs
 
 PAIRS = 256
-TOLERANCE = 1e-9
+TOLERANCE = 1e-8
 
 
 class Shader(Law):
