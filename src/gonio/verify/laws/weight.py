@@ -84,11 +84,11 @@ class Weight(Law):
                     lambda b, x, y, m: b.pdf(x, y)[:, None],
                 )
             value = subject.eval(o, i, mode)
+            if _gray(s.weight[rows]) and not _gray(value):
+                yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
             clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30))
             if clamped:
                 yield Cause(f"the weight is {clamped}", "clamped weight")
-            if _gray(s.weight[rows]) and not _gray(value):
-                yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
@@ -162,7 +162,8 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
     """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else ""."""
     off = np.abs(weight - right) > 0.01 * np.maximum(weight, right)
-    if off.sum() < 64 or off.mean() > 0.97:
+    share = off.mean(0)  # a constant channel is not clamped
+    if off.sum() < 64 or not np.any((share > 0.01) & (share < 0.97)) or np.any(share >= 0.97):
         return ""
     values = weight[off]
     most = float(np.median(values))
