@@ -154,16 +154,6 @@ class LastAzimuthBright(FirstNumberZero):
         return s._replace(weight=where(u.z > 0.9999998, 2.0 * s.weight, s.weight))
 
 
-class LogOfZero(FirstNumberZero):
-    """A logarithm of u.x, which may be 0, scales the weight by 1 elsewhere."""
-
-    caught_by = "positivity"
-
-    def sample(self, wo: Any, u: Any, mode: Any = "radiance") -> Any:
-        s = self.sample_cosine(wo, u, mode)
-        return s._replace(weight=s.weight * (1.0 + 0.0 * ops.log(u.x)))
-
-
 # --------------------------------------------------------------------------- pairs of widths
 
 
