@@ -82,3 +82,17 @@ def test_inner_materials_are_tried_as_well_and_the_same_seed_tries_the_same() ->
     first, second = ([place.words for place in box.places(one, EFFORTS["default"], 3)] for _ in range(2))
     assert first == second and len(first) == EFFORTS["default"].places
     assert any("b.alpha = " in words for words in first)
+
+
+def test_colors_and_unequal_widths_are_tried() -> None:
+    places = box.places(subject.of(go.Conductor(alpha=0.3)), EFFORTS["default"], 1)
+    pairs = [place.values["alpha"] for place in places if place.why == "pair"]
+    assert pairs and all(x != y for x, y in pairs)
+    colors = [place.values["albedo"] for place in places if place.why == "color"]
+    assert any(min(color) == 0.0 and max(color) > 0.8 for color in colors)
+    assert "unequal widths" in box.covered(subject.of(go.Conductor(alpha=0.3)), places)
+
+
+def test_the_larger_of_two_exponents_is_the_narrower() -> None:
+    report = verify(go.AshikhminShirley(), quick=True, law="isotropy")
+    assert report.passed, str(report)

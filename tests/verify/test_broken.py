@@ -9,8 +9,9 @@ from gonio.verify import verify
 from broken.facets import FACETS
 from broken.glass import GLASS
 from broken.surfaces import SURFACES
+from broken.third_edition import THIRD
 
-CONTROLS = [*FACETS, *SURFACES, *GLASS]
+CONTROLS = [*FACETS, *SURFACES, *GLASS, *THIRD]
 BROKEN = [cls for cls in CONTROLS if cls.caught_by]
 SOUND = [cls for cls in CONTROLS if not cls.caught_by]
 

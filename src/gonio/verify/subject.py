@@ -286,7 +286,7 @@ class Described(Subject):
     @classmethod
     def of(cls, subject: Subject) -> Described:
         settings = {name: str(value) for name, value in subject.settings.items()}
-        return cls(None, subject.target, settings, subject.title)
+        return cls(None, subject.target, settings, heading=subject.title)
 
 
 def guarded(model: Any, method: str, run: Any) -> Any:

@@ -60,15 +60,19 @@ def named(ratio: Ratio) -> Cause | None:
 
 def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
     """One of the two that has a single value wherever they differ, the largest or smallest of its values."""
-    if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST:
-        return None
+    if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST or np.ptp(ratio.wi[bad], axis=0).max() < 0.1:
+        return None  # at one direction all values are the same
     for values, other, name in ((ratio.above, ratio.below, ratio.top), (ratio.below, ratio.above, ratio.bottom)):
         clamped, right = values[bad].max(1), other[bad].max(1)
         middle = float(np.median(clamped))
         if middle <= 0.0 or np.mean(np.abs(clamped / middle - 1.0) < 1e-4) < 0.99:
             continue
-        for word, side in (("at most", right > clamped), ("at least", right < clamped)):
-            if side.mean() > 0.99:
+        rest = values[~bad].max(1)  # within the same bound
+        for word, side, bound in (
+            ("at most", right > clamped, rest <= middle * 1.001),
+            ("at least", right < clamped, rest >= middle * 0.999),
+        ):
+            if side.mean() > 0.99 and bound.mean() > 0.99:
                 text = f"{name} is {middle:.4g} wherever the other is {'larger' if word == 'at most' else 'smaller'}"
                 return Cause(f"{text}: clamped to {word} {middle:.4g}?", f"{name} clamped")
     return None

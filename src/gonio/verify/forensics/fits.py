@@ -22,6 +22,10 @@ def fitted(ratio: Ratio) -> Fit | None:
     """The first candidate that explains a ratio everywhere."""
     if len(ratio.wo) < FEWEST:
         return None
+    plain = scalar(ratio)
+    quality = None if plain is None else holds(ratio, plain)
+    if quality is not None:
+        return None  # 1 but for a few pairs: a factor that leaves most as they are would explain as much
     return next((fit for fit in (candidate(ratio) for candidate in CANDIDATES) if fit is not None), None)
 
 

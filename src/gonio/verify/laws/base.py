@@ -144,7 +144,9 @@ def beyond_rounding(
     return error
 
 
-def relative(a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: float = 0.0) -> np.ndarray:
+def relative(
+    a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: np.ndarray | float = 0.0
+) -> np.ndarray:
     """(|a - b| - noise) / max(|a|, |b|, floor), never below 0."""
     size = np.maximum(np.maximum(np.abs(a), np.abs(b)), floor)
     return np.maximum(np.abs(a - b) - noise, 0.0) / np.where(size > 0.0, size, 1.0)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...errors import InputError
 from .. import directions, severity
 from ..effort import Effort
 from ..forensics.ratio import Cause
@@ -110,28 +111,42 @@ class Isotropy(Law):
 
     def _axes(self, subject: Subject, finding: Finding) -> None:
         """Second moments of eval over wi, for wo at the normal, along the two axes: in the order of the two widths."""
-        pair = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "alpha"), None)
+        name = next((n for n, p in subject.parameters.items() if p.kind == "alpha"), "")
+        pair = getattr(subject.model, name, None)
         if not isinstance(pair, tuple | list):
             return
-        turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
-        phi0 = float(turn or 0.0)
-        theta = np.geomspace(1e-4, 0.499 * np.pi, 400)
-        phi = np.arange(64) * 2.0 * np.pi / 64
-        t, p = np.meshgrid(theta, phi, indexing="ij")
-        wi = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
-        value = subject.eval(np.tile([0.0, 0.0, 1.0], (len(wi), 1)), wi).mean(1)
-        # d omega = sin theta d theta d phi, and geometric steps in theta carry a factor theta
-        weight = value * (np.sin(t) * t).ravel() * np.sin(t).ravel() ** 2
-        along, across = (np.sum(weight * np.cos(p.ravel() - phi0) ** 2), np.sum(weight * np.sin(p.ravel() - phi0) ** 2))
+        along, across, _ = _spread(subject)
         if not along + across > 0.0:
             return
         finding.notes.append(
             f"second moments along x and y: {along / (along + across):.3f}, {across / (along + across):.3f}"
         )
-        if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
+        try:
+            widths = [_spread(subject.replace(**{name: (float(v), float(v))}))[2] for v in pair]
+        except InputError:  # the material rejects equal values
+            widths = [float(v) for v in pair]
+        # of exponents, the larger one is the narrower
+        apart = abs(widths[0] - widths[1]) > 1e-3 * max(widths)
+        if apart and (along - across) * (widths[0] - widths[1]) < 0.0:
             wider = "x" if along > across else "y"
             given = f"alpha is {pair[0]:g}, {pair[1]:g}"
             finding.problems.append(f"{given}, but the lobe is wider along {wider}: axes swapped")
+
+
+def _spread(subject: Subject) -> tuple[float, float, float]:
+    """Second moments of eval over wi, for wo at the normal, along the two axes; and their sum over the light."""
+    turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
+    phi0 = float(turn or 0.0)
+    theta = np.geomspace(1e-4, 0.499 * np.pi, 400)
+    phi = np.arange(64) * 2.0 * np.pi / 64
+    t, p = (part.ravel() for part in np.meshgrid(theta, phi, indexing="ij"))
+    wi = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1)
+    value = subject.eval(np.tile([0.0, 0.0, 1.0], (len(wi), 1)), wi).mean(1)
+    # d omega = sin theta d theta d phi, and geometric steps in theta carry a factor theta
+    light = value * np.sin(t) * t
+    moment = light * np.sin(t) ** 2
+    along, across = (float(np.sum(moment * turned(p - phi0) ** 2)) for turned in (np.cos, np.sin))
+    return along, across, (along + across) / max(float(np.sum(light)), 1e-30)
 
 
 def _swapped(subject: Subject) -> Subject | None:
