@@ -132,7 +132,8 @@ def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: 
     """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
     distribution = isinstance(target, str)
     if isinstance(target, str):
-        target = model("conductor")(ndf=target, masking=masking or "smith-correlated").lossless()
+        made: Any = model("conductor")
+        target = made(ndf=target, masking=masking or "smith-correlated").lossless()
     elif masking is not None:
         raise InputError("masking given for a material", "--masking", "the parameters of the material define it")
     baked = ltc.bake(target, resolution, schlick=distribution)
