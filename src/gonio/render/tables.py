@@ -129,13 +129,13 @@ def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
 
 def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: str | None) -> Baked:
     """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
-    distribution = isinstance(target, str)
+    material: Any = target
     if isinstance(target, str):
         made: Any = model("conductor")
-        target = made(ndf=target, masking=masking or "smith-correlated").lossless()
+        material = made(ndf=target, masking=masking or "smith-correlated").lossless()
     elif masking is not None:
         raise InputError("masking given for a material", "--masking", "the parameters of the material define it")
-    baked = ltc.bake(target, resolution, schlick=distribution)
+    baked = ltc.bake(material, resolution, schlick=isinstance(target, str))
     codes = [area_light(baked, language) for language in LANGUAGES]
     baked.manifest["textures"] = codes[0].manifest["textures"]
     if folder is not None:
