@@ -88,13 +88,9 @@ def bake(
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
     if preset is not None:
-        return _preset(target, output, preset, resolution or 128, seed, store, flip)
+        return _preset(target, output, preset, 128 if resolution is None else resolution, seed, store, flip)
     folder = None if output is None else files.check_folder(output)
     ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
-    if lut and "ltc" in lut:
-        _check_ltc(lut, {"layout": layout, "aspect": aspect, "method": method, "floor": floor})
-        return _cosines(_target(target), folder, resolution or ltc.SIZE, masking)
-    resolution = 128 if resolution is None else resolution
     axes = {"resolution": resolution, "layout": layout, "aspect": aspect, "azimuths": azimuths}
     sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed, "floor": floor}
     picture = {"store": store, "flip": flip, "wrap": wrap}
@@ -102,7 +98,10 @@ def bake(
         _check_default({**axes, **sampling, **picture}, "an environment takes --ndf, --levels and --masking")
         return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
-    options = {"masking": masking, **axes, **sampling}
+    if lut and "ltc" in lut:
+        _check_ltc(lut, {**axes, "resolution": None, **sampling, **picture})
+        return _cosines(_target(target), folder, ltc.SIZE if resolution is None else resolution, masking)
+    options = {"masking": masking, **axes, "resolution": 128 if resolution is None else resolution, **sampling}
     if layout == "homework":
         return _homework(_target(target), folder, lut, options, picture)
     baked = _baked(_target(target), lut, options)
@@ -131,12 +130,13 @@ def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
 
 def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: str | None) -> Baked:
     """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
-    distribution = isinstance(target, str)
+    material: Any = target
     if isinstance(target, str):
-        target = model("conductor")(ndf=target, masking=masking or "smith-correlated").lossless()
+        made: Any = model("conductor")
+        material = made(ndf=target, masking=masking or "smith-correlated").lossless()
     elif masking is not None:
         raise InputError("masking given for a material", "--masking", "the parameters of the material define it")
-    baked = ltc.bake(target, resolution, schlick=distribution)
+    baked = ltc.bake(material, resolution, schlick=isinstance(target, str))
     codes = [area_light(baked, language) for language in LANGUAGES]
     baked.manifest["textures"] = codes[0].manifest["textures"]
     if folder is not None:

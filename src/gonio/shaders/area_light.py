@@ -32,7 +32,8 @@ def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> B
         covered = formulas.quad(lookup(inverse, *place), wo, (a, b, c, d))
         albedo = lookup(norm, *place)
         if f0 is None:
-            return vec3(*albedo) * covered
+            color: Spectrum = vec3(*albedo) * covered  # type: ignore[assignment]  # three channels in a shader
+            return color
         return (f0 * (albedo[0] - albedo[1]) + albedo[1]) * covered
 
     optional = {"f0": None if colored else "vec3", "roughness": "float" if swept else None}

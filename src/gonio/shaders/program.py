@@ -128,7 +128,7 @@ class Routines:
 
     def _tables(self) -> list[Table]:
         tables: dict[int, Table] = {}
-        self.readings: dict[int, set[str]] = {}
+        self.readings = {}
         for routine in self.routines:
             for value in routine.values():
                 if value.op == "texel":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..energy.tables import curves as fits
 from ..errors import InputError
 from ..material import BSDF, Microsurface, tree
 from ..ops import Scalar, Spectrum, Table, function, lookup, vec2
+from ..ops.table import read_in_numpy
 from ..optics.lattice import r_sequence
 from .bundle import Bundle
 from .curves import written
@@ -139,7 +140,7 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
 LOOKUP = 30  # operations of an interpolated lookup of two channels, beside its four texels
 
 
-def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Tier, object]]:
+def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Tier, Callable]]:
     """`dfg` by a table and, if a budget is given, by fits of several orders."""
     baked = baking.cached(surface.ndf, lut=("dfg",), masking=surface.masking, size=TABLE)
     table = Table("dfg", baked.arrays["dfg"])
@@ -161,6 +162,6 @@ def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Ti
 def _table_error(table: Table, samples: fits.Samples) -> tuple[float, float]:
     """(largest, mean) error of lookups between the nodes, over the range of the fits."""
     white, share = np.moveaxis(samples.values["dfg"], -1, 0)
-    a, b = lookup(table, samples.roughness[:, None], samples.mu)
+    a, b = read_in_numpy(table, samples.roughness[:, None], samples.mu)
     error = np.maximum(np.abs(a - white * (1.0 - share)), np.abs(b - white * share))
     return float(error.max()), float(error.mean())

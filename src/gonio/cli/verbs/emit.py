@@ -114,7 +114,7 @@ def emit(
         _write_pairs(made.texts(model), check, functions, single, folders)
         return
     at = Placement(place.prefix, place.group, place.first_binding)
-    shader = _shader(made.texts(model), lang, functions, short, at, {"lean": lean, "constants": constants})
+    shader = _shader(made.texts(model), lang, functions, short, at, lean, constants)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())
@@ -128,7 +128,7 @@ def emit(
 
 
 def _shader(
-    models: list[str], lang: str, functions: str, short: Short, at: Placement, options: dict[str, bool]
+    models: list[str], lang: str, functions: str, short: Short, at: Placement, lean: bool, constants: bool
 ) -> Bundle:
     """The shader, with its measured errors on stderr if it is an approximation."""
     from ...catalog import notation
@@ -136,15 +136,15 @@ def _shader(
     from ...shaders import bundle, curves, tiers
 
     if not (short.fit or short.ibl or short.budget):
-        return bundle(models, lang, functions, placement=at, **options)
+        return bundle(models, lang, functions, lean=lean, constants=constants, placement=at)
     if len(models) != 1 or (short.fit and (short.ibl or short.budget)):
         what = f"{len(models)} materials given" if len(models) != 1 else "--fit with --ibl or --budget"
         raise InputError(
             what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
         )
-    given = [f"--{name}" for name, value in options.items() if value and (short.fit or short.ibl)]
-    if given:
-        raise InputError(f"{given[0]} with {'--fit' if short.fit else '--ibl'}", "emit", "it goes with whole materials")
+    if (lean or constants) and (short.fit or short.ibl):
+        what = f"{'--lean' if lean else '--constants'} with {'--fit' if short.fit else '--ibl'}"
+        raise InputError(what, "emit", "it goes with whole materials")
     model = notation.named(models[0])[0]
     if short.fit:
         made, lines = curves.fitted(model, short.fit, lang, at)
@@ -153,7 +153,10 @@ def _shader(
         lines = [str(tier) for tier in found]
     else:
         model, found = tiers.cheapest(model, short.budget)
-        made, lines = bundle(model, lang, functions, placement=at, **options), [str(tier) for tier in found]
+        made, lines = (
+            bundle(model, lang, functions, lean=lean, constants=constants, placement=at),
+            [str(tier) for tier in found],
+        )
     print("\n".join(lines), file=sys.stderr)
     return made
 

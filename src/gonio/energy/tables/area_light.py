@@ -81,7 +81,9 @@ def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar
     inverse  the four numbers of W, as the table has them
     corners  see `cosine_quad`
     """
-    return cosine_quad(*(to_cosine(*inverse, wo, p) for p in corners))
+    first, second, third, fourth = inverse
+    a, b, c, d = (to_cosine(first, second, third, fourth, wo, p) for p in corners)
+    return cosine_quad(a, b, c, d)
 
 
 def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:

@@ -127,7 +127,8 @@ def _albedos(model: BSDF, path: str, roughness: Array, mu: Array) -> Array:
     surface = model.microsurface
     if surface is not None and model.isotropic:
         target = Target(model, surface.ndf, surface.masking)
-        return target.exact(Points(*np.broadcast_arrays(mu, roughness[:, None] ** 2), None, 0.0))["E"]
+        cosine, alpha = np.broadcast_arrays(mu, roughness[:, None] ** 2)
+        return target.exact(Points(cosine, alpha, None, 0.0))["E"]
     options: dict[str, Any] = {"method": "sampling", "samples": SAMPLES} if path else {}
     return np.array([albedo(ltc.at(model, path, value), mu, **options).value for value in roughness])
 

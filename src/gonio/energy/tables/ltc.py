@@ -202,7 +202,8 @@ def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
         start = np.roll(best, side, axis=0)
         cells = np.flatnonzero(_loss(start, *given) < loss)
         if len(cells):
-            best[cells], loss[cells] = _fitted(*(part[cells] for part in given), start[cells])
+            wi, weight, values = (part[cells] for part in given)
+            best[cells], loss[cells] = _fitted(wi, weight, values, start[cells])
     best = best / best[:, 2:3]
     cubed, misplaced = lobe_errors(points, points.value.mean(-1), total, best)
     return Row(best, norm, misplaced, cubed)

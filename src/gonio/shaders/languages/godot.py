@@ -17,7 +17,7 @@ class Godot(GLSL):
     name = "godot"
     title = "Godot 4"
     suffix = ".gdshaderinc"
-    precision = "float has 32 bits."
+    precision = "float has 32 bits: mediump is not enough."
     reserved = GLSL.reserved | frozenset(_MORE.split())
     overloads = False
 

@@ -28,7 +28,7 @@ class TSL(Language):
     name = "tsl"
     title = "TSL (three.js)"
     suffix = ".js"
-    precision = "The renderer must compute at highp."
+    precision = "The renderer must compute at highp: 16 bits are not enough."
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,
         "atan2": "atan({0}, {1})",
