@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ class Fit:
         lines = [",".join((name, *(repr(float(x)) for x in numbers))) for name, *numbers in rows]
         text = "\n".join([",".join(("name", *COLUMNS)), *lines]) + "\n"
         if path is not None:
-            write_whole(path, text.encode())
+            write_whole(Path(path), text.encode())
         return text
 
     def __str__(self) -> str:

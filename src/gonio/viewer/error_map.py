@@ -90,7 +90,7 @@ def compare(
 
 
 def compare_materials(
-    test: object, reference: object, metric: str, tolerance: float | None, output: str | Path | None
+    test: Any, reference: Any, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
     """As `compare`, for two materials, both of which may be text."""
     named = []
