@@ -80,3 +80,33 @@ def test_a_layer_of_weight_0_changes_nothing(model: str, weight: str, parameter:
     other = 0.5 * (min(max(one.low, 0.0), default) + min(one.high, 2.0 * default + 0.5))
     value = (other,) * 3 if one.kind == "spectrum" else float(other)
     np.testing.assert_allclose(values(made(**{weight: off, parameter: value})), values(plain), rtol=ROUNDINGS, atol=0.0)
+
+
+LAMBERT = "lambert(albedo=.3)"
+LIMITS = {
+    **{f"{name}(diffuse=.3,specular=0)": LAMBERT for name in ("ward", "ward-duer", "lafortune", "shifted-gamma")},
+    **{f"{name}(diffuse=.3,specular=0)": LAMBERT for name in ("cook-torrance", "he-torrance")},
+    **{f"{name}(diffuse=.3,specular=0)": LAMBERT for name in ("low-smooth", "low-microfacet")},
+    **{f"{name}(kd=.3,ks=0)": f"lambert(albedo={0.3 * np.pi!r})" for name in ("phong", "blinn-phong")},
+    "modified-phong(kd=.3,ks=0)": LAMBERT,
+    "oren-nayar(albedo=.3,sigma=0)": LAMBERT,
+    "eon(albedo=.3,roughness=0)": LAMBERT,
+    "coat(base=lambert(albedo=.3),index=1)": LAMBERT,
+    "film-conductor(eta=.2,k=3,alpha=.3,thickness=0)": "conductor(eta=.2,k=3,alpha=.3)",
+    "film-conductor(eta=.2,k=3,alpha=.3,thickness=300,film_eta=1)": "conductor(eta=.2,k=3,alpha=.3)",
+    "film-dielectric(eta=1.5,alpha=.3,thickness=0)": "dielectric(eta=1.5,alpha=.3)",
+    "film-dielectric(eta=1.5,alpha=.3,thickness=300,film_eta=1)": "dielectric(eta=1.5,alpha=.3)",
+    "film-dielectric(eta=1.5,alpha=.3,thickness=300,film_eta=1.5)": "dielectric(eta=1.5,alpha=.3)",
+    "mix(a=phong,b=conductor(alpha=.3),weight=0)": "phong",
+    "mix(a=phong,b=conductor(alpha=.3),weight=1)": "conductor(alpha=.3)",
+    "opacity(base=conductor(alpha=.3),opacity=1)": "conductor(alpha=.3)",
+    "normal-map(base=phong,lean_x=0,lean_y=0)": "phong",
+    "bump(base=phong,lean_x=0,lean_y=0)": "phong",
+}
+
+
+@pytest.mark.sample(5)
+@pytest.mark.parametrize("limit", LIMITS)
+def test_a_material_at_its_limit_is_the_material_without_it(limit: str) -> None:
+    without = values(go.material(LIMITS[limit]))
+    np.testing.assert_allclose(values(go.material(limit)), without, rtol=0.0, atol=ROUNDINGS * float(without.max()))

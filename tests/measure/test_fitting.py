@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import gonio as go
@@ -240,3 +241,15 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
 def test_bad_input_is_one_clear_error(call, words: str) -> None:
     with pytest.raises(InputError, match=words):
         call(table(go.Lambert(0.3), shape=(8, 8, 8)))
+
+
+def test_a_fit_is_a_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = go.fit("sample", "lambert")
+    text = found.to_csv(tmp_path / "fit.csv")
+    assert (tmp_path / "fit.csv").read_text() == text
+    head, *rows = [line.split(",") for line in text.splitlines()]
+    assert head == ["name", "value", "error", "low", "high"] and [row[0] for row in rows] == list(found.names)
+    assert [float(row[1]) for row in rows] == list(found.values)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(go.MachineError, match="pandas is not installed"):
+        found.to_frame()

@@ -47,7 +47,7 @@ go.bake("ggx", texels=64)  # reportCallIssue
 go.study("scene", ["alpha"])  # reportArgumentType
 go.compare("a.exr")  # reportCallIssue
 go.view(gold, width=400)  # reportCallIssue
-go.albedo("lambert")  # reportArgumentType
+go.albedo(3)  # reportArgumentType
 go.model(gold)  # reportArgumentType
 
 

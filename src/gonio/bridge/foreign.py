@@ -250,9 +250,10 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
     return load({"type": kind, **properties})
 
 
-def _name_of(cls: type, registered: Mapping[str, object], file: str) -> str:
+def _name_of(cls: object, registered: Mapping[str, object], file: str) -> str:
     """The name under which a file registers a class of plugins, itself or by a function that constructs it. Raises
     InputError if there is none."""
+    name = getattr(cls, "__name__", "")
     by_class = next((kind for kind, make in registered.items() if make is cls), "")
     if by_class:
         return by_class
@@ -261,8 +262,8 @@ def _name_of(cls: type, registered: Mapping[str, object], file: str) -> str:
             if type(_built({"type": kind})) is cls:
                 return kind
     known = [f"{file}:{kind}" for kind in registered]
-    hint = f"name a registered plugin: {', '.join(known)}" if known else f"add mi.register_bsdf('NAME', {cls.__name__})"
-    raise InputError(f"no plugin that the file registers is a {cls.__name__}", file, hint)
+    hint = f"name a registered plugin: {', '.join(known)}" if known else f"add mi.register_bsdf('NAME', {name})"
+    raise InputError(f"no plugin that the file registers is a {name}", file, hint)
 
 
 def mitsuba() -> ModuleType:

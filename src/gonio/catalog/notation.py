@@ -29,6 +29,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..material import tree
 from ..material.bsdf import BSDF
+from ..material.constructing import WIDTHS, with_pair
 from ..material.parameters import ChoiceParameter, IndexParameter, Parameter, Value
 from ..ops import backend
 from ..optics.indices import DispersiveIndex
@@ -91,6 +92,8 @@ def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
     """Whether a material of a class has a parameter, by its path; `given` are its settings, as for `made`."""
     name, dot, rest = path.partition(".")
     parameter = cls.parameters().get(name)
+    if name in WIDTHS and parameter is None and "alpha" in cls.parameters():
+        return True
     if parameter is None or not dot:
         return parameter is not None or (path == "preset" and bool(cls.presets()))
     if not parameter.inner:
@@ -164,6 +167,7 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
     """The settings of a material itself, and of each inner material, by parameter. Raises InputError for unknown
     names."""
     known = cls.parameters()
+    given = with_pair(known, given, "--param")
     own: dict[str, object] = {}
     below: dict[str, dict[str, object]] = {}
     for path, value in given.items():

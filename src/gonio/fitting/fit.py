@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ import numpy as np
 from ..arguments import renamed
 from ..catalog import notation
 from ..catalog.material import MaterialLike
-from ..errors import InputError
+from ..errors import InputError, MachineError
+from ..files import write_whole
 from ..material import BSDF
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
@@ -34,6 +36,7 @@ SOLVED = 8  # starting points that are refined with the metric itself on few val
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs from which two solutions count as distinct
 NORMAL_95 = 1.96
+COLUMNS = ("value", "error", "low", "high")  # of a fit as a table
 TIED = 0.98  # correlation from which two parameters are reported
 
 
@@ -100,6 +103,27 @@ class Fit:
             "correlation": [[round(float(x), 4) for x in row] for row in self.correlation],
             "notes": list(self.notes),
         }
+
+    def to_frame(self) -> Any:
+        """The fitted numbers as a pandas DataFrame: value, error, low and high of the 95 % interval, by name.
+
+        Raises MachineError if pandas is not installed; `to_csv` does not need it.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MachineError("pandas is not installed", "Fit.to_frame", "pip install pandas, or use to_csv") from None
+        columns = dict(zip(COLUMNS, (self.values, self.errors, *self.interval.T), strict=True))
+        return pandas.DataFrame(columns, index=list(self.names))
+
+    def to_csv(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The same as comma-separated text, which is also written to a file if one is given."""
+        rows = zip(self.names, self.values, self.errors, *self.interval.T, strict=True)
+        lines = [",".join((name, *(repr(float(x)) for x in numbers))) for name, *numbers in rows]
+        text = "\n".join([",".join(("name", *COLUMNS)), *lines]) + "\n"
+        if path is not None:
+            write_whole(Path(path), text.encode())
+        return text
 
     def __str__(self) -> str:
         lines = [f"{self.text}: {self.error:.4g} ({self.metric}), {100.0 * self.relative:.3g} % off"]

@@ -33,6 +33,7 @@ from ..optics import warp
 from . import binding, equality, guide_search, notebook, recording, tree
 from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
+from .constructing import accepted, with_pair
 from .facts import Interior, KnownViolation, Microsurface, Preset
 from .former_names import add_former_names, move_former_names
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
@@ -91,6 +92,7 @@ class BSDF(Material):
         _check_pair(cls)
         cls.guided = cls.pdf is BSDF.pdf and cls.sample is BSDF.sample and cls.eval is not BSDF.eval
         dataclass(frozen=True, eq=False, repr=False)(cls)
+        cls.__init__ = accepted(cls.__init__)  # type: ignore[method-assign]
         cls._declared = declared(cls)  # on the class, so that it is discarded when a user's file is loaded again
 
     def __post_init__(self) -> None:
@@ -114,7 +116,9 @@ class BSDF(Material):
 
         wo, wi  (N, 3) unit vectors away from the surface: toward the viewer, toward the light
         mode    "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
-        Returns (N, channels).
+        derivatives  of arrays: paths of parameters; the result is stacked: values, then their derivative by each
+        wavelengths  of arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are no spectrum
+        Returns (N, channels); for arrays of shape (..., 3), (..., channels).
         """
         raise NotImplementedError(f"{type(self).__name__} has no eval")
 
@@ -272,6 +276,7 @@ class BSDF(Material):
     @classmethod
     def preset(cls, name: str, **parameters: Value) -> Self:
         """A material by a preset's name: Conductor.preset("Au", alpha=0.2). Raises InputError if it is unknown."""
+        parameters = with_pair(cls.parameters(), parameters, cls.__name__)
         known = cls.presets()
         by_name = {key.lower(): key for key in known} | {p.title.lower(): key for key, p in known.items()}
         key = by_name.get(str(name).lower())

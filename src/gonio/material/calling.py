@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -19,12 +20,11 @@ from ..arguments import shown
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from ..owner import COMPUTING
-from . import binding, tree
+from . import binding, blocks, requests, tree
 from .parameters import Material
 from .sample import Floats, Sample, SampleArrays
 
 MODES = ("radiance", "importance")
-UNIT = 1e-2  # tolerance of a direction's length: rounding and values typed by hand
 
 V3 = TypeVar("V3", bound="Vector3[DrJit]")
 S = TypeVar("S")
@@ -37,6 +37,7 @@ DrJit: TypeAlias = Any  # a Dr.Jit value, whose type is not expressible
 
 
 MISSING: Any = object()
+EXTRAS = ("derivatives", "wavelengths")  # of eval and pdf on arrays
 
 
 class EvalMethod(Protocol):
@@ -47,7 +48,16 @@ class EvalMethod(Protocol):
     @overload
     def __call__(self, wo: V3, wi: V3, mode: Mode = ..., precision: Precision | None = ...) -> V3: ...
     @overload
-    def __call__(self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...) -> Floats: ...
+    def __call__(
+        self,
+        wo: ArrayLike,
+        wi: ArrayLike,
+        mode: Mode = ...,
+        precision: Precision | None = ...,
+        *,
+        derivatives: Sequence[str] = ...,
+        wavelengths: ArrayLike | None = ...,
+    ) -> Floats: ...
 
 
 class PdfMethod(Protocol):
@@ -56,7 +66,15 @@ class PdfMethod(Protocol):
     @overload
     def __call__(self, wo: Vector3[S], wi: Vector3[S], *, precision: Precision | None = ...) -> S: ...
     @overload
-    def __call__(self, wo: ArrayLike, wi: ArrayLike, *, precision: Precision | None = ...) -> Floats: ...
+    def __call__(
+        self,
+        wo: ArrayLike,
+        wi: ArrayLike,
+        *,
+        precision: Precision | None = ...,
+        derivatives: Sequence[str] = ...,
+        wavelengths: ArrayLike | None = ...,
+    ) -> Floats: ...
 
 
 class SampleMethod(Protocol):
@@ -111,6 +129,7 @@ def method(formula: Callable[..., object], /) -> object:
     ) -> object:
         if other is MISSING:
             other = named.pop(second, MISSING)
+        extra = {key: named.pop(key) for key in EXTRAS if key in named and formula.__name__ in ("eval", "pdf")}
         if other is MISSING or named:
             what = f"has no argument '{next(iter(named))}'" if named else f"lacks its argument '{second}'"
             raise TypeError(f"{type(self).__name__}.{formula.__name__} {what}: wo, {second}, precision and mode")
@@ -122,6 +141,8 @@ def method(formula: Callable[..., object], /) -> object:
             where = f"{type(self).__name__}.{formula.__name__}"
             raise InputError(f"unknown mode {shown(mode)}", where, " or ".join(MODES))
         with COMPUTING:
+            if extra:
+                return _on_request(self, formula.__name__, enter, (wo, other, mode, precision), **extra)
             if backend.is_drjit(wo):
                 return enter(binding.bind_to(self, backend.types_like(type(wo))), wo, other, mode)
             return _on_numpy(self, formula.__name__, enter, wo, other, mode, precision)
@@ -154,23 +175,76 @@ def _on_numpy(
     precision: Precision | None,
 ) -> object:
     types = backend.types(precision)
-    first, second, count = _rows(wo, other, name)
+    first, second, shape = _rows(wo, other, name)
+    count = math.prod(shape)
     _check_rows(material, count)
+    bound = binding.bind_to(material, types)
     if count == 0:  # Dr.Jit cannot broadcast empty arrays with arrays of one entry
         first = second = np.array([0.0, 0.0, 1.0])
-    bound = binding.bind_to(material, types)
-    result = enter(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), mode)
+    many = count >= blocks.MANY
+    if many:
+        a, b = blocks.vector_of(first, count, types), blocks.vector_of(second, count, types)
+    else:
+        a, b = backend.vector_of(first, 3, types), backend.vector_of(second, 3, types)
+    result = enter(bound, a, b, mode)
+    parts = list(result) if isinstance(result, tuple) else [result]
+    if many:
+        valid = [
+            (blocks.is_unit, "wo", a),
+            (blocks.is_random, "u", b) if name == "sample" else (blocks.is_unit, "wi", b),
+        ]
+        arrays, passed = blocks.to_numpy(parts, shape, [check(vector) for check, _, vector in valid])
+        for (_, label, _), array, ok in zip(valid, (first, second), passed, strict=True):
+            if not ok:
+                _check_values(array, label, f"{name}: {label}")
+    else:
+        arrays = [backend.to_numpy(value, max(count, 1))[: count or None] for value in parts]
+        arrays = [array[:0] for array in arrays] if count == 0 else arrays
+    if len(shape) != 1 and not many:
+        arrays = [array.reshape(*shape, *array.shape[1:]) for array in arrays]
+    return type(result)(*arrays) if isinstance(result, tuple) else arrays[0]  # a NamedTuple
 
-    def out(value: object) -> np.ndarray:
-        return backend.to_numpy(value, count) if count else backend.to_numpy(value, 1)[:0]
 
-    if isinstance(result, tuple):
-        return type(result)(*map(out, result))  # a NamedTuple
-    return out(result)
+def _on_request(
+    material: Material,
+    name: str,
+    enter: Callable[..., object],
+    given: tuple[Given, Given, Mode, Precision | None],
+    derivatives: Sequence[str] = (),
+    wavelengths: ArrayLike | None = None,
+) -> Floats:
+    """Values with their derivatives, or at wavelengths, on arrays."""
+    wo, other, mode, precision = given
+    if backend.is_drjit(wo):
+        what, hint = "derivatives or wavelengths of Dr.Jit values", "use dr.enable_grad on a parameter, or give arrays"
+        raise InputError(what, name, hint)
+    if len(derivatives) and wavelengths is not None:
+        raise InputError("derivatives and wavelengths together", name, "ask for one of them")
+    types = backend.types(precision)
+    first, second, shape = _rows(wo, other, name)
+    count = math.prod(shape)
+    _check_rows(material, count)
+    for label, array in (("wo", first), ("wi", second)):
+        _check_values(array, label, f"{name}: {label}")
+    a, b = backend.vector_of(first, 3, types), backend.vector_of(second, 3, types)
+
+    def formula(bound: Material) -> DrJit:
+        return enter(bound, a, b, mode)
+
+    if wavelengths is None:
+        paths = [derivatives] if isinstance(derivatives, str) else derivatives
+        rows = [backend.to_numpy(value, count) for value in requests.slopes(material, paths, formula, types)]
+        return np.stack([row.reshape(*shape, *row.shape[1:]) for row in rows])
+    columns = []
+    for value in requests.at_wavelengths(material, wavelengths, formula, types):
+        row = backend.to_numpy(value, count)
+        columns.append((row[:, 0] if row.ndim == 2 else row).reshape(shape))
+    return np.stack(columns, axis=-1)
 
 
-def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, int]:
-    """Two arguments as arrays of shape (N, 3) or (3,), and N."""
+def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
+    """Two arguments as arrays of shape (N, 3) or (3,), and the shape of the results: (N,), or that of arrays with more
+    axes, without the last. The values of many rows are checked later, with the results."""
     arrays = []
     for label, value in (("wo", wo), ("u" if name == "sample" else "wi", other)):
         where = f"{name}: {label}"
@@ -178,30 +252,46 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, i
             array = np.asarray(value)
             if np.iscomplexobj(array):
                 raise InputError("complex numbers given, real ones expected", where)
-            array = array.astype(np.float64)
+            array = array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
         except InputError:
             raise
         except (TypeError, ValueError):
             array = np.empty(0)
-        if array.ndim not in (1, 2) or array.shape[-1] != 3:
-            raise InputError(f"an array of shape {array.shape}, expected (N, 3)", where)
-        if label != "u":
-            _check_unit(array, where)
-        elif not np.all((array >= 0.0) & (array <= 1.0)):  # NaN compares false
-            raise InputError("random numbers outside [0, 1]", where, "give rng.random((N, 3))")
+        if array.ndim == 0 or array.shape[-1] != 3:
+            raise InputError(f"an array of shape {array.shape}, expected (N, 3) or (..., 3)", where)
+        if array.size < 3 * blocks.MANY:
+            _check_values(array, label, where)
         arrays.append(array)
-    sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
-    if len(sizes) > 1:
-        raise InputError(f"{sizes[0]} and {sizes[1]} rows given, the same number expected", name)
-    return arrays[0], arrays[1], sizes[0]
+    first, second = arrays
+    if max(first.ndim, second.ndim) <= 2:
+        sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
+        if len(sizes) > 1:
+            raise InputError(f"{sizes[0]} and {sizes[1]} rows given, the same number expected", name)
+        return first, second, (sizes[0],)
+    try:
+        shape = np.broadcast_shapes(first.shape, second.shape)
+    except ValueError:
+        what = f"arrays of shapes {first.shape} and {second.shape}, which do not broadcast"
+        raise InputError(what, name, "give the same number of rows on every axis, or 1") from None
+    first, second = (np.broadcast_to(x, shape).reshape(-1, 3) for x in arrays)
+    return first, second, shape[:-1]
+
+
+def _check_values(array: np.ndarray, label: str, where: str) -> None:
+    """Raise InputError for directions that are no unit vectors, and random numbers outside [0, 1]."""
+    if label != "u":
+        _check_unit(array, where)
+    elif not np.all((array >= 0.0) & (array <= 1.0)):  # NaN compares false
+        raise InputError("random numbers outside [0, 1]", where, "give rng.random((N, 3))")
 
 
 def _check_unit(array: np.ndarray, location: str) -> None:
+    array = array.astype(np.float64, copy=False)
     length = np.sqrt(np.einsum("...i,...i->...", array, array))
-    off = ~(np.abs(length - 1.0) <= UNIT)  # NaN compares false
+    off = ~(np.abs(length - 1.0) <= blocks.UNIT)  # NaN compares false
     if np.any(off):
-        row = int(np.argmax(off)) if array.ndim == 2 else 0
-        what = f"row {row} has length {np.atleast_1d(length)[row]:.4g}, unit vectors expected"
+        row = int(np.argmax(off))
+        what = f"row {row} has length {np.ravel(length)[row]:.4g}, unit vectors expected"
         raise InputError(
             what, location, "divide directions by their length: w / np.linalg.norm(w, axis=-1, keepdims=True)"
         )

@@ -169,7 +169,7 @@ class _Numeric(Parameter):
             raise InputError(f"{outside:g} given, {self.range} expected", location)
         if array.max() > self.high:
             text = f"{array.max():g} is over {self.high:g}: the material reflects more light than it receives"
-            warnings.warn(f"{location}: {text}", GonioWarning, stacklevel=5)
+            warnings.warn(f"{location}: {text}", GonioWarning, stacklevel=6)
 
     def bind(self, value: object, types: backend.Types) -> Value:
         return backend.float_of(value, types)

@@ -86,6 +86,7 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object
 
 _CONSTRUCTING = (
     "gonio.material.bsdf",
+    "gonio.material.constructing",
     "gonio.material.kinds",
     "gonio.material.parameters",
     __name__,

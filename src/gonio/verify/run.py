@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, cast
 
 from .. import members
 from ..arguments import renamed
@@ -89,7 +89,8 @@ def verify(
     outputs = Outputs(output, junit, sarif, baseline, write_baseline, tolerate)
     known = outputs.check()
     names = None if law is None else [law] if isinstance(law, str) else list(law)
-    all_ = [_target(one) for one in (target if isinstance(target, list | tuple) else [target])]
+    given: Sequence[Target] = target if isinstance(target, list | tuple) else [cast(Target, target)]
+    all_ = [_target(one) for one in given]
     if isolated or (isolated is None and _isolable(all_)):
         from . import trials
         from .isolation import child

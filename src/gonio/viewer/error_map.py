@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import shown
 from ..catalog import operands
 from ..catalog.material import HasEval, MaterialLike, is_material, material, title_of
 from ..energy.difference import Difference, difference
@@ -89,7 +90,7 @@ def compare(
 
 
 def compare_materials(
-    test: object, reference: object, metric: str, tolerance: float | None, output: str | Path | None
+    test: Any, reference: Any, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
     """As `compare`, for two materials, both of which may be text."""
     named = []
@@ -117,6 +118,13 @@ def _picture(given: object, name: str, encoding: str) -> images.Picture:
         raise InputError("a picture and a material", "compare", "compare two materials or two pictures")
     if isinstance(given, str | Path):
         return images.read(given, encoding)
+    try:
+        numeric = np.asarray(given).dtype.kind in "fiub"
+    except (TypeError, ValueError):  # ragged
+        numeric = False
+    if not numeric:
+        what = f"{shown(given)} given, a picture, a material or an array of numbers expected"
+        raise InputError(what, f"compare: {name}")
     return images.Picture(np.asarray(given, np.float32), Path(name))
 
 
