@@ -86,7 +86,7 @@ def check(name: str, location: str, folder: Path | None = None, allow_code: bool
         raise InputError(what, location, "export the mesh as .ply or .obj")
     if _is_trusted(name):
         return None
-    if folder is not None and (folder / _file(name)).exists():
+    if folder is not None and os.path.exists(folder / _file(name)):
         if allow_code:
             return folder / _file(name)
         what = f"'{name}' is native code in {folder / _file(name)}, which scenes may not run by default"
@@ -111,7 +111,7 @@ def _refuse_current_folder(name: str, location: str) -> None:
 
 def _is_trusted(name: str) -> bool:
     """Whether the plugin is in a trusted folder, which Mitsuba searches first."""
-    return any((folder / _file(name)).exists() for folder in trusted())
+    return any(os.path.exists(folder / _file(name)) for folder in trusted())
 
 
 def _file(name: str) -> str:

@@ -211,7 +211,7 @@ class _Reader:
         """The absolute path of a file that the scene names. Raises InputError if it must not be read."""
         try:
             choices = [folder / name for folder in folders]
-            path = next((choice for choice in choices if choice.exists()), self.folder / name)
+            path = next((choice for choice in choices if os.path.exists(choice)), self.folder / name)
             own = path.resolve().is_relative_to(plugin_search.package().resolve())
         except (OSError, ValueError, RuntimeError) as error:
             raise InputError(f"no usable file name: {error}", location, "give a file beside the scene") from None
