@@ -133,7 +133,7 @@ def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], 
     read  raises ValueError if the file was not written by `write`
     """
     path, _ = _path(key)
-    if path.is_file():
+    if os.path.isfile(path):
         try:
             if files.changeable_by_others(path) or files.changeable_by_others(path.parent):
                 raise ValueError("other users may have changed it")
