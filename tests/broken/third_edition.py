@@ -167,16 +167,13 @@ class Facets(BSDF):
     def _area(self, x: Any, y: Any) -> Any:
         return x * y
 
-    def _slopes(self, w: Any, x: Any, y: Any) -> Any:
-        return sqr(x * w.x) + sqr(y * w.y)
-
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         x, y = maximum(self.alpha.x, 0.02), maximum(self.alpha.y, 0.02)
         m = ops.normalize(wo + wi)
         D = inv_pi / (self._area(x, y) * sqr(sqr(m.x / x) + sqr(m.y / y) + sqr(m.z)))
 
         def masked(w: Any) -> Any:
-            return 0.5 * (ops.safe_sqrt(1.0 + self._slopes(w, x, y) / maximum(sqr(w.z), 1e-12)) - 1.0)
+            return 0.5 * (ops.safe_sqrt(1.0 + (sqr(x * w.x) + sqr(y * w.y)) / maximum(sqr(w.z), 1e-12)) - 1.0)
 
         value = D / ((1.0 + masked(wo) + masked(wi)) * 4.0 * maximum(wo.z, 1e-6))
         return vec3(0.9, 0.8, 0.5) * where(lit(wo, wi), value, 0.0)
@@ -191,15 +188,6 @@ class AreaOfOneWidth(Facets):
         return y * y
 
 
-class UnmaskedAlongY(Facets):
-    """Masking by the smaller width alone."""
-
-    caught_by = "energy"
-
-    def _slopes(self, w: Any, x: Any, y: Any) -> Any:
-        return sqr(minimum(x, y)) * (sqr(w.x) + sqr(w.y))
-
-
 # --------------------------------------------------------------------------- right ones
 
 
@@ -208,7 +196,7 @@ class Toon(Matte):
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         m = ops.normalize(wo + wi)
-        return super().eval(wo, wi, mode) * (ops.ceil(5.0 * ops.clamp(m.z, 0.0, 1.0)) * 0.2)
+        return super().eval(wo, wi, mode) * (-0.2 * ops.floor(-5.0 * ops.clamp(m.z, 0.0, 1.0)))
 
 
 class BlackRing(Matte):

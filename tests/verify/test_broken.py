@@ -33,7 +33,7 @@ def test_there_are_enough_controls_and_every_judging_law_has_one() -> None:
     assert caught == expected
 
 
-LONG = {"BelowTheHorizon"}  # its law integrates over both hemispheres
+LONG = {"BelowTheHorizon", "AreaOfOneWidth"}  # both hemispheres; a guide per pair of widths
 CONTROLS = [pytest.param(cls, marks=pytest.mark.slow) if cls.__name__ in LONG else cls for cls in BROKEN]
 
 
@@ -51,7 +51,10 @@ def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> No
 @pytest.mark.parametrize(
     "control",
     # rough glass is judged whole among the models too, and takes longest
-    [pytest.param(cls, marks=pytest.mark.slow if cls.__name__ == "RightGlass" else ()) for cls in SOUND],
+    [
+        pytest.param(cls, marks=pytest.mark.slow if cls in THIRD or cls.__name__ == "RightGlass" else ())
+        for cls in SOUND
+    ],
     ids=lambda cls: cls.__name__,
 )
 def test_the_sound_twin_passes_every_law(control: type) -> None:

@@ -17,6 +17,20 @@ class NoRadianceFactor(go.Dielectric):
         return super().sample(wo, u, "importance")
 
 
+class FactorInPower(go.Dielectric):
+    """Smooth glass whose power is divided by eta^2 too."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        return super().sample(wo, u, "radiance")
+
+
+class ModesExchanged(go.Dielectric):
+    """Smooth glass that takes one mode for the other."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        return super().sample(wo, u, "importance" if mode == "radiance" else "radiance")
+
+
 class BentTheWrongWay(go.Dielectric):
     """Smooth glass that refracts by 1 / eta."""
 
@@ -42,6 +56,8 @@ class DimmerFromBehind(go.Mirror):
     ("mistake", "why", "cause"),
     [
         (NoRadianceFactor(alpha=0.0), "1 times as much radiance as power", "the factor 1 / eta^2 is missing"),
+        (FactorInPower(alpha=0.0), "1 times as much radiance as power", "power has the factor 1 / eta^2"),
+        (ModesExchanged(alpha=0.0), "as much radiance as power", "the two modes are exchanged"),
         (BentTheWrongWay(alpha=0.0), "not refracted by Snell's law", "Snell's law holds with 1 / eta"),
         (DimmerFromBehind(), "a turn of the view changes what the lobe carries", ""),
     ],

@@ -14,7 +14,7 @@ import numpy as np
 from ..material import BSDF, binding, tree
 from ..ops import backend
 from . import directions, lobes
-from .forensics.factors import dielectric
+from .forensics.factors import dielectric, schlick_curve
 from .lobes import Lobes
 from .subject import Subject, guarded
 
@@ -194,10 +194,8 @@ def modes(probe: Probe) -> Misses:
 def _power_of_index(
     radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, total: np.ndarray
 ) -> str:
-    """The cause where radiance over power is one power of the index for all of transmission.
-
-    total  power of all lobes (N, channels); if it is 1 only once power has lost a factor, power is the wrong one
-    """
+    """The cause where radiance over power is one power of the index for all of transmission. If the power of all lobes,
+    `total` (N, channels), is 1 only without a factor, power is the wrong one of the two."""
     if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
         return ""
     ratio = radiance[usable].sum(1) / np.maximum(power[usable].sum(1), 1e-12)
@@ -207,7 +205,7 @@ def _power_of_index(
         return bool(np.all(np.abs(full - carried + scale * carried - 1.0) < 1e-3))
 
     for exponent, right, wrong in (
-        (0.0, "the factor 1 / eta^2 of radiance is missing", "power has the factor 1 / eta^2, which only radiance has"),
+        (0.0, "the factor 1 / eta^2 is missing", "power has the factor 1 / eta^2, which only radiance has"),
         (2.0, "the factor 1 / eta^2 is inverted", "the two modes are exchanged"),
         (-4.0, "the factor 1 / eta^2 is applied twice", "power has the factor eta^2, which no light has"),
     ):
@@ -257,7 +255,7 @@ def fresnel(probe: Probe) -> Misses:
     def against(curve: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         return {verb: _of_curve(carried[verb], c) for verb, c in (("reflects", curve), ("transmits", 1.0 - curve))}
 
-    exact, schlick = against(dielectric(cosine, ratio)), against(_schlick(cosine, ratio))
+    exact, schlick = against(dielectric(cosine, ratio)), against(schlick_curve(cosine, ratio))
     least = 1e-4 if subject.best == "float64" else 5e-3
     if any(max(off.max() for off, _ in curve.values()) < least for curve in (exact, schlick)):
         return
@@ -283,14 +281,6 @@ def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndar
     most = np.maximum(np.abs(value).max(0), 1e-6)
     expected = curve[:, None] * scale
     return (np.abs(value - expected) / most).max(1), expected
-
-
-def _schlick(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Schlick's curve, in the cosine on the side of the smaller index."""
-    r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
-    sin2 = (1.0 - cosine**2) / eta**2
-    outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cosine)
-    return np.where(sin2 >= 1.0, 1.0, r0 + (1.0 - r0) * (1.0 - outer) ** 5)
 
 
 def rotation(probe: Probe) -> Misses:

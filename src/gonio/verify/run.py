@@ -66,12 +66,11 @@ def verify(
 
     target    anything that `go.material` takes; or a target's name as `gonio verify` takes it; or a list of them
     vary      of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
-    quick     a fast first check
-    deep      more samples, more directions, more widths
+    quick     a fast first check; `deep` has more samples, more directions, more widths
     seed      of all random numbers, 1 if None; the same seed gives the same report
     law       a law's name, or several; all where None
-    output    folder for report.html and report.json; None writes nothing
-    junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
+    output    folder for report.html and report.json
+    junit     file for JUnit's XML; `sarif` one for SARIF
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
     tolerate  "invisible", "small" or "visible": failures of that grade and below do not fail the report
     progress  called with the steps done, all steps, and the name of the next

@@ -50,7 +50,7 @@ class Subject:
     model: Any
     target: str
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
-    drawn_by: Subject | None = dataclasses.field(default=None, repr=False, compare=False)
+    drawn_by: Subject | None = dataclasses.field(default=None, kw_only=True, repr=False, compare=False)
     memo: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
 
     # ------------------------------------------------------------------ facts
@@ -179,7 +179,7 @@ class Subject:
         """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""
         model = self.model
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
-        return Subject(changed, self.target, {**self.settings, **values}, self.drawn_by)
+        return Subject(changed, self.target, {**self.settings, **values}, drawn_by=self.drawn_by)
 
     def rebuilt(self) -> Subject | None:
         """A new object of the same BSDF, which has not been called; None where it cannot be made."""

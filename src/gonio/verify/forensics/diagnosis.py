@@ -146,7 +146,10 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
     if not inner:
         return None
     wrong = [one.target for one in inner if judge(law, one).status == FAIL]
-    sound = subject.with_sound_inside() if wrong else None
+    try:
+        sound = subject.with_sound_inside() if wrong else None
+    except GonioError:  # it takes no diffuse material
+        return None
     if sound is None or judge(law, sound).status == FAIL:
         return None
     return (

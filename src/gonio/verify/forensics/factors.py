@@ -269,3 +269,11 @@ def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
     plus = np.maximum(g + cosine, 1e-12)
     a, b = (g - cosine) / plus, (cosine * plus - 1.0) / (cosine * (g - cosine) + 1.0)
     return np.where(square > 0.0, 0.5 * a**2 * (1.0 + b**2), 1.0)
+
+
+def schlick_curve(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Schlick's curve, in the cosine on the side of the smaller index."""
+    r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
+    sin2 = (1.0 - cosine**2) / eta**2
+    outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cosine)
+    return np.where(sin2 >= 1.0, 1.0, r0 + (1.0 - r0) * (1.0 - outer) ** 5)
