@@ -25,7 +25,7 @@ TOPICS = {
     "Declare your own": "number spectrum width angle index choice flag file bsdf method never register "
     "Angle Colour Index Number Width Direction Mask Mode Pair Scalar Spectrum NDF Stretched Masking Fresnel Interface "
     "Integrator Law Panel ops",
-    "Render and look": "render resume study plot view compare explain info convert",
+    "Render and look": "render resume study report plot view compare explain info convert",
     "Energy and light": "albedo Albedo bake compensation fresnel indices refractive_index",
     "Measure and fit": "measure capture fit fit_picture compress check",
     "Shaders and laws": "emit Shader verify",

@@ -42,7 +42,7 @@ def test_quadrature_agrees_with_the_models_own_sampling(model):
 
 def test_bad_input_is_one_clear_error():
     with pytest.raises(go.InputError, match="a material expected"):
-        go.albedo("gold", 0.5)  # type: ignore[arg-type]
+        go.albedo(3, 0.5)  # type: ignore[arg-type]
     with pytest.raises(go.InputError, match="unknown method"):
         go.albedo(go.Lambert(), 0.5, method="guess")
     with pytest.raises(go.InputError, match="cosine"):

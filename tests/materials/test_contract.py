@@ -125,7 +125,7 @@ def test_mode_is_radiance_or_importance() -> None:
 
 @pytest.mark.parametrize("wo, wi, text", [
     (np.zeros((3, 2)), WI, r"eval: wo: an array of shape \(3, 2\), expected \(N, 3\)"),
-    (WO, np.zeros((2, 2, 3)), r"eval: wi: an array of shape \(2, 2, 3\)"),
+    (WO, np.zeros((2, 2, 4)), r"eval: wi: an array of shape \(2, 2, 4\)"),
     (WO, WI[:4], "4 and 7 rows given, the same number expected"),
     ("up", WI, "eval: wo: an array of shape"),
 ])  # fmt: skip

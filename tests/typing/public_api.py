@@ -347,6 +347,7 @@ photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
 assert_type(photographed.material, go.BSDF)
 print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)
 
+print(go.report("lab2.toml", pdf=True).output, go.report("examples/phong", study=["shapes.1.material.p=4,16"]).words)
 judged = go.check("E.png", "schlick-ibl")
 print(judged.passed)
 adopted = go.Shader("metal.glsl", roughness=0.3)

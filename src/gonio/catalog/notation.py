@@ -60,21 +60,27 @@ def named(
     return outside.probe(material), values
 
 
-def several(texts: Sequence[str], assignments: Sequence[str]) -> list[Settings]:
+def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = True) -> list[Settings]:
     """For each text the class and its settings: its own, and those of the shared ones that it has.
 
     assignments  "name=value" each, shared by all; raises InputError for one that no material has
+    nested       as in `shared`
     """
     named = [taken_apart(text) for text in texts]
-    return [(cls, {**given, **own}) for (cls, own), given in zip(named, shared(named, assignments), strict=True)]
+    return [
+        (cls, {**given, **own}) for (cls, own), given in zip(named, shared(named, assignments, nested), strict=True)
+    ]
 
 
-def shared(named: Sequence[Settings], assignments: Sequence[str]) -> list[dict[str, str]]:
-    """The subset of settings, "name=value" each, for each material; raises InputError for one that none has."""
+def shared(named: Sequence[Settings], assignments: Sequence[str], nested: bool = True) -> list[dict[str, str]]:
+    """The subset of settings, "name=value" each, for each material; raises InputError for one that none has.
+
+    nested  also for a material of which an inner one has the parameter
+    """
     wanted = dict(map(assignment, assignments))
     assigned, known = [], set()
     for cls, own in named:
-        fits = [name for name in wanted if _has(cls, {**wanted, **own}, name) or _inside(cls, {**own}, name)]
+        fits = [name for name in wanted if _has(cls, {**wanted, **own}, name) or (nested and _inside(cls, own, name))]
         assigned.append({name: wanted[name] for name in fits})
         known |= {*fits, *cls.parameters(), *(["preset"] if cls.presets() else [])}
     for name in wanted:

@@ -1,6 +1,7 @@
-"""Shader code generated from the models' Python source. `go.emit(model)` is `bundle.emit`."""
+"""Shader code generated from the models' Python source. `go.emit(model)` is `emission.emit`."""
 
-from .bundle import Bundle, bundle, emit
+from .bundle import Bundle, bundle
+from .emission import emit
 from .languages import Language
 from .placement import Placement
 

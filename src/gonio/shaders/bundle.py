@@ -54,40 +54,6 @@ class Bundle:
 
 
 @exclusive
-def emit(
-    model: MaterialLike | Sequence[MaterialLike],
-    lang: str = "glsl",
-    functions: Sequence[str] = ("eval", "pdf", "sample"),
-    *,
-    lean: bool = False,
-    constants: bool = False,
-    prefix: str = "",
-    group: int = 0,
-    first_binding: int = 0,
-) -> str:
-    """A material as shader code: eval, pdf, sample and the functions that they need.
-
-        print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
-
-    model          anything that `go.material` takes, such as "conductor(preset=Au)"; a list of them for a module
-                   that holds them all, with common functions once
-    lang           name of a language, such as "glsl"; `gonio.shaders.languages()` has all of them
-    functions      of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
-    lean           omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not
-                   a field. An eighth of the text of a default `openpbr` remains
-    constants      also write the material's own values, as a constant of its struct: Conductor_values
-    prefix         begins all global names, so that shaders written apart fit into one module
-    group          of the bindings of tables: WGSL's @group, HLSL's register space
-    first_binding  number of the first table's binding
-    Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
-    "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
-    Raises InputError for a stochastic material (RandomWalk), which has no shader code.
-    """
-    placement = Placement(prefix, group, first_binding)
-    return bundle(model, lang, functions, lean=lean, constants=constants, placement=placement).text
-
-
-@exclusive
 def bundle(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
@@ -98,7 +64,7 @@ def bundle(
     constants: bool = False,
     placement: Placement | None = None,
 ) -> Bundle:
-    """Shader, manifest and tables of a material, or of several in one module; arguments as in `emit`.
+    """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
 
     on         paths of weights that stay fields of a lean shader although they are switched off
     placement  prefix of the names, group and first number of the bindings

@@ -34,7 +34,8 @@ def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Nam
     shared = dict(map(notation.assignment, options))
     classes = [notation.taken_apart(target)[0] for target in targets]
     reached = {name for name in shared if any(_has(cls, name) for cls in classes)}
-    resolved = notation.several(targets, [f"{name}={value}" for name, value in shared.items() if name in reached])
+    own_ones = [f"{name}={value}" for name, value in shared.items() if name in reached]
+    resolved = notation.several(targets, own_ones, nested=False)
     made, notes, unclear = [], [], {}
     for target, (cls, settings) in zip(targets, resolved, strict=True):
         one = Named(outside.probe(notation.made(cls, settings)[0]), frozenset(_paths(cls, settings)))

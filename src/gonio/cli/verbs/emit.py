@@ -7,16 +7,13 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Argument, Option
 
 from .. import completion
 from ..options import Json, Material, output_option
 from .base import MATERIALS, verb
-
-if TYPE_CHECKING:
-    from ...shaders import Bundle, Placement
 
 SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
@@ -103,6 +100,8 @@ def emit(
     """
     from ... import files
     from ...shaders import Placement
+    from ...shaders.emission import Choice
+    from ...shaders.emission import shader as written_for
 
     folders = [Path(one) for one in output or () if one.endswith(SLASHES)]
     single = [Path(one) for one in output or () if not one.endswith(SLASHES)]
@@ -114,7 +113,10 @@ def emit(
         _write_pairs(made.texts(model), check, functions, single, folders)
         return
     at = Placement(place.prefix, place.group, place.first_binding)
-    shader = _shader(made.texts(model), lang, functions, short, at, lean, constants)
+    choice = Choice(functions, lean, constants, **vars(short))
+    shader, errors = written_for(made.texts(model), lang, choice, at)
+    for line in errors:
+        print(line, file=sys.stderr)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())
@@ -125,40 +127,6 @@ def emit(
         print("\n".join(written))
     else:
         sys.stdout.write(shader.text)
-
-
-def _shader(
-    models: list[str], lang: str, functions: str, short: Short, at: Placement, lean: bool, constants: bool
-) -> Bundle:
-    """The shader, with its measured errors on stderr if it is an approximation."""
-    from ...catalog import notation
-    from ...errors import InputError
-    from ...shaders import bundle, curves, tiers
-
-    if not (short.fit or short.ibl or short.budget):
-        return bundle(models, lang, functions, lean=lean, constants=constants, placement=at)
-    if len(models) != 1 or (short.fit and (short.ibl or short.budget)):
-        what = f"{len(models)} materials given" if len(models) != 1 else "--fit with --ibl or --budget"
-        raise InputError(
-            what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
-        )
-    if (lean or constants) and (short.fit or short.ibl):
-        what = f"{'--lean' if lean else '--constants'} with {'--fit' if short.fit else '--ibl'}"
-        raise InputError(what, "emit", "it goes with whole materials")
-    model = notation.named(models[0])[0]
-    if short.fit:
-        made, lines = curves.fitted(model, short.fit, lang, at)
-    elif short.ibl:
-        made, found = tiers.split_sum(model, lang, at, short.budget)
-        lines = [str(tier) for tier in found]
-    else:
-        model, found = tiers.cheapest(model, short.budget)
-        made, lines = (
-            bundle(model, lang, functions, lean=lean, constants=constants, placement=at),
-            [str(tier) for tier in found],
-        )
-    print("\n".join(lines), file=sys.stderr)
-    return made
 
 
 def _write_pairs(models: list[str], count: int, functions: str, single: list[Path], folders: list[Path]) -> None:

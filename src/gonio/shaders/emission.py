@@ -1,0 +1,101 @@
+"""`go.emit`: a material as shader code, exact or approximated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..catalog.material import MaterialLike, material
+from ..errors import InputError
+from ..owner import exclusive
+from . import curves, tiers
+from .bundle import Bundle, bundle
+from .placement import Placement
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What of a material is written; the fields are arguments of `emit`."""
+
+    functions: Sequence[str]
+    lean: bool = False
+    constants: bool = False
+    fit: str = ""
+    ibl: bool = False
+    budget: int = 0
+
+    @property
+    def approximates(self) -> bool:
+        return bool(self.fit or self.ibl or self.budget)
+
+    def check(self, count: int) -> None:
+        """Raise InputError for options that exclude each other, or more than one material."""
+        if count != 1 or (self.fit and (self.ibl or self.budget)):
+            what = f"{count} materials given" if count != 1 else "--fit with --ibl or --budget"
+            raise InputError(
+                what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
+            )
+        if (self.lean or self.constants) and (self.fit or self.ibl):
+            what = f"{'--lean' if self.lean else '--constants'} with {'--fit' if self.fit else '--ibl'}"
+            raise InputError(what, "emit", "it goes with whole materials")
+
+
+@exclusive
+def emit(
+    model: MaterialLike | Sequence[MaterialLike],
+    lang: str = "glsl",
+    functions: Sequence[str] = ("eval", "pdf", "sample"),
+    *,
+    lean: bool = False,
+    constants: bool = False,
+    prefix: str = "",
+    group: int = 0,
+    first_binding: int = 0,
+    fit: str = "",
+    ibl: bool = False,
+    budget: int = 0,
+) -> str:
+    """A material as shader code: eval, pdf, sample and the functions that they need.
+
+        print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
+
+    model          anything that `go.material` takes, such as "conductor(preset=Au)"; a list of them for a module
+                   that holds them all, with common functions once
+    lang           name of a language, such as "glsl"; `gonio.shaders.languages()` has all of them
+    functions      of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
+    lean           omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not
+                   a field. An eighth of the text of a default `openpbr` remains
+    constants      also write the material's own values, as a constant of its struct: Conductor_values
+    prefix         begins all global names, so that shaders written apart fit into one module
+    group          of the bindings of tables: WGSL's @group, HLSL's register space
+    first_binding  number of the first table's binding
+    fit            instead the albedos as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
+    ibl            instead the split sum of image-based lighting
+    budget         the most exact terms, table or fit within so many operations; 0 is no limit
+    Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
+    "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
+    Raises InputError for a stochastic material (RandomWalk), which has no shader code, and where `fit`, `ibl` and
+    `budget` exclude each other.
+    """
+    given = Choice(functions, lean, constants, fit, ibl, budget)
+    return shader(model, lang, given, Placement(prefix, group, first_binding))[0].text
+
+
+def shader(
+    models: MaterialLike | Sequence[MaterialLike], lang: str, choice: Choice, placement: Placement
+) -> tuple[Bundle, list[str]]:
+    """The shader, and lines on the measured errors of an approximation."""
+    lines: list[str] = []
+    if choice.approximates:
+        several = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
+        choice.check(len(several))
+        model = material(several[0])
+        if choice.fit:
+            return curves.fitted(model, choice.fit, lang, placement)
+        if choice.ibl:
+            made, found = tiers.split_sum(model, lang, placement, choice.budget)
+            return made, [str(tier) for tier in found]
+        models, found = tiers.cheapest(model, choice.budget)
+        lines = [str(tier) for tier in found]
+    made = bundle(models, lang, choice.functions, lean=choice.lean, constants=choice.constants, placement=placement)
+    return made, lines
