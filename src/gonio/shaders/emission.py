@@ -93,9 +93,9 @@ def shader(
         if choice.fit:
             return curves.fitted(model, choice.fit, lang, placement)
         if choice.ibl:
-            made, found = tiers.split_sum(model, lang, placement, choice.budget)
-            return made, [str(tier) for tier in found]
-        models, found = tiers.cheapest(model, choice.budget)
-        lines = [str(tier) for tier in found]
+            made, chosen = tiers.split_sum(model, lang, placement, choice.budget)
+            return made, [str(tier) for tier in chosen]
+        models, chosen = tiers.cheapest(model, choice.budget)
+        lines = [str(tier) for tier in chosen]
     made = bundle(models, lang, choice.functions, lean=choice.lean, constants=choice.constants, placement=placement)
     return made, lines

@@ -57,10 +57,10 @@ class Routines:
     bound: BSDF | None = None
     derives: str = ""  # name of the routine that computes derived values
 
-    def __init__(self, whole: graph.Graph, single: bool) -> None:
-        simplified = routines(whole, guarded=not single)
+    def __init__(self, graph_of_all: graph.Graph, single: bool) -> None:
+        simplified = routines(graph_of_all, guarded=not single)
         self.driver = simplified.pop()
-        functions_of = dict(zip((r.name for r in simplified), whole.functions, strict=False))
+        functions_of = dict(zip((r.name for r in simplified), graph_of_all.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
         self.entries: dict[str, Routine] = {}
         self._parameters: dict[tuple, Struct] = {}

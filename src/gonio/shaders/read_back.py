@@ -116,10 +116,10 @@ def _read(module: Module, made: Bundle, names: list[str], given: dict[str, Array
 
 
 def _one(module: Module, name: str) -> Any:
-    found = module.function(name)
-    if len(found) != 1:
-        raise InputError(f"{len(found)} functions '{name}' in the text", "shader")
-    return found[0]
+    entry = module.function(name)
+    if len(entry) != 1:
+        raise InputError(f"{len(entry)} functions '{name}' in the text", "shader")
+    return entry[0]
 
 
 def _called(machine: Machine, module: Module, function: Any, structs: list[Any], more: list[Any]) -> tuple[Any, ...]:

@@ -91,7 +91,7 @@ def joined(head: Sequence[str], declared: Sequence[Block], language: Language, p
     constants = [line for block in declared if block.kind == "constant" for line in block.lines]
     parts = [constants, *(block.lines for block in declared if block.kind != "constant")]
     lines = "\n\n".join("\n".join(part) for part in parts if part).split("\n")
-    return "\n".join([*head, "", *language.whole(lines, prefix)]) + "\n"
+    return "\n".join([*head, "", *language.finished(lines, prefix)]) + "\n"
 
 
 def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str]:

@@ -212,5 +212,5 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         dr.eval(sums, ends)
         parts.append(Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
-    seen = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    return [Seen(*[column[number :: len(rules)] for column in seen]) for number in range(len(rules))]
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return [Seen(*[column[number :: len(rules)] for column in columns]) for number in range(len(rules))]

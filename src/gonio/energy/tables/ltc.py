@@ -264,9 +264,9 @@ def _slopes(inverse: Array, wi: Array) -> tuple[Array, Array]:
 
 def _loss(inverse: Array, wi: Array, weight: Array, lobe: Array) -> Array:
     """int |f - D|^3 of each cell; infinite where W mirrors."""
-    turned = (inverse[:, 2] <= 0.0) | (inverse[:, 0] * inverse[:, 4] - inverse[:, 1] * inverse[:, 3] <= 0.0)
-    safe = np.where(turned[:, None], (1.0, 0.0, 1.0, 0.0, 1.0), inverse)
-    return np.where(turned, np.inf, np.sum(weight * np.abs(lobe - _density(safe, wi)) ** 3, axis=1))
+    inverted = (inverse[:, 2] <= 0.0) | (inverse[:, 0] * inverse[:, 4] - inverse[:, 1] * inverse[:, 3] <= 0.0)
+    safe = np.where(inverted[:, None], (1.0, 0.0, 1.0, 0.0, 1.0), inverse)
+    return np.where(inverted, np.inf, np.sum(weight * np.abs(lobe - _density(safe, wi)) ** 3, axis=1))
 
 
 def _fitted(wi: Array, weight: Array, lobe: Array, start: Array) -> tuple[Array, Array]:

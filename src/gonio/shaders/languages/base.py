@@ -103,7 +103,7 @@ class Language:
         """The lines of a struct with fields (type, name)."""
         return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
 
-    def whole(self, lines: Sequence[str], prefix: str) -> list[str]:
+    def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
         """All declarations, as the language needs them around."""
         return list(lines)
 

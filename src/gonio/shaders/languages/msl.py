@@ -59,7 +59,7 @@ class MSL(Language):
     def fetch(self, table: str, places: list[str]) -> str:
         return f"{table}.read(uint{len(places)}({', '.join(places)}), 0)"
 
-    def whole(self, lines: Sequence[str], prefix: str) -> list[str]:
+    def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
         """Everything inside a struct."""
         inside = [f"    {line}" if line else "" for line in lines]
         return [f"struct {prefix}Shader {{", *inside, "};"]

@@ -73,7 +73,7 @@ class TSL(Language):
     def fetch(self, table: str, places: list[str]) -> str:
         return f"{table}.load(ivec{len(places)}({', '.join(places)}))"
 
-    def whole(self, lines: Sequence[str], prefix: str) -> list[str]:
+    def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
         """With the imports of the names that occur."""
         text = "\n".join(lines)
         nodes, textures = (

@@ -140,8 +140,8 @@ def _transpose(emitter: Emitter, values: list[Value]) -> Value:
     type = values[0].type
     if type.kind != "matrix":
         raise emitter.error(f"transpose of {type}", "a matrix")
-    turned = Type("matrix", (vector(type.scalar, type.length),), type.parts[0].length)
-    return emitter.emit("Transpose", turned, values[0].id)
+    transposed = Type("matrix", (vector(type.scalar, type.length),), type.parts[0].length)
+    return emitter.emit("Transpose", transposed, values[0].id)
 
 
 def _determinant(emitter: Emitter, values: list[Value]) -> Value:
@@ -158,17 +158,17 @@ def _ldexp(emitter: Emitter, values: list[Value]) -> Value:
 
 
 def _modf(emitter: Emitter, values: list[Value]) -> Value:
-    number = emitter.settled(emitter.together(values, "modf", floats=True)[0])
-    whole = emitter.standard(3, number.type, number.id)
-    fraction = emitter.emit("FSub", number.type, number.id, whole.id)
+    number = emitter.with_concrete_type(emitter.together(values, "modf", floats=True)[0])
+    truncated = emitter.standard(3, number.type, number.id)
+    fraction = emitter.emit("FSub", number.type, number.id, truncated.id)
     type = Type("struct", name=f"modf of {number.type}")
     emitter.structs[type.name] = ("fract", "whole"), (number.type, number.type)
-    return emitter.emit("CompositeConstruct", type, fraction.id, whole.id)
+    return emitter.emit("CompositeConstruct", type, fraction.id, truncated.id)
 
 
 def bitcast(emitter: Emitter, type: Type, value: Value) -> Value:
     """bitcast<type>(value)."""
-    value = emitter.settled(value)
+    value = emitter.with_concrete_type(value)
     if not value.type.numbers or value.type.of(FLOAT) != type.of(FLOAT) or BOOL in (value.type.scalar, type.scalar):
         raise emitter.error(f"bitcast<{type}> of {value.type}", "32-bit numbers of one shape")
     if {value.type.scalar, type.scalar} <= {INT, UINT}:
@@ -185,7 +185,7 @@ def _texture(emitter: Emitter, name: str, values: list[Value]) -> Value:
         return emitter.emit("ImageQuerySize", shape, texture.id)
     if name == "textureLoad":
         _count(emitter, name, values, 3)
-        return emitter.emit("ImageFetch", color, texture.id, emitter.settled(values[1]).id)
+        return emitter.emit("ImageFetch", color, texture.id, emitter.with_concrete_type(values[1]).id)
     if len(values) not in (_MIPS[name], _MIPS[name] + 1):  # one more is an offset in texels
         raise emitter.error(f"{name} of {len(values)} values", f"it takes {_MIPS[name]}")
     if len(values) > _MIPS[name]:

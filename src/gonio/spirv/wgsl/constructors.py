@@ -18,8 +18,8 @@ def constructed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
         parts = emitter.structs[type.name][1] if type.kind == "struct" else type.parts * type.length
         if len(parts) != len(values):
             raise emitter.error(f"{len(values)} values for the {len(parts)} of {type}")
-        whole = [emitter.converted(value, part) for value, part in zip(values, parts, strict=True)]
-        return _composed(emitter, type, whole)
+        constituents = [emitter.converted(value, part) for value, part in zip(values, parts, strict=True)]
+        return _composed(emitter, type, constituents)
     if len(values) != 1 or not type.numbers or values[0].type.kind in ("vector", "matrix"):
         raise emitter.error(f"{type} of {', '.join(str(value.type) for value in values)}")
     if not values[0].type.numbers:

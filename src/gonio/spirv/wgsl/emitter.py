@@ -83,11 +83,11 @@ class Emitter:
         if not isinstance(number, tuple):
             key = type, repr(number)
             if key not in self._constants:
-                self._constants[key] = self._kept(number, type)
+                self._constants[key] = self._constant_id(number, type)
             return Value(self._constants[key], type)
-        return Value(self._kept(number, type), type)
+        return Value(self._constant_id(number, type), type)
 
-    def _kept(self, number: Number, type: Type) -> int:
+    def _constant_id(self, number: Number, type: Type) -> int:
         self.type_id(type)
         self._leaves += len(leaves(number))
         if self._leaves > MAX_CONSTANTS:
@@ -128,12 +128,12 @@ class Emitter:
         if all(id in self.module.constants for id in operands[first:last]):
             one = Instruction(name, self.type_id(type), self.fresh(), operands, self.line, self.where)
             return self.constant(self._machine.folded(one), type)
-        settled = [self._settled(id) for id in operands[first:last]]
-        return self.always(name, concrete(type), *operands[:first], *settled, *operands[last:])
+        with_concrete_type = [self._with_concrete_type(id) for id in operands[first:last]]
+        return self.always(name, concrete(type), *operands[:first], *with_concrete_type, *operands[last:])
 
-    def _settled(self, id: int) -> int:
+    def _with_concrete_type(self, id: int) -> int:
         """An operand whose type is not abstract."""
-        return self.settled(Value(id, self._abstract[id])).id if id in self._abstract else id
+        return self.with_concrete_type(Value(id, self._abstract[id])).id if id in self._abstract else id
 
     def standard(self, number: int, type: Type, *operands: int) -> Value:
         """A function of GLSL.std.450."""
@@ -177,7 +177,7 @@ class Emitter:
             return self.constant(_as(number, type), type)
         raise self.error(f"{what} of type {value.type} where {type} is expected", f"convert it: {type}(...)")
 
-    def settled(self, value: Value) -> Value:
+    def with_concrete_type(self, value: Value) -> Value:
         """A value whose type is not abstract."""
         return self.converted(value, concrete(value.type))
 
@@ -204,7 +204,7 @@ class Emitter:
         if common(source, scalar) == scalar:
             return self.converted(value, target)
         if source in (ABSTRACT_FLOAT, ABSTRACT_INT):
-            value = self.settled(value)
+            value = self.with_concrete_type(value)
             return self.cast(value, scalar)
         if scalar == BOOL:
             name = "FUnordNotEqual" if source == FLOAT else "INotEqual"

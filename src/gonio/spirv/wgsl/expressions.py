@@ -79,9 +79,9 @@ class Expressions:
     def _part(self, node: Expression) -> Value:
         """A name of a value, or a part of a value."""
         if isinstance(node, Name):
-            found = self._named(node)
-            assert isinstance(found, Value)
-            return found
+            named = self._named(node)
+            assert isinstance(named, Value)
+            return named
         if isinstance(node, Member):
             base = self.value(node.base)
             self.emitter.line = node.line
@@ -89,7 +89,7 @@ class Expressions:
         if isinstance(node, Index):
             base, index = self.value(node.base), self._index(node)
             number = self.emitter.known(index)
-            base = base if number is not None else self.emitter.settled(base)
+            base = base if number is not None else self.emitter.with_concrete_type(base)
             item = self._item(base.type)
             if number is not None:
                 return self.emitter.emit(
@@ -104,8 +104,8 @@ class Expressions:
         """The variable, or its part, that an expression names; None for values."""
         self.emitter.line = node.line
         if isinstance(node, Name):
-            found = self._named(node)
-            return found if isinstance(found, Place) else None
+            named = self._named(node)
+            return named if isinstance(named, Place) else None
         if isinstance(node, Unary) and node.sign == "*":
             return self._behind(self.value(node.inside))
         if not isinstance(node, Member | Index):
@@ -146,8 +146,8 @@ class Expressions:
 
     def loaded(self, place: Place) -> Value:
         """The value of a variable now."""
-        whole = self.emitter.always("Load", place.type, place.pointer)
-        return self._shuffled(whole, place.swizzle) if place.swizzle else whole
+        composite = self.emitter.always("Load", place.type, place.pointer)
+        return self._shuffled(composite, place.swizzle) if place.swizzle else composite
 
     def store(self, place: Place, value: Value) -> None:
         """Change a variable; of a swizzle its components."""
@@ -155,11 +155,11 @@ class Expressions:
             self.emitter.do("Store", place.pointer, self.emitter.converted(value, place.type).id)
             return
         value = self.emitter.converted(value, vector(place.type.scalar, len(place.swizzle)))
-        whole = self.emitter.always("Load", place.type, place.pointer)
+        composite = self.emitter.always("Load", place.type, place.pointer)
         for at, component in enumerate(place.swizzle):
             part = self.emitter.emit("CompositeExtract", place.type.scalar, value.id, at, literals=1)
-            whole = self.emitter.emit("CompositeInsert", place.type, part.id, whole.id, component, literals=1)
-        self.emitter.do("Store", place.pointer, whole.id)
+            composite = self.emitter.emit("CompositeInsert", place.type, part.id, composite.id, component, literals=1)
+        self.emitter.do("Store", place.pointer, composite.id)
 
     # ------------------------------------------------------------------ parts
 
@@ -167,15 +167,15 @@ class Expressions:
         for scope in reversed(self.scopes):
             if node.text in scope:
                 return scope[node.text]
-        found = self.names.value(self.unit, node.text, node.line)
+        named = self.names.value(self.unit, node.text, node.line)
         self.emitter.line = node.line
-        if found is None:
+        if named is None:
             known = [name for scope in self.scopes for name in scope] + list(self.unit.declarations)
             raise self.emitter.error(f"unknown name '{node.text}'", did_you_mean(node.text, known))
-        return found
+        return named
 
     def _index(self, node: Index) -> Value:
-        index = self.emitter.settled(self.value(node.index))
+        index = self.emitter.with_concrete_type(self.value(node.index))
         self.emitter.line = node.line
         if index.type not in (INT, UINT):
             raise self.emitter.error(f"an index of type {index.type}", "an integer: i32(...)")

@@ -51,17 +51,17 @@ class _Parser(Words):
     # ------------------------------------------------------------------ declarations
 
     def module(self) -> tuple[dict[str, Declaration], list[Assertion]]:
-        found: dict[str, Declaration] = {}
+        items: dict[str, Declaration] = {}
         assertions: list[Assertion] = []
         while self.word.kind != "end":
             one = self.declaration()
             if isinstance(one, Assertion):
                 assertions.append(one)
             elif one is not None:
-                if one.name in found:
+                if one.name in items:
                     raise refuse(f"'{one.name}' is declared twice", "rename one", f"{self.where}:{one.line}")
-                found[one.name] = one
-        return found, assertions
+                items[one.name] = one
+        return items, assertions
 
     def declaration(self) -> Declaration | Assertion | None:
         attributes = self.attributes()
@@ -96,12 +96,12 @@ class _Parser(Words):
         raise self.error("a declaration (fn, struct, var, const, override or alias)")
 
     def attributes(self) -> set[str]:
-        found = set()
+        items = set()
         while self.accept("@"):
-            found.add(self.name())
+            items.add(self.name())
             if self.word.text == "(":
                 self.arguments()
-        return found
+        return items
 
     def function(self, line: int, entry: bool) -> Function:
         name = self.name()
@@ -120,15 +120,15 @@ class _Parser(Words):
         return members
 
     def listed(self, end: str) -> list[Parameter]:
-        found = []
+        items = []
         while not self.accept(end):
             self.attributes()
             line, name = self.word.line, self.name()
             self.expect(":")
-            found.append(Parameter(line, name, self.type()))
+            items.append(Parameter(line, name, self.type()))
             if not self.accept(",") and not self.accept(";") and self.word.text != end:
                 raise self.error(f"',' or '{end}'")
-        return found
+        return items
 
     def declared(self, kind: str, line: int) -> Declared:
         space = ""
@@ -156,17 +156,17 @@ class _Parser(Words):
         return Name(line, name, self.list_of_type())
 
     def list_of_type(self) -> list[Expression]:
-        found: list[Expression] = []
+        items: list[Expression] = []
         if self.word.kind == "open":
             self.deeper()
             self.take()
             while self.word.kind != "close":
-                found.append(self.expression())
+                items.append(self.expression())
                 if not self.accept(",") and self.word.kind != "close":
                     raise self.error("',' or '>'")
             self.take()
             self.depth -= 1
-        return found
+        return items
 
     # ------------------------------------------------------------------ expressions
 
@@ -242,13 +242,13 @@ class _Parser(Words):
     def arguments(self) -> list[Expression]:
         self.deeper()
         self.expect("(")
-        found = []
+        items = []
         while not self.accept(")"):
-            found.append(self.expression())
+            items.append(self.expression())
             if not self.accept(",") and self.word.text != ")":
                 raise self.error("',' or ')'")
         self.depth -= 1
-        return found
+        return items
 
     # ------------------------------------------------------------------ statements
 
@@ -256,14 +256,14 @@ class _Parser(Words):
         self.attributes()
         self.deeper()
         line = self.expect("{").line
-        found: list[Statement] = []
+        items: list[Statement] = []
         while not self.accept("}"):
             if self.word.kind == "end":
                 raise self.error("'}'")
             if (one := self.statement()) is not None:
-                found.append(one)
+                items.append(one)
         self.depth -= 1
-        return Block(line, found)
+        return Block(line, items)
 
     def statement(self) -> Statement | None:
         self.attributes()
@@ -358,17 +358,17 @@ class _Parser(Words):
 
     def continuing(self) -> tuple[list[Statement], Expression | None]:
         self.expect("{")
-        found: list[Statement] = []
+        items: list[Statement] = []
         while not self.accept("}"):
             if self.word.text == "break" and self.words[self.at + 1].text == "if":
                 self.at += 2
                 until = self.expression()
                 self.expect(";")
                 self.expect("}")
-                return found, until
+                return items, until
             if (one := self.statement()) is not None:
-                found.append(one)
-        return found, None
+                items.append(one)
+        return items, None
 
     def switch(self, line: int) -> Switch:
         selector = self.expression()

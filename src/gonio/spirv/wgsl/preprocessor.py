@@ -93,7 +93,7 @@ def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preproces
     known, result = dict(defines), Preprocessed()
     conditions, lines, pending, start = _Conditions(known), [], "", 0
     for number, line in enumerate(text.split("\n"), 1):
-        place, kept = f"{where}:{number}", ""
+        place, expanded = f"{where}:{number}", ""
         match = _DIRECTIVE.match(line)
         if pending:
             pending += " " + line.split("//")[0]
@@ -104,11 +104,11 @@ def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preproces
         elif match is not None:
             _other(match[1], match[2].split("//")[0].strip(), known, result, place)
         else:
-            kept = _VALUE.sub(lambda one: _value(one, known, place), line) if "#" in line else line  # noqa: B023
+            expanded = _VALUE.sub(lambda one: _value(one, known, place), line) if "#" in line else line  # noqa: B023
         if pending and pending.count("{") <= pending.count("}"):
             _add(result, pending, start, f"{where}:{start}")
             pending = ""
-        lines.append(kept)
+        lines.append(expanded)
     if pending or conditions.stack:
         raise refuse("a directive without an end", "#endif, or }", f"{where}:{start or len(lines)}")
     result.text = "\n".join(lines)

@@ -95,19 +95,19 @@ class Sources:
                     match = _IMPORT_PATH.search(opened.read(1 << 16))
                 if match is not None:
                     self._files.setdefault(match[1], file)
-        found = self._files.get(path)
-        return found and self._small(found)
+        files = self._files.get(path)
+        return files and self._small(files)
 
     def _listed(self) -> list[Path]:
-        found: list[Path] = []
+        files: list[Path] = []
         for folder in self.folders:
             try:
                 entries = sorted(one for one in folder.iterdir() if one.suffix == ".wgsl")
             except OSError as error:
                 raise refuse(f"the folder '{folder}' cannot be read", str(error.strerror), "includes") from None
             inside = (one for one in entries if one.is_file() and one.resolve().is_relative_to(folder))
-            found += list(inside)[: MAX_FOLDER - len(found)]
-        return found
+            files += list(inside)[: MAX_FOLDER - len(files)]
+        return files
 
     def _small(self, file: Path) -> Path:
         if file.stat().st_size > MAX_TEXT:

@@ -96,14 +96,14 @@ class Body(Expressions):
                 if type is None:
                     raise self.emitter.error(f"var {node.name} without type and value")
                 value = self.emitter.zero(type)
-            value = self.emitter.settled(value)
+            value = self.emitter.with_concrete_type(value)
             pointer = self.emitter.variable(value.type)
             self.emitter.do("Store", pointer.id, value.id)
             self.scopes[-1][node.name] = Place(pointer.id, value.type)
             return
         if value is None or (node.kind == "const" and self.emitter.known(value) is None):
             raise self.emitter.error(f"{node.kind} {node.name} without a known value", "let")
-        self.scopes[-1][node.name] = value if node.kind == "const" else self.emitter.settled(value)
+        self.scopes[-1][node.name] = value if node.kind == "const" else self.emitter.with_concrete_type(value)
 
     def _assign(self, node: Assign) -> None:
         if node.target is None:
@@ -198,7 +198,7 @@ class Body(Expressions):
 
     def _switch(self, node: Switch) -> None:
         emitter = self.emitter
-        selector = emitter.settled(self.value(node.selector))
+        selector = emitter.with_concrete_type(self.value(node.selector))
         if selector.type not in (INT, UINT):
             raise emitter.error(f"switch on {selector.type}", "an integer")
         end = emitter.fresh()

@@ -45,14 +45,14 @@ class Token(NamedTuple):
 
 def tokens(text: str, where: str) -> list[Token]:
     """The words of a text. Raises InputError, with file and line, for other characters, and for too many words."""
-    found: list[Token] = []
+    result: list[Token] = []
     for token in _words(text, where):
-        found.append(token)
-        if len(found) > MAX_TOKENS:
+        result.append(token)
+        if len(result) > MAX_TOKENS:
             raise refuse(f"more than {MAX_TOKENS} words", "a shader is shorter", f"{where}:{token.line}")
-    _mark_lists(found)
-    line = found[-1].line if found else 1
-    return [*found, Token("end", "the end of the file", line)]
+    _mark_lists(result)
+    line = result[-1].line if result else 1
+    return [*result, Token("end", "the end of the file", line)]
 
 
 def _words(text: str, where: str) -> Iterator[Token]:
@@ -85,18 +85,18 @@ def _after_comment(text: str, at: int, where: str) -> tuple[int, int]:
     return at, lines
 
 
-def _mark_lists(found: list[Token]) -> None:
+def _mark_lists(result: list[Token]) -> None:
     """Mark the `<` and `>` that enclose lists of a type's arguments."""
     pending: list[tuple[int, int]] = []  # place of `<`, depth of brackets
     depth = 0
-    for place, token in enumerate(found):
+    for place, token in enumerate(result):
         text = token.text
-        if text == "<" and place and found[place - 1].kind == "name":
+        if text == "<" and place and result[place - 1].kind == "name":
             pending.append((place, depth))
         elif text == ">" and pending and pending[-1][1] == depth:
             start = pending.pop()[0]
-            found[start] = found[start]._replace(kind="open")
-            found[place] = token._replace(kind="close")
+            result[start] = result[start]._replace(kind="open")
+            result[place] = token._replace(kind="close")
         elif text in ("(", "["):
             depth += 1
         elif text in (")", "]", "&&", "||"):
@@ -104,7 +104,7 @@ def _mark_lists(found: list[Token]) -> None:
                 pending.pop()
             depth = max(0, depth - 1) if text in (")", "]") else depth
         elif text in (";", "{", ":") or (
-            text == "=" and not (found[place - 1].text == ">" and found[place - 1].joined)
+            text == "=" and not (result[place - 1].text == ">" and result[place - 1].joined)
         ):
             pending.clear()
             depth = 0

@@ -209,7 +209,7 @@ class _Translation:
         if one.type is not None:
             type = self._asked(unit, one.type)
         elif value is not None:
-            value = self.emitter.settled(value)
+            value = self.emitter.with_concrete_type(value)
             type = value.type
         else:
             raise self.emitter.error(f"var {one.name} without type and value")

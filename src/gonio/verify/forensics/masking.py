@@ -66,6 +66,6 @@ def _areas(ndf: object, alpha: tuple[float, float], wo: np.ndarray) -> tuple[np.
     solid = m[:, 2] ** 3 * alpha[0] * alpha[1] * np.tan(t) / np.cos(t) ** 2
     solid *= (angle[1] - angle[0]) * (phi[1] - phi[0])
     density = backend.to_numpy(ndf.D(backend.vector_of(m, 3, types), pair), len(m))  # type: ignore[attr-defined]
-    seen = np.maximum(wo @ m.T, 0.0) @ (np.asarray(density, float) * solid) / wo[:, 2]
+    projected = np.maximum(wo @ m.T, 0.0) @ (np.asarray(density, float) * solid) / wo[:, 2]
     stated = backend.to_numpy(ndf.Lambda(backend.vector_of(wo, 3, types), pair), len(wo))  # type: ignore[attr-defined]
-    return 1.0 + np.asarray(stated, float), seen
+    return 1.0 + np.asarray(stated, float), projected

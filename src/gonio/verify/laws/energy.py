@@ -184,11 +184,11 @@ class Energy(Law):
         coarse = dataclasses.replace(effort, accuracy=3e-4)
         for path, value in [*white.items()][:MOST_ALONE] if len(white) > 1 else ():
             try:
-                alone = subject.replace(**{path: value})
+                whitened = subject.replace(**{path: value})
             except InputError:
                 continue
-            alone = dataclasses.replace(alone, drawn_by=subject if subject.guided else None)
-            albedo, error = _quadrature(alone, wo[:: max(len(wo) // 4, 1)], coarse, seed)
+            whitened = dataclasses.replace(whitened, drawn_by=subject if subject.guided else None)
+            albedo, error = _quadrature(whitened, wo[:: max(len(wo) // 4, 1)], coarse, seed)
             gain = float((albedo - error).max() - 1.0)
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}

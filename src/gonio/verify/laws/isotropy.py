@@ -145,7 +145,7 @@ def _spread(subject: Subject) -> tuple[float, float, float]:
     # d omega = sin theta d theta d phi, and geometric steps in theta carry a factor theta
     light = value * np.sin(t) * t
     moment = light * np.sin(t) ** 2
-    along, across = (float(np.sum(moment * turned(p - phi0) ** 2)) for turned in (np.cos, np.sin))
+    along, across = (float(np.sum(moment * harmonic(p - phi0) ** 2)) for harmonic in (np.cos, np.sin))
     return along, across, (along + across) / max(float(np.sum(light)), 1e-30)
 
 

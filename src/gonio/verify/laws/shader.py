@@ -53,11 +53,11 @@ class Shader(Law):
         except InputError as error:
             raise DoesNotApply(f"no shader code: {error.what}") from error
         try:
-            found = read_back.difference(model, made, *inputs)
+            figures = read_back.difference(model, made, *inputs)
         except GonioError as error:
             finding.problems.append(f"{language} cannot be read back: {error.what} ({error.where})")
             return
-        worst = max(found, key=lambda one: one.figure)
+        worst = max(figures, key=lambda one: one.figure)
         if worst.figure > finding.figure or not finding.worst:
             finding.figure = max(finding.figure, worst.figure)
             wo, wi, u = (rows[worst.row] for rows in inputs)
