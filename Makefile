@@ -50,8 +50,8 @@ browser: .venv/installed
 	|| $(BIN)/playwright install chromium \
 	|| echo "NO BROWSER could be found or installed: tests in WebGL and WebGPU will be skipped, nothing is tried there" >&2
 
-# two processes, each with files of its own: Python traces kernels on one core, whatever Dr.Jit does with the others
-PARALLEL := -n 2 --dist loadfile
+# three processes on two cores, each with files of its own: a browser, a server or a child is often waited for
+PARALLEL := -n 3 --dist loadfile
 
 # formulas, tables, shader text, files and scenes, two cases of each test: what one runs while editing
 UNIT := tests/bridge tests/catalog tests/energy tests/materials tests/measure tests/ops tests/optics tests/shaders \

@@ -73,6 +73,7 @@ def test_nothing_is_defined_and_not_used(name: str) -> None:
             assert len(re.findall(rf"\b{local}\b", body)) > 1, f"{function}: {local}"
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", [n for n in COMPENSATED if "turquin" not in n])
 def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) -> None:
     made = bundle(COMPENSATED[name])
