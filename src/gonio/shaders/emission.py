@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..catalog.material import MaterialLike, material
 from ..errors import InputError
-from ..owner import exclusive
+from ..owner import public
 from . import curves, tiers
 from .bundle import Bundle, bundle
 from .placement import Placement
@@ -40,7 +40,7 @@ class Choice:
             raise InputError(what, "emit", "it goes with whole materials")
 
 
-@exclusive
+@public
 def emit(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
