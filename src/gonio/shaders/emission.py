@@ -17,7 +17,7 @@ from .placement import Placement
 class Choice:
     """What of a material is written; the fields are arguments of `emit`."""
 
-    functions: Sequence[str]
+    functions: str | Sequence[str]
     lean: bool = False
     constants: bool = False
     fit: str = ""
@@ -44,7 +44,7 @@ class Choice:
 def emit(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
-    functions: Sequence[str] = ("eval", "pdf", "sample"),
+    functions: str | Sequence[str] = ("eval", "pdf", "sample"),
     *,
     lean: bool = False,
     constants: bool = False,
