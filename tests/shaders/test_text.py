@@ -153,7 +153,7 @@ def test_unknown_languages_functions_and_things_are_refused() -> None:
 
 def test_what_cannot_be_a_shader_is_refused_with_one_clear_error() -> None:
     for refused, words in [
-        (lambda: go.emit(GOLD, functions=3), "functions: 3 given"),  # type: ignore[arg-type]
+        (lambda: go.emit(GOLD, functions=3), "3 given, names of functions expected"),  # type: ignore[arg-type]
         (lambda: go.emit(GOLD, functions=()), "no function given"),
         (lambda: go.emit(GOLD, functions=" , "), "no function given"),
         (lambda: go.emit(GOLD, ["glsl"]), "unknown language"),  # type: ignore[arg-type]
