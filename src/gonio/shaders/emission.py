@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..arguments import shown
 from ..catalog.material import MaterialLike, material
 from ..errors import InputError
-from ..owner import exclusive
+from ..owner import public
 from . import curves, tiers
 from .bundle import Bundle, bundle
 from .placement import Placement
@@ -27,9 +26,6 @@ class Choice:
 
     @property
     def approximates(self) -> bool:
-        for name, kind in (("fit", str), ("ibl", bool), ("budget", int)):
-            if not isinstance(value := getattr(self, name), kind):
-                raise InputError(f"{shown(value)} given, {kind.__name__} expected", f"emit: {name}")
         return bool(self.fit or self.ibl or self.budget)
 
     def check(self, count: int) -> None:
@@ -44,7 +40,7 @@ class Choice:
             raise InputError(what, "emit", "it goes with whole materials")
 
 
-@exclusive
+@public
 def emit(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
