@@ -112,7 +112,9 @@ def axes(subject: Subject) -> list[Axis]:
             low = max(low, min(MIN_ALBEDO, high))
         if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
             low += MARGIN * (high - low)
-        axes_.append(Axis(leaf.path, low, high, ratio, leaf.parameter.kind))
+        # fitted widths and powers are spectra too, but no colors
+        color = leaf.parameter.kind == "spectrum" and leaf.parameter.high <= 1.0
+        axes_.append(Axis(leaf.path, low, high, ratio, "color" if color else leaf.parameter.kind))
     return axes_
 
 
@@ -194,11 +196,11 @@ WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # of the two axes, as shares of a range
 
 def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
     """Saturated values of all colors together, the channels of each in another order."""
-    spectra = [axis for axis in along if axis.kind == "spectrum"]
+    colors = [axis for axis in along if axis.kind == "color"]
     return [
-        {axis.path: _plain([float(axis.at(s)) for s in np.roll(shares, k)]) for k, axis in enumerate(spectra)}
+        {axis.path: _plain([float(axis.at(s)) for s in np.roll(shares, k)]) for k, axis in enumerate(colors)}
         for shares in COLORS
-        if spectra
+        if colors
     ]
 
 
