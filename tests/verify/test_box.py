@@ -93,6 +93,12 @@ def test_colors_and_unequal_widths_are_tried() -> None:
     assert "unequal widths" in box.covered(subject.of(go.Conductor(alpha=0.3)), places)
 
 
+def test_a_fitted_width_of_each_channel_is_no_color() -> None:
+    places = box.places(subject.of(go.model("shifted-gamma")()), EFFORTS["deep"], 1)
+    colored = {path for place in places if place.why == "color" for path in place.values}
+    assert colored == {"diffuse"}
+
+
 def test_the_larger_of_two_exponents_is_the_narrower() -> None:
     report = verify(go.AshikhminShirley(), quick=True, law="isotropy")
     assert report.passed, str(report)
