@@ -267,6 +267,15 @@ def test_a_spectral_render_leaves_the_variant_as_it_was(tmp_path: Path) -> None:
     assert mi.variant() == "llvm_ad_rgb"
 
 
+def test_a_render_leaves_the_variant_of_a_program_as_it_was() -> None:
+    mi.set_variant("llvm_ad_spectral")
+    try:
+        go.render(go.Lambert(), spp=1, size=(4, 4))
+        assert mi.variant() == "llvm_ad_spectral"
+    finally:
+        mi.set_variant("llvm_ad_rgb")
+
+
 def test_a_material_is_shown_on_a_ball_by_wavelengths_too() -> None:
     glass = go.Dielectric(eta="sf11", alpha=0.05)
     pictures = [np.asarray(go.render(glass, spp=64, size=(24, 24), spectral=s), float) for s in (False, True)]

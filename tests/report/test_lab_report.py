@@ -203,3 +203,9 @@ def test_without_a_browser_the_error_says_what_to_do(monkeypatch: pytest.MonkeyP
     with pytest.raises(go.MachineError) as error:
         printing.browser()
     assert "report.html" in error.value.hint
+
+
+def test_a_refused_report_leaves_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        go.report("lambert", study=["nothing=1,2"], output=tmp_path / "report")
+    assert not (tmp_path / "report").exists()

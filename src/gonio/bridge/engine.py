@@ -120,8 +120,8 @@ def using(variant: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
-    """Restore the variant after the block if a spectral one was set in it (RGB on the same device if none was set
-    before): the rest of a program expects three colors."""
+    """Restore the variant after the block. If none was set before, a spectral one becomes RGB on the same device: the
+    rest of a program expects three colors."""
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
     try:
@@ -129,5 +129,5 @@ def put_back() -> Iterator[None]:
     finally:
         mi = sys.modules.get("mitsuba")
         now = mi and mi.variant()
-        if mi and now and now != before and "spectral" in now:
+        if mi and now and now != before and (before or "spectral" in now):
             mi.set_variant(before or "_".join([*now.split("_")[:2], "rgb"]))

@@ -117,7 +117,6 @@ def write(
     text = _read(text_file)
     if text is not None:
         words.check_references(text, folder, {*names, words.SETTINGS}, options.allow_outside)
-    (folder / words.FOLDER).mkdir(parents=True, exist_ok=True)
     making = Making(options, folder / words.FOLDER, tell)
     with contextlib.chdir(content.folder):
         facts, unchanged = _make(content, names, making, step)
@@ -176,6 +175,7 @@ def _make(
         step(0, total, f"checking {name}")
         with _located(location):
             identities.append(figure.identity(making))
+    making.folder.mkdir(parents=True, exist_ok=True)  # a refused report leaves nothing behind
     before = _made_before(making.folder)
     facts: list[Facts] = []
     unchanged = 0
