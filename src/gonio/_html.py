@@ -19,6 +19,6 @@ _ID = re.compile(r'(id="|url\(#|href="#)([A-Za-z]+[0-9a-f]{10})(?=["\)])')
 
 
 def numbered_ids(svg: str) -> str:
-    """Matplotlib's SVG with its ids numbered in order of appearance; Matplotlib derives some of them from memory addresses."""
+    """An SVG of Matplotlib's with its ids numbered in order of appearance; some are derived from memory addresses."""
     numbers: dict[str, int] = {}
     return _ID.sub(lambda id: f"{id[1]}i{numbers.setdefault(id[2], len(numbers))}", svg)
