@@ -44,6 +44,15 @@ def square(x: float, seconds: float = 0.0) -> dict[str, np.ndarray]:
     return {"x": np.array([x * x]), "pid": np.array([os.getpid()])}
 
 
+def meet(x: float, folder: str) -> dict[str, np.ndarray]:
+    """A part that ends once another process, too, has begun one: the second worker may start late."""
+    (Path(folder) / str(os.getpid())).touch()
+    until = time.monotonic() + 120.0
+    while len(os.listdir(folder)) < 2 and time.monotonic() < until:
+        time.sleep(0.02)
+    return square(x)
+
+
 def refuse(x: float) -> dict[str, np.ndarray]:
     raise InputError(f"{x} given", "x", "give another")
 
@@ -61,9 +70,9 @@ def done(function: executor.Function, arguments: list[tuple[object, ...]]) -> di
     return {index: found for index, found in executor.each(function, arguments) if index >= 0}
 
 
-def test_parts_are_done_by_all_and_each_is_done(two: Cluster) -> None:
+def test_parts_are_done_by_all_and_each_is_done(two: Cluster, tmp_path: Path) -> None:
     with executor.using(two):
-        found = done(square, [(x, 0.05) for x in range(20)])
+        found = done(meet, [(x, str(tmp_path)) for x in range(20)])
     assert [float(found[i]["x"][0]) for i in range(20)] == [x * x for x in range(20)]
     assert len({int(one["pid"][0]) for one in found.values()} - {os.getpid()}) == 2
 
