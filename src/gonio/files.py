@@ -7,7 +7,6 @@ import errno
 import os
 import shutil
 import stat
-import tempfile
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -180,6 +179,8 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 
     elsewhere  not beside the target: its disk is full
     """
+    import tempfile  # its import takes 2 ms, and this is rarely needed
+
     places: list[Callable[[], str | Path]] = [lambda: target.parent, Path.cwd, tempfile.gettempdir]
     for place in places[1:] if elsewhere else places:
         folder = None

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.abc
 import importlib.machinery
 import sys
 import warnings
@@ -124,15 +123,18 @@ def new_name(name: str) -> str:
     return f"{parent}.{tail}" if parent else ""
 
 
-class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds moved modules; it is asked last, for names that no other finder knows."""
+class _Finder:
+    """Finds moved modules; it is asked last, for names that no other finder knows.
+
+    Not derived from the base classes in `importlib.abc`, whose import would take a sixth of that of Gonio.
+    """
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
         if not name.startswith("gonio.") or not new_name(name):
             return None
-        return importlib.machinery.ModuleSpec(name, self, is_package=True)
+        return importlib.machinery.ModuleSpec(name, self, is_package=True)  # type: ignore[arg-type]
 
     def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
         """The module at its new path, registered under both names."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
 
@@ -31,9 +32,14 @@ def samples_option(text: str) -> OptionInfo:
     return Option("--samples", metavar="N", help=text)
 
 
+@cache
+def _declared() -> dict[str, object]:
+    return get_type_hints(RenderOptions, include_extras=True)
+
+
 def render_option(name: str) -> OptionInfo:
     """An option of `RenderOptions`, with its help text."""
-    kind, shown = get_args(get_type_hints(RenderOptions, include_extras=True)[name])
+    kind, shown = get_args(_declared()[name])
     flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
     return Option(*flag, metavar=shown.metavar or None, help=shown.help)
 
@@ -200,8 +206,7 @@ class Rendering(RenderOptions):
 
 # size and exposure are read by `request`, whose errors say more than Typer's
 _TEXTS: dict[str, object] = {"size": str | None, "exposure": str}
-_TYPES = get_type_hints(RenderOptions)
 Rendering.__annotations__ = {
-    field.name: Annotated[_TEXTS.get(field.name, _TYPES[field.name]), render_option(field.name)]
+    field.name: Annotated[_TEXTS.get(field.name, get_args(_declared()[field.name])[0]), render_option(field.name)]
     for field in fields(RenderOptions)
 }

@@ -20,7 +20,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, TypeAlias, dataclass_transform, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, dataclass_transform, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,7 @@ from ..errors import InputError, did_you_mean
 from ..members import Family, subclasses_of
 from ..ops import Direction, Mask, Mode, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
-from . import binding, equality, guide_search, notebook, recording, tree
+from . import binding, equality, notebook, recording, tree
 from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
 from .constructing import accepted, with_pair
@@ -39,6 +39,9 @@ from .former_names import add_former_names, move_former_names
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .polarization import Polarized
 from .sample import Sample
+
+if TYPE_CHECKING:
+    from .guide import Guide
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
 
@@ -128,7 +131,7 @@ class BSDF(Material):
 
         The default, if `sample` is not defined either, is the density of a guide (`gonio.material.guide`).
         """
-        return guide_search.guide_of(self.plain).pdf(self, wo, wi)
+        return _guide(self).pdf(self, wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
@@ -137,7 +140,7 @@ class BSDF(Material):
         u  three numbers in [0, 1) per ray, (N, 3): the first selects the lobe, the others the direction
         The default uses a guide computed from `eval`.
         """
-        wi = guide_search.guide_of(self.plain).draw(self, wo, u)
+        wi = _guide(self).draw(self, wo, u)
         return self._weighted(wo, wi, mode)
 
     def sample_cosine(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
@@ -395,6 +398,13 @@ def _folders() -> list[str]:
 
 add_former_names(BSDF)
 BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), where="model")
+
+
+def _guide(material: BSDF) -> Guide:
+    """The guide of a material that defines `eval` alone."""
+    from . import guide_search  # only such a material needs it, and it costs 10 ms
+
+    return guide_search.guide_of(material.plain)
 
 
 def _check_pair(cls: type[BSDF]) -> None:

@@ -19,7 +19,7 @@ from . import tree
 from .guide import Axis, Guide
 from .guide_charts import MIN_LIGHT, Slices, named
 from .guide_probe import Guided, alike, depends_on_azimuth, probe
-from .guide_versions import plain_values, varying_parameters, version
+from .guide_versions import varying_parameters, version
 from .parameters import Material
 
 AZIMUTHS = 16  # of wo, if `eval` is not invariant under rotation
@@ -32,7 +32,7 @@ def guide_of(material: Material) -> Guide:
     """The cached guide of an unbound material; raises InputError if it must be computed while a loop is recorded."""
     own = vars(material).get("_guide")
     if own is None:
-        plain = plain_values(material)
+        plain = tree.plain_values(material)
         guides = _cached(type(material))
         if plain not in guides:
             guides[plain] = find(plain)

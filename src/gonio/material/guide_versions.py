@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import ops
-from ..ops import Scalar, backend, fetch
+from ..ops import Scalar, fetch
 from . import tree
 from .guide import Axis
 from .guide_charts import MIN_LIGHT, Chart, Slices, named
@@ -48,18 +48,6 @@ class _Varying:
             return ops.sqrt(share) if self.kind == "alpha" else share
 
         return Axis(read, count)
-
-
-def plain_values(material: Any) -> Any:
-    """The material with NumPy arrays in place of Dr.Jit's."""
-    values: dict[str, Value] = {}
-    for leaf in tree.leaves(material):
-        parts = pair_of(leaf.value) if leaf.parameter.kind == "alpha" else (leaf.value,)
-        if leaf.parameter.numeric and any(map(backend.is_drjit, parts)):
-            columns = [np.asarray(backend.to_numpy(backend.drjit().detach(p), 1)) for p in parts]
-            one = [float(c[0]) if c.shape == (1,) else c[0] if c.shape == (1, 3) else c for c in columns]
-            values[leaf.path] = one[0] if len(one) == 1 else tuple(one)
-    return tree.replace(material, values) if values else material
 
 
 def _ends(parameter: Parameter, value: Value) -> tuple[float, float] | None:

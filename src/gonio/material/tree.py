@@ -11,8 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Generic, NamedTuple, TypeVar
 
+import numpy as np
+
 from ..errors import InputError, did_you_mean
-from .parameters import Material, Parameter, Value
+from ..ops import backend
+from .parameters import Material, Parameter, Value, pair_of
 
 M = TypeVar("M", bound=Material)
 
@@ -125,3 +128,15 @@ def _known(material: Material, name: str, location: str) -> str:
 def rebuild_from(cls: type[M], values: Mapping[str, object]) -> M:
     """A material from its class and values, as unpickling calls it."""
     return cls(**values)
+
+
+def plain_values(material: M) -> M:
+    """The material with NumPy arrays in place of Dr.Jit's."""
+    values: dict[str, Value] = {}
+    for leaf in leaves(material):
+        parts = pair_of(leaf.value) if leaf.parameter.kind == "alpha" else (leaf.value,)
+        if leaf.parameter.numeric and any(map(backend.is_drjit, parts)):
+            columns = [np.asarray(backend.to_numpy(backend.drjit().detach(p), 1)) for p in parts]
+            one = [float(c[0]) if c.shape == (1,) else c[0] if c.shape == (1, 3) else c for c in columns]
+            values[leaf.path] = one[0] if len(one) == 1 else tuple(one)
+    return replace(material, values) if values else material

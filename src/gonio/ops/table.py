@@ -59,7 +59,7 @@ def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
     cells, places = [], []
     for x, count in zip(points, table.shape, strict=True):
         at = np.clip(x * count - 0.5, 0.0, count - 1.0)
-        cell = np.minimum(at.astype(int), max(count - 2, 0))
+        cell = np.minimum(np.nan_to_num(at).astype(int), max(count - 2, 0))  # NaN stays in `at`: the value is NaN
         cells.append(cell)
         places.append(at - cell)
     total = np.zeros((*points[0].shape, table.channels))
@@ -77,5 +77,5 @@ def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
 def fetch_in_numpy(table: Table, *places: object) -> np.ndarray:
     """Every channel, channels first, of the texels at integer coordinates: `ops.fetch` in NumPy float64."""
     points = np.broadcast_arrays(*[np.asarray(x, dtype=float) for x in places])
-    index = tuple(np.clip(x, 0, n - 1).astype(int) for x, n in zip(points, table.shape, strict=True))
+    index = tuple(np.nan_to_num(np.clip(x, 0, n - 1)).astype(int) for x, n in zip(points, table.shape, strict=True))
     return np.moveaxis(table.values[index], -1, 0)

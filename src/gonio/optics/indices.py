@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import index_database
 from .dispersion import (
     ALL,
     VISIBLE,
@@ -81,7 +80,9 @@ def _glass(low: float, high: float, *terms: tuple[float, float]) -> Sellmeier:
     return Sellmeier(low, high, terms)
 
 
+@functools.cache
 def _constants() -> dict[str, OpticalConstants]:
+    """The substances by name. They are read when one is asked for."""
     tables, schott = _measured(), "Schott2017"
     media = {
         "vacuum": ("vacuum", Constant(*ALL, 1.0), "by definition"),
@@ -137,13 +138,14 @@ def _constants() -> dict[str, OpticalConstants]:
     return substances | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
 
 
-_CONSTANTS = _constants()
-MEDIA = {name: constants for name, constants in _CONSTANTS.items() if name not in METALS}
+def media() -> dict[str, OpticalConstants]:
+    """The transparent substances by name."""
+    return {name: optical for name, optical in _constants().items() if name not in METALS}
 
 
 def indices() -> Mapping[str, OpticalConstants]:
     """Refractive indices by name: transparent media, and metals by symbol, each with range and source."""
-    return MappingProxyType(_CONSTANTS)
+    return MappingProxyType(_constants())
 
 
 def refractive_index(
@@ -171,15 +173,17 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
     if not isinstance(name, str):
         raise InputError(f"{name!r} given, the name of a substance expected", location, "see go.indices()")
     text = name.strip()
-    known = {key.lower(): key for key in _CONSTANTS} | {metal.name: key for key, metal in METALS.items()}
+    known = {key.lower(): key for key in _constants()} | {metal.name: key for key, metal in METALS.items()}
     if text.lower() in known:
-        return _CONSTANTS[known[text.lower()]]
+        return _constants()[known[text.lower()]]
+    from . import index_database  # rarely used, and costs 3 ms
+
     if text.startswith(index_database.PREFIX):
         return index_database.read(text, location)
     formula = re.fullmatch(r"(\w+)\s*\((.*)\)", text, re.DOTALL)
     if formula and formula[1] in ("cauchy", "sellmeier"):
         return _formula(text, formula[1], formula[2], location)
-    spelled = [*_CONSTANTS, *(metal.name for metal in METALS.values()), "cauchy(a, b)", "sellmeier(b1, c1)"]
+    spelled = [*_constants(), *(metal.name for metal in METALS.values()), "cauchy(a, b)", "sellmeier(b1, c1)"]
     raise InputError(f"unknown refractive index '{name}'", location, did_you_mean(text, spelled))
 
 

@@ -246,5 +246,5 @@ def returned_less(
     less = []
     for n, (E, one, w, row) in enumerate(zip(E_of, transmitted, facets, rows, strict=True)):
         cos = (n / (HATS - 1.0)) ** 2 + zeros_like(rough)
-        less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
+        less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.means()[n])
     return total_of(less)

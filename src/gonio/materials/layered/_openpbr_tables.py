@@ -155,8 +155,10 @@ def _hats(x: np.ndarray) -> np.ndarray:
     return weights[:, 1:-1]
 
 
-# cosine-weighted means of values at those nodes
-MEANS: list[float] = _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
+@lru_cache
+def means() -> list[float]:
+    """The weights of cosine-weighted means of values at those nodes."""
+    return _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
 # --------------------------------------------------------------------------- any reflectance
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from ... import ops
 from ...energy.albedo.directional import albedo
 from ...errors import InputError
-from ...material import BSDF, guide_search, tree
+from ...material import BSDF, tree
 from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, Table, backend
 from ...ops.backend import Array
@@ -102,7 +102,7 @@ def tables_of(coat: BSDF) -> LayerTables:
     """The cached tables of an unbound coat. Raises InputError if they must be computed while Dr.Jit records a loop."""
     own = vars(coat).get("_layer_tables")
     if own is None:
-        key = _bright(guide_search.plain_values(coat))
+        key = _bright(tree.plain_values(coat))
         if key not in _cache:
             if backend.drjit().flag(backend.drjit().JitFlag.SymbolicScope):
                 what = f"the interior of {type(coat).__name__} cannot be computed while a loop is recorded"

@@ -80,7 +80,7 @@ class Dielectric(microfacet._Microfacet):
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
         """Transparent media by name: eta."""
-        media = indices.MEDIA.items()
+        media = indices.media().items()
         return {name: Preset(m.title, {"eta": indices.DispersiveIndex(m)}, m.source) for name, m in media}
 
     @function

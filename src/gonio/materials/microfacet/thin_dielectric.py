@@ -55,7 +55,7 @@ class ThinDielectric(BSDF):
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
         """Transparent media by name: eta, for sodium light; a sheet sends all wavelengths the same way."""
-        return {name: Preset(m.title, {"eta": m.sodium}, m.source) for name, m in indices.MEDIA.items()}
+        return {name: Preset(m.title, {"eta": m.sodium}, m.source) for name, m in indices.media().items()}
 
     @function
     def reflectance(self, cos: Scalar) -> Scalar:
