@@ -3,11 +3,23 @@
     my.glsl                 read by its adapter my.glsl.toml, or by names of functions and arguments (`adapter`)
     disney.brdf             parameters and shader in one file (`explorer`)
 
-A shader cannot run code on the machine: its instructions are carried out by `gonio.spirv`.
+A shader cannot run code on the machine: its instructions are carried out by `gonio.spirv`. The readers are loaded by
+the first shader.
 """
 
-from .adoption import adopt as adopt
-from .files import SUFFIXES as SUFFIXES
-from .files import Shader as Shader
-from .files import class_of as class_of
-from .files import names_shader as names_shader
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from .names import SUFFIXES as SUFFIXES
+from .names import names_shader as names_shader
+
+if TYPE_CHECKING:
+    from .adoption import adopt as adopt
+    from .files import Shader as Shader
+    from .files import class_of as class_of
+else:
+
+    def __getattr__(name: str) -> object:
+        if name in ("adopt", "Shader", "class_of"):
+            return getattr(import_module(".adoption" if name == "adopt" else ".files", __name__), name)
+        raise AttributeError(f"module 'gonio.catalog.shaders' has no attribute '{name}'")

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from ...errors import InputError
 from .adapter import Adapter
-from .files import bounds, names_shader, read
+from .files import bounds, read
+from .names import names_shader
 from .program import Program
 
 

@@ -28,28 +28,12 @@ from .adapter import Adapter
 from .material import _SampledShaderFile, _ShaderFile
 from .program import Declared, Program
 
-SUFFIXES = (".glsl", ".frag", ".hlsl", ".wgsl", ".spv", ".brdf")
 _LANGUAGES = {".hlsl": "hlsl", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
 MAX_TABLE = 1 << 28
 MAX_CLASSES = 64  # in memory
 # parameters whose names say that they lie in [0, 1]
 _UNIT = re.compile(r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.I)
-
-
-def names_shader(text: str) -> bool:
-    """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
-    path = Path(os.path.expanduser(text.strip()))
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES or "\0" in text:
-        return False
-    if suffix != ".brdf":
-        return True
-    try:
-        with path.open("rb") as file:
-            return explorer.is_explorer(file.read(1 << 16).decode("utf-8", "replace"))
-    except OSError:
-        return False
 
 
 def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:

@@ -160,6 +160,7 @@ def means() -> list[float]:
     """The weights of cosine-weighted means of values at those nodes."""
     return _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
+
 # --------------------------------------------------------------------------- any reflectance
 
 # Gauss nodes for the cosine of facets at which a reflectance is evaluated; between them it is a polynomial

@@ -1,0 +1,25 @@
+"""Which texts name a shader. This is asked of every material, so it must not load the readers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+SUFFIXES = (".glsl", ".frag", ".hlsl", ".wgsl", ".spv", ".brdf")
+
+
+def names_shader(text: str) -> bool:
+    """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
+    path = Path(os.path.expanduser(text.strip()))
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES or "\0" in text:
+        return False
+    if suffix != ".brdf":
+        return True
+    try:
+        with path.open("rb") as file:
+            from . import explorer
+
+            return explorer.is_explorer(file.read(1 << 16).decode("utf-8", "replace"))
+    except OSError:
+        return False
