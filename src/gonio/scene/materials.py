@@ -377,9 +377,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
         fields[_attribute("file")] = (str | None, Field(None, alias="file", description="The shader."))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     doc = lab.doc if lab else _summary(model)
-    # otherwise pydantic would search all loaded modules for the source of this class, which has none
-    made = {"use_attribute_docstrings": False}
-    cls = create_model(title, __base__=MaterialPart, __doc__=doc, __cls_kwargs__=made, **fields)
+    cls = create_model(title, __base__=MaterialPart, __doc__=doc, **fields)
     cls.model, cls.declared, cls.dials, cls.lab = model, declared, dials, lab
     return cls
 
