@@ -217,7 +217,7 @@ def typed(parameter: Parameter, value: Value) -> object:
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"'{value}' given, a number expected", where, parameter.range) from None
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 

@@ -9,7 +9,6 @@ files are decoded here, since Mitsuba's reader writes past its buffer if run len
 
 from __future__ import annotations
 
-import math
 import re
 import struct
 from collections.abc import Iterator
@@ -21,12 +20,13 @@ from numpy.typing import NDArray
 
 from ..bridge import engine
 from ..bridge.faults.exr_threads import file_threads
+from . import openexr
+from .openexr import Claimed, Unreadable
 
 # DEFLATE, the densest compression here, expands a byte to at most 1032. A file that claims more is rejected.
 MAX_EXPANSION = 1032
 MAX_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
 MAX_SIDE = 1 << 20  # limit of libpng
-MAX_CHANNELS = 1024  # of an OpenEXR file: some have one per object
 
 _MAGIC = {
     b"\x89PNG\r\n\x1a\n": "PNG",
@@ -34,18 +34,6 @@ _MAGIC = {
     b"\x76\x2f\x31\x01": "OpenEXR",
     b"#?": "RGBE",
 }
-
-
-class Unreadable(ValueError):
-    """A picture that is damaged or contradicts itself; the text is the reason."""
-
-
-class Claimed(NamedTuple):
-    """Claims of a header: pixels, and the smallest number of uncompressed bits per pixel."""
-
-    width: int
-    height: int
-    bits: int
 
 
 def kind_of(content: bytes) -> str | None:
@@ -57,17 +45,22 @@ def check(content: bytes, kind: str) -> Claimed:
     """Raise Unreadable if a file contradicts itself, or claims more than it can contain."""
     try:
         claimed = _HEADERS[kind](content)
+        _check_size(claimed, len(content))
+        if kind == "OpenEXR":
+            openexr.check_blocks(content)
     except (struct.error, IndexError):
         raise Unreadable("it is cut off in its header") from None
+    return claimed
+
+
+def _check_size(claimed: Claimed, length: int) -> None:
     if not (0 < claimed.width <= MAX_SIDE and 0 < claimed.height <= MAX_SIDE):
         raise Unreadable(f"it claims {claimed.width} x {claimed.height} pixels")
     pixels = claimed.width * claimed.height
-    if pixels * claimed.bits > MAX_EXPANSION * 8 * len(content):
-        claim = f"{claimed.width} x {claimed.height} pixels"
-        raise Unreadable(f"it claims {claim}, which {len(content)} bytes cannot contain")
+    if pixels * claimed.bits > MAX_EXPANSION * 8 * length:
+        raise Unreadable(f"it claims {claimed.width} x {claimed.height} pixels, which {length} bytes cannot contain")
     if pixels > MAX_PIXELS:
         raise Unreadable(f"its {claimed.width} x {claimed.height} pixels are more than {MAX_PIXELS >> 20} Mi")
-    return claimed
 
 
 class Decoded(NamedTuple):
@@ -145,89 +138,10 @@ def _jpeg(content: bytes) -> Claimed:
             continue
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack(">HH", content[at + 5 : at + 9])
-            return Claimed(width, height, 1)  # a block of 64 equal pixels takes a few bits
+            # Huffman codes take a bit for a block of 64 pixels at least, 1/16 of what DEFLATE could make of them
+            return Claimed(width, height, 16 if marker < 0xC8 else 1)
         at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
     raise Unreadable("its header is damaged")
-
-
-_HALF_FLOAT = (32, 16, 32)  # bits of UINT, HALF and FLOAT
-
-
-def _exr(content: bytes) -> Claimed:
-    attributes = {name: value for name, _, value in exr_attributes(content)}
-    try:
-        left, top, right, bottom = struct.unpack("<iiii", attributes["dataWindow"])
-        channels = attributes["channels"]
-        for name in ("compression", "displayWindow", "lineOrder", "pixelAspectRatio", "screenWindowCenter"):
-            attributes[name]
-    except KeyError as error:
-        raise Unreadable(f"its header lacks '{error.args[0]}'") from None
-    at, count, bits = 0, 0, 0
-    while channels[at]:  # name, then type, linear and reserved, sampling along x and y
-        end = channels.find(b"\0", at)
-        if end < 0:
-            raise Unreadable("its list of channels is damaged")
-        at = end + 1
-        kind, _, along_x, along_y = struct.unpack("<iIii", channels[at : at + 16])
-        if not 0 <= kind < 3:
-            raise Unreadable(f"it has a channel of unknown type {kind}")
-        if along_x != 1 or along_y != 1:
-            raise Unreadable("it has a channel with fewer pixels than the others, which is not supported")
-        at, count, bits = at + 16, count + 1, bits + _HALF_FLOAT[kind]
-    if not 0 < count <= MAX_CHANNELS:
-        raise Unreadable(f"it has {count} channels")
-    return Claimed(right - left + 1, bottom - top + 1, bits)
-
-
-# Sizes of attribute types in bytes (OpenEXR, "File layout"). The library reads that many whatever size the file states,
-# and interprets the misaligned rest as names and sizes of blocks to allocate.
-_EXR_BYTES = {
-    kind: size
-    for size, kinds in {
-        1: "compression envmap lineOrder",
-        4: "float int",
-        8: "double rational timecode v2f v2i",
-        9: "tiledesc",
-        12: "v3f v3i",
-        16: "box2f box2i v2d",
-        24: "v3d",
-        28: "keycode",
-        32: "chromaticities",
-        36: "m33f",
-        64: "m44f",
-        72: "m33d",
-        128: "m44d",
-    }.items()
-    for kind in kinds.split()
-}
-
-
-def exr_attributes(content: bytes) -> Iterator[tuple[str, str, bytes]]:
-    """Name, type and value of each attribute of an OpenEXR file's (first) header. Raises Unreadable."""
-    version = struct.unpack("<I", content[4:8])[0]
-    if version & 0xFF != 2 or version & ~0x1EFF:
-        raise Unreadable(f"it is of an unknown version of OpenEXR, {version:#x}")
-    if version & 0x800:
-        raise Unreadable("it contains deep data, which is not supported")
-    at = 8
-    while content[at]:
-        texts = []
-        for _ in range(2):  # name and type
-            end = content.find(b"\0", at, at + 256)
-            if end < 0:
-                raise Unreadable("its header is damaged")
-            texts.append(content[at:end].decode("utf-8", "replace"))
-            at = end + 1
-        size = struct.unpack("<i", content[at : at + 4])[0]
-        if not 0 <= size <= len(content) - at - 4:
-            raise Unreadable(f"its attribute '{texts[0]}' is longer than the file")
-        if size != _EXR_BYTES.get(texts[1], size):
-            raise Unreadable(f"its attribute '{texts[0]}' has {size} bytes, {texts[1]} has {_EXR_BYTES[texts[1]]}")
-        value = content[at + 4 : at + 4 + size]
-        if texts[1] == "preview" and (size < 8 or size != 8 + 4 * math.prod(struct.unpack("<II", value[:8]))):
-            raise Unreadable(f"its attribute '{texts[0]}' is not a preview of the stated size")
-        yield texts[0], texts[1], value
-        at += 4 + size
 
 
 _RESOLUTION = re.compile(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n")
@@ -307,4 +221,4 @@ def _runs(data: memoryview, width: int, height: int) -> NDArray[np.uint8]:
     return lines.reshape(height, 4, width).transpose(0, 2, 1)
 
 
-_HEADERS = {"PNG": _png, "JPEG": _jpeg, "OpenEXR": _exr, "RGBE": _rgbe}
+_HEADERS = {"PNG": _png, "JPEG": _jpeg, "OpenEXR": openexr.claimed, "RGBE": _rgbe}

@@ -26,7 +26,7 @@ from ..bridge.faults.exr_threads import file_threads
 from ..catalog.operands import PICTURE_SUFFIXES
 from ..errors import InputError, MachineError, did_you_mean, encodable, summary
 from ..owner import exclusive
-from . import exposures, formats
+from . import exposures, formats, openexr
 
 Value = str | int | float
 RGB = NDArray[np.float32]
@@ -288,7 +288,7 @@ def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
 def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
     """The texts and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
     numbers = {"int": "<i", "float": "<f", "double": "<d"}
-    for name, kind, value in formats.exr_attributes(content):
+    for name, kind, value in openexr.attributes_of(content):
         if kind == "string":
             yield name, value.decode("utf-8", "replace")
         elif kind in numbers and len(value) == struct.calcsize(numbers[kind]):

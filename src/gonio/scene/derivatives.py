@@ -15,7 +15,7 @@ CHANNELS = ("r", "g", "b")
 def place_of(path: str, where: str) -> tuple[str, str]:
     """("shapes.0.material", "base.alpha") of "shapes.0.material.base.alpha"."""
     steps = path.removeprefix("scene.").split(".")
-    if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdigit() or steps[2] != "material":
+    if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdecimal() or steps[2] != "material":
         raise InputError(f"'{path}' names no material of a shape", where, 'such as "shapes.0.material.alpha"')
     return ".".join(steps[:3]), ".".join(steps[3:])
 

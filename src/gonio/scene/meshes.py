@@ -363,7 +363,7 @@ def _ply_header(header: bytes, refuse: _Refuse) -> tuple[str, list[tuple[str, in
             continue
         if words[0] == "format" and len(words) > 1:
             order = {"ascii": "ascii", "binary_little_endian": "<", "binary_big_endian": ">"}.get(words[1], "")
-        elif words[0] == "element" and len(words) == 3 and words[2].isdigit() and len(words[2]) < 12:
+        elif words[0] == "element" and len(words) == 3 and words[2].isdecimal() and len(words[2]) < 12:
             elements.append((words[1], int(words[2]), []))
         elif words[0] == "property" and elements and len(words) in (3, 5):
             if any(kind not in _PLY_TYPES for kind in (words[2:4] if words[1] == "list" else words[1:2])):

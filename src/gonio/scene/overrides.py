@@ -115,7 +115,7 @@ def _below(holder: Json, step: str, path: str, before: list[str], steps: list[st
 
 
 def _index(holder: list[Json], step: str, path: str) -> int:
-    if not step.isascii() or not step.isdigit() or len(step) > 9 or int(step) >= len(holder):
+    if not step.isascii() or not step.isdecimal() or len(step) > 9 or int(step) >= len(holder):
         hint = f"0 to {len(holder) - 1}, or *" if holder else "the list is empty"
         raise InputError(f"no item '{step}' in a list of {len(holder)}", f"path {path}", hint)
     return int(step)
@@ -124,7 +124,7 @@ def _index(holder: list[Json], step: str, path: str) -> int:
 def _that_take(holders: list[Json], key: str) -> list[Json]:
     """The objects that have the key; if none has, the materials that accept it."""
     with_key: list[Json] = []
-    with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
+    with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdecimal())]
     if with_key:
         return with_key
     types = [(h, part_of(str(h.get("type")))) for h in holders if isinstance(h, dict)]

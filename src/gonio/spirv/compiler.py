@@ -173,7 +173,7 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
         match = re.match(r"(?:ERROR|error): (?:([^:\n]*):(\d+): )?(.*)", line)
         if match is None or "compilation errors" in line or not match[3]:
             continue
-        number = int(match[1]) if match[1] and match[1].isdigit() else 0
+        number = int(match[1]) if match[1] and match[1].isdecimal() else 0
         file = sources.names[number] if number < len(sources.names) else name
         messages.append((f"{file}:{match[2]}" if match[2] else file, match[3].strip()))
     if not messages:

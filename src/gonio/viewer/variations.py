@@ -44,7 +44,7 @@ class Variation:
 def _last_word(path: str) -> str:
     steps = [step for step in path.replace("/", ".").split(".") if step]
     for back, step in enumerate(reversed(steps)):
-        if not step.isdigit() and step != "*":
+        if not step.isdecimal() and step != "*":
             return step + "".join(f"[{index}]" for index in steps[len(steps) - back :])
     return path
 

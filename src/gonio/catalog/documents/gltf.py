@@ -48,7 +48,7 @@ class Gltf(Document):
     def image(self, path: Path, index: str) -> bytes:
         file = GltfFile(path)
         at = f"/images/{index}"
-        if not index.isdigit() or int(index) >= len(file.items("images")):
+        if not index.isdecimal() or int(index) >= len(file.items("images")):
             raise InputError(f"no picture '{index}' in it", f"{path}#{at}")
         image = file.items("images")[int(index)]
         uri = image.get("uri")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...pictures import formats, images
+from ...pictures import formats, images, openexr
 from . import series
 from .calibration import Calibration, Exposure, Shot
 from .series import Exposed, Noise
@@ -126,7 +126,7 @@ def _own_seconds(content: bytes) -> float | None:
     seconds: float | None = None
     try:
         if formats.kind_of(content) == "OpenEXR":
-            for name, kind, value in formats.exr_attributes(content):
+            for name, kind, value in openexr.attributes_of(content):
                 if name == "expTime" and kind == "float":
                     seconds = float(struct.unpack("<f", value)[0])
         elif content.startswith(b"\xff\xd8"):

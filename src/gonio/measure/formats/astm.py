@@ -52,7 +52,7 @@ class Astm(Format):
             raise InputError("no line of VARS", where, "this is no ASTM E1392 file")
         values = table(rows, len(columns), where)
         claimed = next((text for key, text in head.items() if key.upper() == "NUM_POINTS"), "")
-        if claimed and (not claimed.isdigit() or int(claimed) != len(values)):
+        if claimed and (not claimed.isdecimal() or int(claimed) != len(values)):
             raise InputError(f"NUM_POINTS says {claimed[:20]}, {len(values)} rows follow", where, "the file is damaged")
         nm = _wavelengths(columns[4:], where)
         if nm is None and len(columns) not in (5, 7):

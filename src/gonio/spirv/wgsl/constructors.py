@@ -15,9 +15,10 @@ def constructed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
     if type.kind == "matrix":
         return _matrix(emitter, type, values)
     if type.kind in ("array", "struct"):
-        parts = emitter.structs[type.name][1] if type.kind == "struct" else type.parts * type.length
-        if len(parts) != len(values):
-            raise emitter.error(f"{len(values)} values for the {len(parts)} of {type}")
+        count = len(emitter.structs[type.name][1]) if type.kind == "struct" else type.length
+        if count != len(values):
+            raise emitter.error(f"{len(values)} values for the {count} of {type}")
+        parts = emitter.structs[type.name][1] if type.kind == "struct" else type.parts * count
         constituents = [emitter.converted(value, part) for value, part in zip(values, parts, strict=True)]
         return _composed(emitter, type, constituents)
     if len(values) != 1 or not type.numbers or values[0].type.kind in ("vector", "matrix"):
