@@ -13,9 +13,11 @@ threads must hold the lock too:
 from __future__ import annotations
 
 import functools
+import gc
 import os
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -47,11 +49,11 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
         with COMPUTING:
             try:
                 return call(*args, **kwargs)
-            except RuntimeError as error:
+            except BaseException as error:
+                forget_frames(error)
                 cause = out_of_loop(error)
                 if cause is error:
                     raise
-                forget_frames(error)
                 raise cause from error
             finally:
                 settle()
@@ -60,15 +62,25 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def forget_frames(error: BaseException) -> None:
-    """Drop the tracebacks of an exception and its causes, and the objects that Gonio's frames hold.
+    """Drop what the frames hold that an exception and its causes have left.
 
     A notebook stores its last exception and with it the scene: Dr.Jit's virtual calls go to every living BSDF, so that
-    each later render would raise the same error. GONIO_DEBUG=1 preserves the frames for a debugger.
+    each later render would raise the same error. Of errors that Dr.Jit wraps, the lines go too, since from Python 3.12
+    on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves all of it for a debugger.
     """
-    chain: BaseException | None = None if os.environ.get("GONIO_DEBUG") else error
-    while chain is not None:
-        chain.__traceback__ = None
-        chain = chain.__cause__ or chain.__context__
+    if os.environ.get("GONIO_DEBUG"):
+        return
+    waiting, causes = [error], []
+    while waiting:
+        one = waiting.pop()
+        traceback.clear_frames(one.__traceback__)
+        causes.append(one)
+        waiting += [x for x in (one.__cause__, one.__context__) if x is not None and x not in causes]
+    wrapped = [one for one in causes if isinstance(one, RuntimeError) and (one is not error or len(causes) > 1)]
+    for one in wrapped:
+        one.__traceback__ = None
+    if wrapped:
+        gc.collect()  # a scene is part of cycles
 
 
 def public(call: Callable[P, R]) -> Callable[P, R]:

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import gonio as go
 import numpy as np
 import pytest
 from gonio.bridge import engine
@@ -427,6 +428,14 @@ def test_a_plugin_that_is_not_made_for_it_is_an_error_of_the_scene(integrator: s
     (tmp_path / "a.xml").write_text(XML.replace("<shape", f"{BUMP}<shape", 1))
     with pytest.raises(InputError, match=r"Mitsuba cannot render it: \[Texture\] .*not implemented"):
         render_to_file(Request(tmp_path / "a.xml", tmp_path / "a.exr", spp=4, integrator=integrator))
+
+
+def test_an_error_that_a_notebook_remembers_does_not_come_back(scene: Path, tmp_path: Path) -> None:
+    """Dr.Jit's calls go to every living BSDF: the scene that failed must be gone, though its error is not."""
+    (tmp_path / "a.xml").write_text(XML.replace("<shape", f"{BUMP}<shape", 1))
+    with pytest.raises(InputError, match="not implemented") as caught:
+        go.render(tmp_path / "a.xml", spp=4)
+    assert go.render(scene, spp=1).shape == (16, 24, 3), caught
 
 
 # --- a finished picture is never lost ------------------------------------------------------------------

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MachineError, summary
+from ..owner import exclusive
 from ..pictures import denoise, images
 from ..transport.passes import Interrupts, Progress, Renders
 from . import checkpoints
@@ -64,6 +65,7 @@ def estimated(prepared: Prepared) -> tuple[float | None, str]:
     return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
 
 
+@exclusive
 def render_to_file(
     request: Request,
     report: Callable[[Progress], None] = lambda progress: None,

@@ -63,9 +63,12 @@ def prepare(request: Request, writes: bool = False) -> Prepared:
 
 def _nearby(path: Path) -> str:
     parent = path.parent
-    if not parent.is_dir():
+    if not os.path.isdir(parent):  # unlike Path.is_dir, False for a name that is too long
         return f"the folder '{parent}' does not exist"
-    near = [x.name for x in parent.iterdir() if x.suffix in (".json", ".xml") or (x / "scene.json").is_file()]
+    try:
+        near = [x.name for x in parent.iterdir() if x.suffix in (".json", ".xml") or (x / "scene.json").is_file()]
+    except OSError:  # the folder must not be listed
+        near = []
     return did_you_mean(path.name, near) if near and len(near) <= 20 else "give a folder, a .json or a .xml"
 
 
