@@ -27,7 +27,7 @@ from fuzz import untrusted  # noqa: F401  (declares more targets)
 from fuzz.mutation import mutated
 from fuzz.targets import HERE, TARGETS, Target
 
-SECONDS = 5.0  # an input may take
+SECONDS = 5.0  # of all cores together an input may take, whatever else they do
 PATIENCE = 4 * SECONDS  # after which a worker is ended
 MEMORY = 200e6  # bytes, beside 4 times the input
 CORPUS = HERE / "corpus"
@@ -54,7 +54,7 @@ def judged(target: Target, data: bytes, folder: Path) -> str:
     from gonio.errors import GonioError
 
     before = _resident()
-    started = time.monotonic()
+    started = time.process_time()
     try:
         target.read(data, folder)
     except GonioError as error:
@@ -63,7 +63,7 @@ def judged(target: Target, data: bytes, folder: Path) -> str:
     except (Exception, SystemExit) as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {str(error)[:100]!a}"
-    seconds, peak = time.monotonic() - started, _peak()
+    seconds, peak = time.process_time() - started, _peak()
     if seconds > SECONDS:
         return f"it takes {seconds:.1f} s"
     if peak - before > 4 * len(data) + MEMORY:
