@@ -104,7 +104,10 @@ def bake(
     options = {"masking": masking, **axes, "resolution": 128 if resolution is None else resolution, **sampling}
     if layout == "homework":
         return _homework(_target(target), folder, lut, options, picture)
-    baked = _baked(_target(target), lut, options)
+    return _written(_baked(_target(target), lut, options), folder)
+
+
+def _written(baked: Baked, folder: Path | None) -> Baked:
     if folder is not None:
         _write(baked, folder, _pictures(baked))
     return baked

@@ -88,8 +88,7 @@ def verify(
     outputs = Outputs(output, junit, sarif, baseline, write_baseline, tolerate)
     known = outputs.check()
     names = None if law is None else [law] if isinstance(law, str) else list(law)
-    given: Sequence[Target] = target if isinstance(target, list | tuple) else [cast(Target, target)]
-    all_ = [_target(one) for one in given]
+    all_ = [_target(one) for one in (target if isinstance(target, list | tuple) else [cast(Target, target)])]
     if isolated or (isolated is None and _isolable(all_)):
         from . import trials
         from .isolation import child

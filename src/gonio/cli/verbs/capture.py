@@ -59,9 +59,8 @@ def capture(
     named = how.models(model or ())
     fixed, free = how.fixed(), tuple(how.free or ())
     if next_ and run.is_blank(photographs, calibration):
-        path = run.calibration_of(photographs, calibration)
-        _print_plan(run.plan(path, named[0] if named else "lambert+ggx", next_, fixed=fixed, free=free), as_json)
-        return
+        rig, first = run.calibration_of(photographs, calibration), next(iter(named), "lambert+ggx")
+        return _print_plan(run.plan(rig, first, next_, fixed=fixed, free=free), as_json)
     with Bar("capture") as bar:
         result = run.capture(
             photographs,
@@ -76,11 +75,10 @@ def capture(
     written = [] if target is None else _write(result, target)
     if as_json:
         print(json.dumps(result.as_dict() | ({"next": [one.as_dict() for one in plan]} if plan else {})))
-        return
-    print_warnings(result.warnings)
-    _print(result)
-    for line in [*(f"next: {one}" for one in plan), *([" ".join(map(str, written))] if written else [])]:
-        print(line)
+    else:
+        _print(result)
+        for line in [*(f"next: {one}" for one in plan), *([" ".join(map(str, written))] if written else [])]:
+            print(line)
 
 
 def _write(result: Capture, target: Path) -> list[Path]:
@@ -101,6 +99,7 @@ def _print_plan(plan: Sequence[Proposal], as_json: bool) -> None:
 
 
 def _print(result: Capture) -> None:
+    print_warnings(result.warnings)
     left = ", ".join(f"{result.counts[why]} {why}" for why in ("saturated", "shadowed", "grazing"))
     print(f"{result.counts['used']} pixels in {len(result.samples.count)} samples; left out: {left}")
     if result.fitted is None:

@@ -16,7 +16,7 @@ from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
 if TYPE_CHECKING:
-    from ...check import Report
+    from ...check import Finding, Report
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,6 @@ def check(
       gonio check --reference values
       gonio check class --sheet lab2 --scene examples --hide-solution
     """
-    from ...check import Report
     from ...check import check as judge
 
     if reference is not None:
@@ -95,14 +94,20 @@ def check(
         raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
     work, against = _with_parameters(target, model, made)
     result = judge(work, against, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
+    _print(result, as_json)
+    if result.exit_code:
+        raise Exit(result.exit_code)
+
+
+def _print(result: Report | Finding, as_json: bool) -> None:
+    from ...check import Report
+
     if as_json:
         print(json.dumps(result.as_dict()))
     elif isinstance(result, Report):
         _print_table(result)
     else:
         print("\n".join(result.lines()))
-    if result.exit_code:
-        raise Exit(result.exit_code)
 
 
 def _write_reference(folder: Path, material: str | None, made: Material, as_json: bool) -> None:

@@ -77,9 +77,7 @@ def bake(
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
     _check(lut, size, spp, points, layout)
-    if floor < 0.0 or (floor > 0.0 and method != "cosine"):
-        hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
-        raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
+    _check_floor(floor, method)
     for name, given in (("masking", masking), ("aspect", aspect)):
         if material and given is not None:
             raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
@@ -108,13 +106,16 @@ def bake(
         arrays.update(glass)
         errors.update(figures)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
-    sampling = (
-        {}
-        if method == "quadrature"
-        else {"spp": spp, "points": points, "seed": seed, **({"floor": floor} if floor else {})}
-    )
+    options = {"spp": spp, "points": points, "seed": seed, **({"floor": floor} if floor else {})}
+    sampling = {} if method == "quadrature" else options
     manifest = {"target": describe(target), **_described(asked, axes, method, sampling), "axes": text}
     return _sealed(arrays, nodes, dims, errors, manifest)
+
+
+def _check_floor(floor: float, method: str) -> None:
+    if floor < 0.0 or (floor > 0.0 and method != "cosine"):
+        hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
+        raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
 
 
 def _described(asked: Target, axes: Axes, method: str, sampling: dict[str, object]) -> dict[str, object]:
