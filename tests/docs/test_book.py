@@ -12,6 +12,8 @@ from pathlib import Path
 import gonio as go
 import pytest
 
+import browser
+
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
 from book import api, bibliography, errors, families, gallery, links, text  # noqa: E402
@@ -76,10 +78,42 @@ def test_docstrings_become_markdown() -> None:
     assert "| `name` | its meaning goes on |" in shown and "| `other` | another |" in shown
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="NOT BUILT: the extra `book` is not installed")
-def test_the_book_builds_without_a_warning(tmp_path: Path) -> None:
-    """All pages, without the live ones: links, formulas, headings, pictures."""
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "dummy", ROOT / "docs", tmp_path]
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the book without its live pages; links, formulas, headings and pictures give no warning."""
+    if importlib.util.find_spec("sphinx") is None:
+        pytest.skip("NOT BUILT: the extra `book` is not installed")
+    folder = tmp_path_factory.mktemp("book")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", ROOT / "docs", folder]
     done = subprocess.run(command, env={**os.environ, "GONIO_BOOK": "quick"}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_the_book_loads_nothing_from_the_network(built: Path) -> None:
+    """Scripts, styles, frames, pictures and fonts are files of the book."""
+    loading = r"<(?:script|iframe|img|source|object)\b[^>]*?\b(?:src|data)=\"(?:https?:)?//|"
+    loading += r"<link\b[^>]*\brel=\"(?:stylesheet|preload|icon)\"[^>]*\bhref=\"(?:https?:)?//"
+    pages = list(built.rglob("*.html"))
+    assert len(pages) > 150
+    assert [page.name for page in pages if re.search(loading, page.read_text(encoding="utf-8"))] == []
+    styles = (path.read_text(encoding="utf-8") for path in built.rglob("*.css"))
+    assert not any(re.search(r"url\([\"']?(?:https?:)?//|@import", style) for style in styles)
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_search_of_the_book_opened_from_disk_finds_words_and_options(built: Path) -> None:
+    requests, messages = [], []
+    with browser.chromium() as chromium:
+        page = chromium.new_page()
+        page.on("request", lambda request: requests.append(request.url))
+        page.on("console", lambda message: messages.append(message.text))
+        page.on("pageerror", lambda error: messages.append(str(error)))
+        for word in ("Kulla-Conty", "E_avg", "--until-error", "GGX"):
+            page.goto(f"{(built / 'search.html').as_uri()}?q={word}")
+            page.wait_for_selector("#search-results .search-summary")
+            page.wait_for_selector("#search-results li a")
+    assert messages == []
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
