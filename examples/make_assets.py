@@ -330,7 +330,7 @@ def main() -> None:
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
     png("full-moon/maria.png", maria(256))
-    png("pool-caustic/tiles.png", checker(16, (0.1, 0.42, 0.55), (0.32, 0.62, 0.68)))
+    png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
     obj("diamond/brilliant.obj", *brilliant())
