@@ -11,12 +11,13 @@ from pathlib import Path
 
 import gonio as go
 import pytest
+from gonio.viewer import stage
 
 import browser
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
-from book import api, bibliography, errors, families, gallery, links, text  # noqa: E402
+from book import api, bibliography, errors, families, gallery, links, models, strips, text  # noqa: E402
 
 
 def test_every_page_is_a_chapter() -> None:
@@ -69,6 +70,26 @@ def test_links_out_of_the_docs_lead_to_pages_of_the_book(path: str, page: str | 
 def test_the_gallery_has_every_example() -> None:
     folders = {path.name for path in (ROOT / "examples").iterdir() if path.is_dir() and path.name[0] not in "._"}
     assert {example.folder for example in gallery.examples()} == folders
+
+
+def test_every_model_but_a_few_has_a_strip_of_five_different_balls() -> None:
+    every = strips.all_series()
+    assert set(go.models()) - set(every) == {"measured", "shifted-gamma"}  # a table, and one ball in `gonio view`
+    assert all(len({label for label, _ in balls}) == 5 for balls in every.values())
+
+
+def test_a_strip_shows_its_parameter() -> None:
+    """Darker to brighter over the albedo of Lambert's model."""
+    picture = strips.strip(strips.all_series()["lambert"], size=(100, 26), spp=4)
+    means = [picture[10:16, x - 4 : x + 4].mean() for x in (19, 34, 50, 66, 81)]
+    assert means == sorted(means) and means[-1] > 4.0 * means[0]
+
+
+def test_a_live_page_opens_with_color_in_the_studio() -> None:
+    opened = models.opening("conductor")
+    assert opened.lights == (stage.STUDIO,)
+    assert opened.materials["m0"].bsdf.k == go.Conductor.preset("Au").k  # type: ignore[attr-defined]
+    assert len(opened.rows[0].balls) == 5
 
 
 def test_docstrings_become_markdown() -> None:
