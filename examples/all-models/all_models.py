@@ -63,7 +63,7 @@ LOOKS = {
 def material(name: str) -> go.BSDF:
     """The model as it is shown."""
     if name == "measured":
-        return go.Measured(str(HERE.parent / "three-forms" / "rough-copper.gonio"))
+        return go.Measured(HERE.parent / "three-forms" / "rough-copper.gonio")
     return go.material(f"{name}({LOOKS[name]})" if name in LOOKS else name)
 
 
