@@ -119,7 +119,7 @@ def _strip(name: str) -> str:
     labels = strips.labels(name)
     if len(labels) < 2:
         return ""
-    words = ", ".join(labels)
+    words = f"{labels[0].rpartition(' ')[0]} " + ", ".join(label.rpartition(" ")[2] for label in labels)
     picture = f'<img src="../../strips/{name}.jpg" loading="lazy" alt="Five balls of {name}: {words}">'
     return f"```{{raw}} html\n{picture}\n```\n\nFrom left to right: {words}."
 

@@ -78,6 +78,11 @@ def test_every_model_but_a_few_has_a_strip_of_five_different_balls() -> None:
     assert all(len({label for label, _ in balls}) == 5 for balls in every.values())
 
 
+def test_a_page_names_the_values_of_its_strip() -> None:
+    page = str(models._strip("phong"))
+    assert "/strips/phong.jpg" in page and "From left to right: p 7.5, 15, 30, 60, 120." in page
+
+
 def test_a_strip_shows_its_parameter() -> None:
     """Darker to brighter over the albedo of Lambert's model."""
     picture = strips.strip(strips.all_series()["lambert"], size=(100, 26), spp=4)
