@@ -20,7 +20,7 @@ version = release = gonio.__version__
 
 extensions = ["myst_parser", "sphinx_design", "book.extension"]
 # the copies of these pages in the book are made from the code: docs/reference
-exclude_patterns = ["models", "reference/live", "images", "report-cards/programs"]
+exclude_patterns = ["models", "reference/live", "reference/strips", "images", "report-cards/programs"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
 myst_dmath_allow_digits = False  # "$3" is no formula
@@ -30,7 +30,7 @@ html_theme = "furo"
 html_title = "Gonio"
 html_static_path = ["book/static"]
 html_css_files = ["book.css"]
-html_extra_path = [] if os.environ.get("GONIO_BOOK") == "quick" else ["reference/live"]
+html_extra_path = [] if os.environ.get("GONIO_BOOK") == "quick" else ["reference/live", "reference/strips"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
 from pathlib import Path
@@ -37,18 +38,28 @@ def bumps(size: int, across: int, height: float) -> np.ndarray:
     return (normal + 1) / 2
 
 
-def worn(size: int) -> np.ndarray:
-    """Roughness of a worn surface: smooth noise of a few octaves, contrast raised, .1 to .6."""
-    rng = np.random.default_rng(8)
+def cloudy(size: int, seed: int, octaves: range) -> np.ndarray:
+    """Smooth noise of a few octaves that tiles, contrast raised, 0 to 1."""
+    rng = np.random.default_rng(seed)
     total = np.zeros((size, size))
-    for octave in range(2, 6):
+    for octave in octaves:
         spectrum = np.fft.rfft2(rng.standard_normal((size, size)))
         fy, fx = np.fft.fftfreq(size)[:, None] * size, np.fft.rfftfreq(size)[None, :] * size
         band = np.exp(-((np.hypot(fx, fy) / 2**octave) ** 2))  # periodic, so it tiles
         layer = np.fft.irfft2(spectrum * band, s=(size, size))
         total += layer / layer.std() / 2**octave * 4
-    share = 1 / (1 + np.exp(-2.5 * total / total.std()))
-    return np.repeat((0.1 + 0.5 * share)[..., None], 3, axis=2)
+    return 1 / (1 + np.exp(-2.5 * total / total.std()))
+
+
+def worn(size: int) -> np.ndarray:
+    """Roughness of a worn surface, .1 to .6."""
+    return np.repeat((0.1 + 0.5 * cloudy(size, 8, range(2, 6)))[..., None], 3, axis=2)
+
+
+def maria(size: int) -> np.ndarray:
+    """Albedo of a moon: dark plains in bright highlands, with 1 % of red more than of blue per level."""
+    level = np.rint((0.2 + 0.35 * cloudy(size, 11, range(2, 7))) * 96) / 96  # few levels, which compress well
+    return level[..., None] * np.array([1.0, 0.97, 0.92])
 
 
 def sky(height: int) -> np.ndarray:
@@ -210,6 +221,86 @@ def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
     return np.stack([x, level, z], 1), normals, np.zeros((x.size, 2)), faces
 
 
+def turned(profile: np.ndarray, sides: int) -> tuple[np.ndarray, ...]:
+    """A solid turned on a lathe about +y from a profile of (radius, height); u runs around it, v along the profile.
+
+    The profile runs counterclockwise about what is inside, as seen with the axis on the left: up the outside. Corners
+    sharper than 40 degrees stay sharp, because their points are given once for each side.
+    """
+    steps = np.diff(profile, axis=0)
+    outward = np.stack([steps[:, 1], -steps[:, 0]], 1) / np.linalg.norm(steps, axis=1, keepdims=True)
+    runs, first = [], 0
+    for i in range(1, len(steps) + 1):
+        if i == len(steps) or outward[i] @ outward[i - 1] < math.cos(math.radians(40.0)):
+            runs.append((first, i))
+            first = i
+    points, normals = [], []
+    for first, end in runs:
+        own = outward[first:end]
+        mean = np.vstack([own[:1], own[1:] + own[:-1], own[-1:]])
+        normals.append(mean / np.linalg.norm(mean, axis=1, keepdims=True))
+        points.append(profile[first : end + 1])
+    starts = np.cumsum([0, *(len(run) for run in points)])
+    rows = np.concatenate([np.arange(a, b - 1) for a, b in itertools.pairwise(starts)])
+    place, normal = np.vstack(points), np.vstack(normals)
+    turn = np.linspace(0.0, 2.0 * math.pi, sides + 1)  # the seam twice, for u = 0 and 1
+
+    def around(pairs: np.ndarray) -> np.ndarray:
+        shape = (len(pairs), sides + 1)
+        x, z = pairs[:, :1] * np.sin(turn), pairs[:, :1] * np.cos(turn)
+        return np.stack([x, np.broadcast_to(pairs[:, 1:], shape), z], -1).reshape(-1, 3)
+
+    u, v = np.meshgrid(turn / (2.0 * math.pi), np.linspace(0.0, 1.0, len(place)))
+    a = (rows[:, None] * (sides + 1) + np.arange(sides)).ravel()
+    faces = np.vstack([np.stack([a, a + 1, a + sides + 2], 1), np.stack([a, a + sides + 2, a + sides + 1], 1)])
+    return around(place), around(normal), np.stack([u.ravel(), v.ravel()], 1), faces
+
+
+def draped(radius: float, height: float, folds: int, rows: int = 36, columns: int = 132) -> tuple[np.ndarray, ...]:
+    """A cloth over a ball on the ground: smooth on the ball, in folds of rising depth below its equator."""
+    along = np.linspace(0.0, 1.0, rows + 1)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, columns + 1)[None, :]
+    arc = along * (math.pi / 2.0 * radius + height)  # length from the top
+    angle = np.minimum(arc / radius, math.pi / 2.0)
+    hanging = np.maximum(arc - math.pi / 2.0 * radius, 0.0) / height
+    wave = np.cos(folds * turn + 0.9 * np.sin(2.0 * turn)) + 0.35 * np.cos((folds - 3) * turn + 1.0)
+    grown = hanging**1.4
+    reach = radius * np.sin(angle) * (1.0 + 0.22 * grown * (1.0 + wave))
+    x, z = reach * np.sin(turn), reach * np.cos(turn)
+    y = np.broadcast_to(height + radius * np.cos(angle) - height * hanging, x.shape)
+    place = np.stack([x, y, z], -1)
+    down, across = np.gradient(place, axis=0), np.gradient(place, axis=1)
+    across[:, 0] = across[:, -1] = place[:, 1] - place[:, -2]
+    normal = np.cross(down, across)
+    normal[0] = [0.0, 1.0, 0.0]
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    number = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    faces = np.vstack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)[columns:]])
+    uv = np.stack(np.broadcast_arrays(turn / (2.0 * math.pi), along), -1)
+    return place.reshape(-1, 3), normal.reshape(-1, 3), uv.reshape(-1, 2), faces
+
+
+def goblet() -> tuple[np.ndarray, np.ndarray]:
+    """Profiles of a wine glass 2.6 high, and of the wine in it, which reaches half into the wall of the glass."""
+    bowl = np.linspace(-math.pi / 2.0 + 0.12, 0.95, 22)
+    outer = np.stack([0.72 * np.cos(bowl), 1.78 + 0.82 * np.sin(bowl)], 1)
+    inner = np.stack([0.69 * np.cos(bowl), 1.79 + 0.79 * np.sin(bowl)], 1)
+    foot = [(0.0, 0.0), (0.62, 0.0), (0.64, 0.015), (0.62, 0.035), (0.3, 0.06), (0.12, 0.1), (0.06, 0.2), (0.05, 0.5)]
+    stem = [(0.05, 0.8), (0.06, 0.92)]
+    glass = np.vstack([foot, stem, outer, inner[::-1], [(0.0, inner[0, 1] - 0.005)]])
+    filled = np.linspace(-math.pi / 2.0, -0.1, 18)
+    wine = np.stack([0.705 * np.cos(filled), 1.785 + 0.805 * np.sin(filled)], 1)
+    wine[0, 0] = 0.0
+    return glass, np.vstack([wine, [(0.0, wine[-1, 1])]])
+
+
+def knob() -> np.ndarray:
+    """Profile of the ring between side and face of a hi-fi knob of radius 1 and height 0.9."""
+    turn = np.linspace(0.0, math.pi / 2.0, 7)
+    return np.stack([0.94 + 0.06 * np.cos(turn), 0.84 + 0.06 * np.sin(turn)], 1)
+
+
 def photographs() -> None:
     """A ball of brown paint under one lamp after the other, as a camera takes it; lengths in millimetres."""
     center, distance = np.array([0.0, 0.0, 500.0]), 400.0
@@ -238,6 +329,7 @@ def main() -> None:
         png(f"{folder}/checker.png", checker(20, grey, white))
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
+    png("full-moon/maria.png", maria(256))
     png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
@@ -246,6 +338,11 @@ def main() -> None:
     bend = np.stack([1.6 * np.cos(1.5 * math.pi * way), 0.25 + 0.9 * way, -1.6 * np.sin(1.5 * math.pi * way)], 1)
     ply("fibre/fibre.ply", *tube(bend, 0.16, sides=32))
     ply("pool-caustic/water.ply", *waves(2, 70, 0.05))
+    ply("velvet/cloth.ply", *draped(1.0, 1.1, 11))
+    glass, wine = goblet()
+    ply("wine/glass.ply", *turned(glass, 56))
+    ply("wine/wine.ply", *turned(wine, 56))
+    ply("brushed-knobs/edge.ply", *turned(knob(), 128))
     ply("shader-ball/shell.ply", *shell(1.0, 0.93))
     mi.Bitmap(sky(128)).write(str(HERE / "shader-ball" / "studio.hdr"))
     photographs()

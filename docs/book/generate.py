@@ -11,14 +11,19 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from . import api, bibliography, errors, families, gallery, models, project, substances
+from . import api, bibliography, errors, families, gallery, models, project, strips, substances
 
 ROOT = Path(__file__).parents[2]
 Pages = dict[str, str | bytes]  # path below docs/ -> contents
+SHOWN = "examples/all-models/*.py"  # the values at which models are shown
 
 PARTS: dict[str, tuple[Callable[[], Pages], tuple[str, ...]]] = {
-    "reference/models": (models.pages, ("src/gonio/**/*.py", "docs/book/*.py", "docs/report-cards/cards.json")),
-    "reference/live": (models.live, ("src/gonio/**/*.py", "src/gonio/viewer/static/*", "docs/book/models.py")),
+    "reference/models": (models.pages, ("src/gonio/**/*.py", "docs/book/*.py", "docs/report-cards/cards.json", SHOWN)),
+    "reference/live": (models.live, ("src/gonio/**/*.py", "src/gonio/viewer/static/*", "docs/book/models.py", SHOWN)),
+    "reference/strips": (
+        strips.pages,
+        ("src/gonio/materials/**/*.py", "src/gonio/optics/**/*.py", "docs/book/strips.py", SHOWN),
+    ),
     "reference/families": (families.pages, ("src/gonio/**/*.py", "docs/book/*.py")),
     "reference/substances": (substances.pages, ("src/gonio/optics/*", "src/gonio/catalog/**/*", "docs/book/*.py")),
     "reference/api": (api.pages, ("src/gonio/**/*.py", "docs/book/*.py")),
@@ -33,9 +38,9 @@ PARTS: dict[str, tuple[Callable[[], Pages], tuple[str, ...]]] = {
 
 
 def write_all(docs: Path) -> None:
-    """Make every part whose inputs have changed since it was made last; GONIO_BOOK=quick omits the live pages."""
+    """Make every part whose inputs have changed since it was made last; GONIO_BOOK=quick omits live pages and balls."""
     for folder, (make, inputs) in PARTS.items():
-        if folder == "reference/live" and os.environ.get("GONIO_BOOK") == "quick":
+        if folder in ("reference/live", "reference/strips") and os.environ.get("GONIO_BOOK") == "quick":
             continue
         digest = _digest(inputs)
         stamp = docs / folder / ".made-from"

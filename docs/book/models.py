@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import tempfile
@@ -11,7 +12,7 @@ from typing import Any
 import gonio as go
 from gonio.viewer import manual, page, stage
 
-from . import formulas
+from . import formulas, strips
 from .bibliography import KEY, citation, known
 from .text import cell, escaped, fenced, markdown, table
 
@@ -41,14 +42,19 @@ def pages() -> dict[str, str | bytes]:
 
 
 def live() -> dict[str, str | bytes]:
-    """The page of `gonio view`, as one file without network, for each model that has shader code."""
+    """The page of `gonio view`, as one file without network, for each model that has shader code, in the studio."""
     made: dict[str, str | bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in go.models():
             if has_shader(name):
-                path = page.export(stage.of_targets([operand(name)]), Path(folder) / f"{name}.html")
+                path = page.export(opening(name), Path(folder) / f"{name}.html")
                 made[f"reference/live/live/{name}.html"] = path.read_bytes()
     return made
+
+
+def opening(name: str) -> stage.Stage:
+    """What the live page of a model shows first: the material of the sheet of all models, in the studio."""
+    return dataclasses.replace(stage.of_models([strips.all_models.material(name)]), lights=(stage.STUDIO,))
 
 
 def operand(name: str) -> str:
@@ -86,7 +92,7 @@ def _index() -> str:
 def _page(model: type[go.BSDF]) -> str:
     name = model.name
     found = manual.page(model)
-    parts = [f"# {name}", markdown(found.doc), "## Formula"]
+    parts = [f"# {name}", markdown(found.doc), _strip(name), "## Formula"]
     parts += [f"$$\n{line}\n$$" for line in formulas.of_model(name)] + [SYMBOLS]
     if name in formulas.RUN:
         parts.append("The formula is set from an expression that a test evaluates against the model.")
@@ -106,6 +112,16 @@ def _page(model: type[go.BSDF]) -> str:
     if sources := _sources(found):
         parts += ["## Sources", sources]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _strip(name: str) -> str:
+    """Balls over the main parameter, which the part `reference/strips` renders; none in the quick book."""
+    labels = strips.labels(name)
+    if len(labels) < 2:
+        return ""
+    words = f"{labels[0].rpartition(' ')[0]} " + ", ".join(label.rpartition(" ")[2] for label in labels)
+    picture = f'<img src="../../strips/{name}.jpg" loading="lazy" alt="Five balls of {name}: {words}">'
+    return f"```{{raw}} html\n{picture}\n```\n\nFrom left to right: {words}."
 
 
 def _parameters(found: manual.Page) -> str:

@@ -97,7 +97,7 @@ def profile(rays: int) -> tuple[Floats, Floats]:
     return (bins[1:] + bins[:-1]) / 2.0, (rgb / solid).T
 
 
-def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (960, 480), sun: float = 22.0) -> Floats:
+def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (1280, 640), sun: float = 22.0) -> Floats:
     """The eastern sky in the evening, 110 degrees wide: the antisolar point is `sun` degrees below the horizon."""
     width, height = size
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -107,8 +107,10 @@ def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (960, 480),
     down = np.radians(sun)
     away = np.degrees(np.arccos(way @ [0.0, -np.sin(down), np.cos(down)]))
     bow = np.stack([np.interp(away, angles, colours[:, channel]) for channel in range(3)], axis=2)
-    sky = np.array([0.06, 0.08, 0.11]) * (1.0 - 0.5 * way[..., 1:2]) + 1.6 * np.maximum(bow, 0.0)
-    ground = np.array([0.02, 0.028, 0.014]) * (1.0 + way[..., 1:2])
+    sky = np.array([0.035, 0.045, 0.075]) * (1.0 - 0.7 * way[..., 1:2]) + 2.3 * np.maximum(bow, 0.0)
+    # a field in the low sun, which fades into the haze of the horizon
+    haze = np.exp(20.0 * np.minimum(way[..., 1:2], 0.0))
+    ground = np.array([0.06, 0.055, 0.016]) * (1.0 - haze) + np.array([0.03, 0.034, 0.035]) * haze
     return np.where(way[..., 1:2] > 0.0, sky, ground)
 
 

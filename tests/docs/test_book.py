@@ -11,10 +11,13 @@ from pathlib import Path
 
 import gonio as go
 import pytest
+from gonio.viewer import stage
+
+import browser
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
-from book import api, bibliography, errors, families, gallery, links, text  # noqa: E402
+from book import api, bibliography, errors, families, gallery, links, models, strips, text  # noqa: E402
 
 
 def test_every_page_is_a_chapter() -> None:
@@ -69,6 +72,31 @@ def test_the_gallery_has_every_example() -> None:
     assert {example.folder for example in gallery.examples()} == folders
 
 
+def test_every_model_but_a_few_has_a_strip_of_five_different_balls() -> None:
+    every = strips.all_series()
+    assert set(go.models()) - set(every) == {"measured", "shifted-gamma"}  # a table, and one ball in `gonio view`
+    assert all(len({label for label, _ in balls}) == 5 for balls in every.values())
+
+
+def test_a_page_names_the_values_of_its_strip() -> None:
+    page = str(models._strip("phong"))
+    assert "/strips/phong.jpg" in page and "From left to right: p 7.5, 15, 30, 60, 120." in page
+
+
+def test_a_strip_shows_its_parameter() -> None:
+    """Darker to brighter over the albedo of Lambert's model."""
+    picture = strips.strip(strips.all_series()["lambert"], size=(100, 26), spp=4)
+    means = [picture[10:16, x - 4 : x + 4].mean() for x in (19, 34, 50, 66, 81)]
+    assert means == sorted(means) and means[-1] > 4.0 * means[0]
+
+
+def test_a_live_page_opens_with_color_in_the_studio() -> None:
+    opened = models.opening("conductor")
+    assert opened.lights == (stage.STUDIO,)
+    assert opened.materials["m0"].bsdf.k == go.Conductor.preset("Au").k  # type: ignore[attr-defined]
+    assert len(opened.rows[0].balls) == 5
+
+
 def test_docstrings_become_markdown() -> None:
     doc = "One line with a|b.\n\n    code = 1\n\nname   its meaning\n       goes on\nother  another"
     shown = text.markdown(doc)
@@ -76,10 +104,42 @@ def test_docstrings_become_markdown() -> None:
     assert "| `name` | its meaning goes on |" in shown and "| `other` | another |" in shown
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="NOT BUILT: the extra `book` is not installed")
-def test_the_book_builds_without_a_warning(tmp_path: Path) -> None:
-    """All pages, without the live ones: links, formulas, headings, pictures."""
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "dummy", ROOT / "docs", tmp_path]
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the book without its live pages; links, formulas, headings and pictures give no warning."""
+    if importlib.util.find_spec("sphinx") is None:
+        pytest.skip("NOT BUILT: the extra `book` is not installed")
+    folder = tmp_path_factory.mktemp("book")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", ROOT / "docs", folder]
     done = subprocess.run(command, env={**os.environ, "GONIO_BOOK": "quick"}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_the_book_loads_nothing_from_the_network(built: Path) -> None:
+    """Scripts, styles, frames, pictures and fonts are files of the book."""
+    loading = r"<(?:script|iframe|img|source|object)\b[^>]*?\b(?:src|data)=\"(?:https?:)?//|"
+    loading += r"<link\b[^>]*\brel=\"(?:stylesheet|preload|icon)\"[^>]*\bhref=\"(?:https?:)?//"
+    pages = list(built.rglob("*.html"))
+    assert len(pages) > 150
+    assert [page.name for page in pages if re.search(loading, page.read_text(encoding="utf-8"))] == []
+    styles = (path.read_text(encoding="utf-8") for path in built.rglob("*.css"))
+    assert not any(re.search(r"url\([\"']?(?:https?:)?//|@import", style) for style in styles)
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_search_of_the_book_opened_from_disk_finds_words_and_options(built: Path) -> None:
+    requests, messages = [], []
+    with browser.chromium() as chromium:
+        page = chromium.new_page()
+        page.on("request", lambda request: requests.append(request.url))
+        page.on("console", lambda message: messages.append(message.text))
+        page.on("pageerror", lambda error: messages.append(str(error)))
+        for word in ("Kulla-Conty", "E_avg", "--until-error", "GGX"):
+            page.goto(f"{(built / 'search.html').as_uri()}?q={word}")
+            page.wait_for_selector("#search-results .search-summary")
+            page.wait_for_selector("#search-results li a")
+    assert messages == []
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []

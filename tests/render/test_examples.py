@@ -17,9 +17,12 @@ SCENES = sorted(
 )
 # Their small lamps are seen through glass, and light little else by it: `path` suits them (docs/transport.md).
 BY_PATH_ALL_THE_SAME = {"diamond/scene.json", "rainbow/scene.json"}
+EIGHT_KERNELS = "openpbr-layers/scene.json"  # one for each combination of layers
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == EIGHT_KERNELS else []) for name in SCENES]
+)
 def test_every_example_renders(name: str) -> None:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

@@ -456,6 +456,8 @@ def described(material: BSDF) -> MaterialPart:
             fields[key] = described(value)
         elif isinstance(value, DispersiveIndex):
             fields[key] = value.constants.name
+        elif isinstance(value, Path):
+            fields[key] = str(value)
         elif value is not None:
             fields[key] = np.asarray(value).tolist() if parameter.numeric else value
     made = part.model_validate(fields)
