@@ -43,7 +43,9 @@ def adopt(
         _adopt_package(file, output, force=force, as_json=as_json)
         return
     if output is not None:
-        raise InputError("-o names the folder for a package's shaders", "--output", "leave it out: FILE.toml is written")
+        raise InputError(
+            "-o names the folder for a package's shaders", "--output", "leave it out: FILE.toml is written"
+        )
     adopted = shaders.adopt(file)
     target = Path(f"{file}.toml")
     if target.exists() and not force:
