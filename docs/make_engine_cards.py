@@ -35,6 +35,12 @@ import matplotlib.pyplot as plt
 FOLDER = Path(__file__).parent / "report-cards" / "engines"
 STORED = FOLDER / "cards.json"
 SEED = 1
+OVERVIEW = """Shaders of engines that are on npm, judged by the laws of [`gonio verify`](../../verify.md) and by white
+furnaces. Gonio contains no text of theirs: `gonio adopt node_modules/three` writes a program that includes the
+package's own ([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function
+or table, and how to see it without Gonio. The laws are those of a path tracer: a rasterizer need not be reciprocal, and
+several causes are deliberate. Corrections are welcome.
+"""
 
 
 # --------------------------------------------------------------------------- measuring
@@ -118,8 +124,8 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
     lines = [
         f"# {engine.title}",
         "",
-        f"`{engine.package}` {shown} of npm; [repository]({engine.home}). Written by `python docs/make_engine_cards.py`;",
-        "all figures are in [cards.json](cards.json).",
+        f"`{engine.package}` {shown} of npm; [repository]({engine.home}).",
+        "Written by `python docs/make_engine_cards.py`; all figures are in [cards.json](cards.json).",
         "",
         engine.intro,
         "",
@@ -199,10 +205,9 @@ def _again(engine: Engine, version: str, stem: str) -> list[str]:
     ]
     if engine.programs:
         links = ", ".join(f"[{name}](programs/{name})" for name in engine.programs)
-        outputs = ", ".join(
-            f"[{one.stem}](programs/{one.name})" for one in sorted((FOLDER / "programs").glob(f"{stem}-*.txt"))
-        )
-        lines += ["", f"Without Gonio: {links}, whose first lines say how to run it; what it printed: {outputs}."]
+        printed = sorted((FOLDER / "programs").glob(f"{stem}-*.txt"))
+        outputs = ", ".join(f"[{one.stem}](programs/{one.name})" for one in printed)
+        lines += ["", f"Without Gonio: {links}, whose first lines say how to run it.", f"What it printed: {outputs}."]
     return lines
 
 
@@ -220,13 +225,8 @@ def overview(stored: dict[str, Any]) -> str:
     lines = [
         "# Report cards of engines",
         "",
-        "Shaders of engines that are on npm, judged by the laws of [`gonio verify`](../../verify.md) and by white furnaces.",
-        "Gonio contains no text of theirs: `gonio adopt node_modules/three` writes a program that includes the package's own",
-        "([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function or table,",
-        "and how to see it without Gonio. The materials are judged under direct light, in the way a path tracer would use",
-        "them; a rasterizer need not be reciprocal, and several causes are deliberate. Corrections are welcome.",
-        "",
-        "| engine | releases | white metal, roughness 1, normal incidence | largest gain of a white furnace | laws that fail |",
+        *OVERVIEW.split("\n"),
+        "| engine | releases | white metal, roughness 1, n.v 1 | largest gain of a white furnace | laws that fail |",
         "|---|---|---|---|---|",
     ]
     for name, results in stored.items():

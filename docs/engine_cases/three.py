@@ -127,10 +127,10 @@ the energy of single scattering, so that only errors of the table are left.
 
 `DFGLUTData.js` holds 16 x 16 texels, each computed at the center of its texel. `texture2D(dfgLUT, vec2(roughness,
 dotNV))` returns the last texel for every coordinate above 31/32. For roughness 1 at normal incidence it returns
-E = {after["texel"]:.4f}, which is right for the texel's center ({after["exact_texel"]:.4f}), where
-{after["exact_end"]:.4f} is meant; {after["exact_end"]:.4f} / {after["texel"]:.4f} = {after["exact_end"] / after["texel"]:.3f}
-is the albedo of white metal. The same happens below 1/32 toward grazing angles, with the opposite sign. White metal
-with other tables in the same program:
+E = {after["texel"]:.4f}, which is right for the texel's center ({after["exact_texel"]:.4f}); the energy there is
+{after["exact_end"]:.4f}. Their quotient, {after["exact_end"] / after["texel"]:.3f}, is the albedo of white metal. The
+same happens below 1/32 toward grazing angles, with the opposite sign. White metal with other tables in the same
+program:
 
 | table | roughness 1, n.v 1 | roughness 0.5, n.v 0.02 |
 |---|---|---|
@@ -156,7 +156,12 @@ CAUSES = {
     ("three-standard(metal=0)", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
     ("three-standard(metal=0)", "reciprocity"): "As for metal; the factor is 1 + 0.04 (1 / E - 1).",
     ("three-standard(metal=0)", "precision"): "As for metal.",
-    ("three-standard(metal=0)", "linearity"): "As for metal.",
+    ("three-standard(metal=0)", "linearity", "0.185.1"): "As for metal.",
+    (
+        "three-standard(metal=0)",
+        "linearity",
+    ): "Between metal and dielectric the mixed F0 is multiplied by 1 + F0 (1 / E - 1), "
+    "so that the color enters by its square while the diffuse lobe loses it. The size is invisible.",
     ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions and Favg, so that "
     "the color enters by its third power alone. The size is invisible.",
     ("three-physical", "reciprocity"): "As for the standard material; with clear coat the base is scaled by "
@@ -204,9 +209,9 @@ ENGINE = Engine(
         ),
     ),
     remarks={
-        "White dielectric": "`RE_Direct_Physical` leaves to the diffuse lobe 1 - F(v.h) of each light. At grazing angles "
-        "most lights have a large v.h and a small F, while the sum of all lights reflects far more: at roughness 0.1 and "
-        "n.v 0.05 gloss alone returns {gloss:.2f}, and the diffuse lobe keeps {gloss_diffuse:.2f}. "
+        "White dielectric": "`RE_Direct_Physical` leaves to the diffuse lobe 1 - F(v.h) of each light. At grazing "
+        "angles most lights have a large v.h and a small F, while the sum of all lights reflects far more: at "
+        "roughness 0.1 and n.v 0.05 gloss alone returns {gloss:.2f}, and the diffuse lobe keeps {gloss_diffuse:.2f}. "
         "`RE_IndirectDiffuse_Physical` in the same chunk uses 1 minus the albedo of the specular lobe instead. 0.185.1 "
         "does not reduce the diffuse lobe of direct light at all.",
         "White, half metal": "F0 is mixed before the compensation, 1 + F0 (1 / E - 1), which is meant for one F0; "

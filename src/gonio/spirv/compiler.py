@@ -108,24 +108,26 @@ class _Sources:
     def __init__(self, name: str, folders: Sequence[Path]) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
 
-    def expanded(self, text: str, name: str, depth: int) -> str:
+    def expanded(self, text: str, name: str, depth: int, first: int = 1) -> str:
+        """A text with its includes; it begins on the line `first` of its file."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
         own = self.names.index(name)
 
         def include(match: re.Match[str]) -> str:
-            line = text.count("\n", 0, match.start()) + 1
+            line = text.count("\n", 0, match.start()) + first
             if (rest := match[2].partition("//")[0].strip()) and not rest.startswith("/*"):
                 raise InputError(f"'{rest}' after an include", f"{name}:{line}", "a file, or FILE.js#NAME")
             file, _, literal = match[1].partition("#")
             path = self._located(file, f"{name}:{line}")
-            content, first = path.read_text(encoding="utf-8", errors="replace"), 1
+            content, start = path.read_text(encoding="utf-8", errors="replace"), 1
             if path.suffix == ".js":
-                _, content, first, _ = shader_in(content, literal, path.name)
+                _, content, start, _ = shader_in(content, literal, path.name)
             self.names.append(str(path))
-            inside = self.expanded(content, str(path), depth + 1)
-            return f"#line {first} {len(self.names) - 1}\n{inside}\n#line {line + 1} {own}"
+            number = len(self.names) - 1
+            inside = self.expanded(content, str(path), depth + 1, start)
+            return f"#line {start} {number}\n{inside}\n#line {line + 1} {own}"
 
         return _INCLUDE.sub(include, text)
 

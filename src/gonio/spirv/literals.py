@@ -33,7 +33,7 @@ class Literal(NamedTuple):
 
 def literals(text: str, where: str) -> list[Literal]:
     """The template literals of a JavaScript text, outside comments and strings. Raises InputError for an open one."""
-    found, at = [], 0
+    result, at = [], 0
     while (token := _TOKEN.search(text, at)) is not None:
         at = token.end()
         if token[0] == "`":
@@ -42,9 +42,9 @@ def literals(text: str, where: str) -> list[Literal]:
             named = _NAMED.search(_COMMENT.sub(" ", text[max(at - _NAME_BEFORE, 0) : at - 1]).rstrip())
             name = (named[1] or named[2]) if named else ""
             code_line = text.count("\n", 0, code) + 1 if code else 0
-            found.append(Literal(name, _unescaped(text[at : end - 1]), line, code_line))
+            result.append(Literal(name, _unescaped(text[at : end - 1]), line, code_line))
             at = end
-    return found
+    return result
 
 
 def shader_in(text: str, name: str, where: str) -> Literal:
