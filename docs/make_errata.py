@@ -69,7 +69,8 @@ replaced it. **Computed**, white furnace at F = 1:
 The thread's values of single scattering are confirmed. With an exact E the formula of the paper gives 1
 everywhere: it multiplies the lobe
 by 1 / E. If the new term does the same with the E of a table, that table is too large by 6 % and 12 % in the last
-two rows. It is: [the card of three.js](report-cards/engines/three.md) shows where, and how to mend it. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
+two rows. It is: [the card of three.js](report-cards/engines/three.md) shows where, and
+how to mend it. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
 
 
 def blended_metalness() -> str:

@@ -177,7 +177,7 @@ CAUSES = {
         "energy",
     ): "As for the standard material. The loss of up to a fifth at high anisotropy is not "
     "a violation: the table is read at `roughness`, which is the narrower of the two widths (`alphaT` is larger).",
-    ("three-iridescent", "positivity"): "Only derivatives: `Fresnel0ToIor` takes the square root of a base reflectance "
+    ("three-iridescent", "positivity"): "`Fresnel0ToIor` takes the square root of a base reflectance "
     "of 0, and the film's phase has a square root at grazing incidence. No value is wrong.",
     ("three-iridescent", "reciprocity"): "As for the standard material; besides, `evalIridescence` is called with "
     "n.v instead of v.h, once for all lights, also in 0.185.1.",
