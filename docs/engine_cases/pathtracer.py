@@ -68,7 +68,8 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## The cosine of the sheen
 
 `bsdfEval` adds `sheenColor`, D G / (4 cos cos), to values that contain the light's cosine. Without it the albedo of a
-white sheen of roughness 0.5 over a black metal is {grazing:.2f} at n.v 0.05 and {normal:.2f} at n.v 1. Remedy: multiply by wi.z, as in `specularEval`."""
+white sheen of roughness 0.5 over a black metal is {grazing:.2f} at n.v 0.05 and {normal:.2f} at n.v 1.
+Remedy: multiply by wi.z, as in `specularEval`."""
 
 
 ENGINE = Engine(
