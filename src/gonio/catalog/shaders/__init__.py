@@ -15,11 +15,19 @@ from .names import names_shader as names_shader
 
 if TYPE_CHECKING:
     from .adoption import adopt as adopt
+    from .engines import Package as Package
+    from .engines import adopt_package as adopt_package
+    from .engines import package_in as package_in
     from .files import Shader as Shader
     from .files import class_of as class_of
 else:
+    _HOMES = {
+        **dict.fromkeys(("Shader", "class_of"), ".files"),
+        **dict.fromkeys(("Package", "adopt_package", "package_in"), ".engines"),
+        "adopt": ".adoption",
+    }
 
     def __getattr__(name: str) -> object:
-        if name in ("adopt", "Shader", "class_of"):
-            return getattr(import_module(".adoption" if name == "adopt" else ".files", __name__), name)
+        if name in _HOMES:
+            return getattr(import_module(_HOMES[name], __name__), name)
         raise AttributeError(f"module 'gonio.catalog.shaders' has no attribute '{name}'")

@@ -97,8 +97,9 @@ class _SampledShaderFile(_ShaderFile):
         wi: Value = ops.vec3(*[numeric(part) for part in leaves(direction)[:3]])
         if "weight" not in members or "pdf" not in members:
             return self._weighted(wi=wi, wo=wo, mode=mode)
-        weight: Value = ops.vec3(*[numeric(part) for part in leaves(members["weight"])])
-        made = Sample.of_density(wi, weight, numeric(members["pdf"]))
+        above = self._above(wo, wi)  # as in eval and pdf: a direction below is a failed sample
+        weight: Value = ops.vec3(*[where(above, numeric(part), 0.0) for part in leaves(members["weight"])])
+        made = Sample.of_density(wi, weight, where(above, numeric(members["pdf"]), 0.0))
         if "delta" not in members:
             return made
         delta = truth(members["delta"])

@@ -55,7 +55,10 @@ class Program:
             names.add(name)
             shape = self.module.shape(type)
             if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
-                yield Declared(name, shape, self.adapter.parameters.get(name, Uniform()))
+                uniform = self.adapter.parameters.get(name, Uniform())
+                if uniform.default is None and name in self.module.defaults:
+                    uniform = replace(uniform, default=self.module.defaults[name])
+                yield Declared(name, shape, uniform)
         unknown = [name for name in self.adapter.parameters if name not in names]
         if unknown:
             known = ", ".join(sorted(names)) or "none"

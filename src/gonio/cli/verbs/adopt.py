@@ -9,29 +9,43 @@ from typing import Annotated
 from typer import Argument, Option
 
 from ...errors import InputError
-from ..options import Json
+from ..options import Json, output_option
 from .base import MATERIALS, verb
 
 
 @verb(MATERIALS, place=10)
 def adopt(
-    file: Annotated[Path, Argument(metavar="FILE", help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf.")],
+    file: Annotated[
+        Path,
+        Argument(metavar="FILE", help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf; or an engine's package."),
+    ],
     *,
+    output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
     force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
     as_json: Json = False,
 ) -> None:
     """Write the adapter of a shader, FILE.toml: which function is the BRDF, and what its arguments mean.
 
-    It is a first one by names of functions, arguments and uniforms; the guesses are printed.
+    It is a first one by names of functions, arguments and uniforms; the guesses are printed. The folder of an engine's
+    npm package gives shaders that include the package's text, with their adapters.
 
     \b
     Examples:
       gonio adopt my.glsl
       gonio verify my.glsl
+      gonio adopt node_modules/three
+      gonio verify three/three-standard.glsl
     """
     from ... import files
     from ...catalog import shaders
 
+    if file.is_dir():
+        _adopt_package(file, output, force=force, as_json=as_json)
+        return
+    if output is not None:
+        raise InputError(
+            "-o names the folder for a package's shaders", "--output", "leave it out: FILE.toml is written"
+        )
     adopted = shaders.adopt(file)
     target = Path(f"{file}.toml")
     if target.exists() and not force:
@@ -43,3 +57,13 @@ def adopt(
     print(target)
     for guess in adopted.guesses:
         print(f"  guessed: {guess}")
+
+
+def _adopt_package(folder: Path, output: Path | None, *, force: bool, as_json: bool) -> None:
+    from ...catalog import shaders
+
+    target = output or Path(shaders.package_in(folder).name.rpartition("/")[2])
+    if target.exists() and not force:
+        raise InputError(f"'{target}' is there already", "--output", "name another folder, or replace it with --force")
+    written = shaders.adopt_package(folder, target)
+    print(json.dumps({"written": [str(one) for one in written]}) if as_json else "\n".join(map(str, written)))

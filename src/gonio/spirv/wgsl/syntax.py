@@ -197,3 +197,23 @@ class Assertion(Node):
 
 
 Declaration = Function | Struct | Alias | Declared
+
+
+def names_in(expression: Expression) -> set[str]:
+    """The names of values that an expression uses."""
+    names, waiting = set(), [expression]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Name):
+            names.add(one.text)
+        elif isinstance(one, Call):
+            waiting += one.arguments
+        elif isinstance(one, Index):
+            waiting += [one.base, one.index]
+        elif isinstance(one, Member):
+            waiting.append(one.base)
+        elif isinstance(one, Unary):
+            waiting.append(one.inside)
+        elif isinstance(one, Chain):
+            waiting += [one.first, *(right for _, right, _ in one.rest)]
+    return names

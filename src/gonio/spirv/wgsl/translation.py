@@ -2,6 +2,9 @@
 
 Functions of the shader's own file are all translated, those of imported files where they are called. A function with
 constructs that are not read is refused where it is called, so that a file may contain anything else.
+
+An `override` of f32 without a value in `defines` is a uniform with a default; one that depends on such an override is
+computed before any function runs. Other overrides are constants, since loops and array lengths may depend on them.
 """
 
 from __future__ import annotations
@@ -18,8 +21,8 @@ from .emitter import Emitter, Value
 from .expressions import Expressions, Place, Signature
 from .sources import Sources, Unit
 from .statements import Body
-from .syntax import Alias, Declared, Expression, Function, Name, Struct
-from .types import FLOAT, MATRICES, NAMED, REFUSED, TEXTURES, VECTORS, VOID, Type, matrix, vector
+from .syntax import Alias, Assign, Block, Declared, Expression, Function, Name, Struct, names_in
+from .types import FLOAT, MATRICES, NAMED, REFUSED, TEXTURES, VECTORS, VOID, Type, concrete, matrix, vector
 
 MAX_INSIDE = 32  # declarations that need one another
 # SPIR-V's numbers of where a variable lives
@@ -95,8 +98,8 @@ class _Translation:
         key = home.where, declared.name
         if key not in self._values:
             with _Entered(self, key, home, declared.line):
-                made = self._variable if declared.kind == "var" else self._constant
-                self._values[key] = made(home, declared)
+                derived = self._computed if self._derived(home, declared) else self._constant
+                self._values[key] = (self._variable if declared.kind == "var" else derived)(home, declared)
         return self._values[key]
 
     def signature(self, unit: Unit, name: str, line: int) -> Signature | None:
@@ -186,16 +189,52 @@ class _Translation:
         self.emitter.structs[title] = names, types
         return Type("struct", name=title)
 
-    def _constant(self, unit: Unit, one: Declared) -> Value:
+    def _constant(self, unit: Unit, one: Declared) -> Value | Place:
         asked = self._asked(unit, one.type) if one.type is not None else None
         given = self.sources.defines.get(one.name) if one.kind == "override" else None
         if given is not None:
             return self._override(one, asked or FLOAT, given)
         if one.value is None:
+            if one.kind == "override" and asked == FLOAT:
+                return self._parameter(unit, one, None)
             hint = f"defines = {{ {one.name} = '...' }} in the adapter"
             raise self.emitter.error(f"{one.kind} {one.name} without a value", hint)
         value = Expressions(self.emitter, self, unit).value(one.value)
+        if one.kind == "override" and (asked or concrete(value.type)) == FLOAT:
+            return self._parameter(unit, one, self.emitter.converted(value, FLOAT, f"'{one.name}'"))
         return self.emitter.converted(value, asked, f"'{one.name}'") if asked is not None else value
+
+    def _parameter(self, unit: Unit, one: Declared, default: Value | None) -> Place:
+        """An override of f32 as a uniform."""
+        module, id = self.emitter.module, self.emitter.fresh()
+        pointer = self.emitter.type_id(Type("pointer", (FLOAT,), _SPACES[""]))
+        module.variables[id] = Instruction("Variable", pointer, id, (_SPACES[""],), one.line, unit.where)
+        module.names[id] = one.name
+        if default is not None:
+            module.defaults[one.name] = float(self.emitter.known(default) or 0.0)
+        return Place(id, FLOAT)
+
+    def _derived(self, unit: Unit, one: Declared) -> bool:
+        """Whether the value of an override depends on one that is a uniform, and is not given."""
+        if one.kind != "override" or one.value is None or one.name in self.sources.defines:
+            return False
+        return any(isinstance(self.value(unit, name, one.line), Place) for name in sorted(names_in(one.value)))
+
+    def _computed(self, unit: Unit, one: Declared) -> Place:
+        """A variable for an override, and the function that assigns it, after those on which it depends."""
+        assert one.value is not None
+        type = self._asked(unit, one.type) if one.type is not None else FLOAT
+        place = Place(self.emitter.fresh(), type)
+        pointer = self.emitter.type_id(Type("pointer", (type,), _SPACES["private"]))
+        operands = (_SPACES["private"],)
+        self.emitter.module.variables[place.pointer] = Instruction(
+            "Variable", pointer, place.pointer, operands, one.line, unit.where
+        )
+        start = Signature(self.emitter.fresh(), (), VOID)
+        self.emitter.module.names[start.id] = "main"
+        body = Block(one.line, [Assign(one.line, Name(one.line, one.name), "=", one.value)])
+        self._queue.append((unit, Function(one.line, "main", [], None, body, False), start))
+        return place
 
     def _override(self, one: Declared, type: Type, text: str) -> Value:
         try:

@@ -6,8 +6,10 @@ import ast
 import os
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from ...catalog import shaders
+from ...errors import GonioError
 from ..verdict import DECLARED, FAIL, Card, Verdict
 
 _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
@@ -29,6 +31,8 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
+        if shaders.names_shader(shader := card.subject.target.partition("(")[0]):
+            return Place(_relative(Path(os.path.expanduser(shader))), _function_line(shader))
         known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
         return Place(_relative(file), 1) if known else None
     file = Path(os.path.expanduser(named["file"]))
@@ -83,6 +87,18 @@ def _relative(file: Path) -> str:
         if path.resolve().is_relative_to(base.resolve()):
             return path.resolve().relative_to(base.resolve()).as_posix()
     return path.as_posix()
+
+
+def _function_line(shader: str) -> int:
+    """The line on which a shader's BRDF begins, 1 if that is in another file."""
+    try:
+        cls: Any = shaders.class_of(shader)
+        name = cls.program.adapter.function
+        text = Path(os.path.expanduser(shader)).read_text(encoding="utf-8", errors="replace")
+    except (GonioError, OSError):
+        return 1
+    lines = enumerate(text.splitlines(), 1)
+    return next((number for number, line in lines if re.search(rf"\b{re.escape(name)}\s*\(", line)), 1)
 
 
 def _class_line(file: Path, name: str) -> int:

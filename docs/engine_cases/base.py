@@ -1,0 +1,83 @@
+"""What is measured of an engine: white furnaces, trials that isolate a cause, and the causes.
+
+A cause names functions and tables of the engine. Figures in it come from the trials; `{name}` stands for one.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gonio as go
+import numpy as np
+from gonio.material import BSDF
+
+COSINES = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
+ROUGHNESSES = (0.1, 0.25, 0.5, 0.75, 1.0)
+Make = Callable[..., BSDF]  # a material of a class by its parameters
+
+
+class Furnace(NamedTuple):
+    """A white furnace: the material, and its parameters for a roughness."""
+
+    title: str
+    material: str
+    parameters: Callable[[float], dict[str, float]]
+
+
+class Engine(NamedTuple):
+    """What is measured of an engine.
+
+    package    of npm; `title`, and `home`, the address of the repository
+    intro      sentences above the tables
+    materials  the shaders to verify
+    furnaces   white furnaces, one table each; `remarks` on them, by title
+    trials     folder of the adopted shaders -> figures that isolate causes
+    sections   figures by version -> further sections of the page
+    causes     (material, law) or (material, law, version) -> cause and remedy
+    programs   files of report-cards/engines/programs that show it without Gonio
+    """
+
+    package: str
+    title: str
+    home: str
+    intro: str
+    materials: tuple[str, ...]
+    furnaces: tuple[Furnace, ...]
+    remarks: Mapping[str, str]
+    trials: Callable[[Path], dict[str, float]]
+    sections: Callable[[dict[str, dict[str, float]]], str]
+    causes: Mapping[tuple[str, ...], str]
+    programs: tuple[str, ...]
+
+
+def material(folder: Path, name: str, **parameters: float) -> Any:
+    """A material of an adopted package."""
+    return go.Shader(folder / f"{name}.glsl", **parameters)
+
+
+def furnace(one: BSDF, cosines: tuple[float, ...] = COSINES) -> list[float]:
+    """Albedo of the first channel at each cosine."""
+    return [float(value) for value in np.asarray(go.albedo(one, mu=list(cosines)).value)[..., 0]]
+
+
+@functools.cache
+def single_scattering(roughness: float, cosines: tuple[float, ...]) -> list[float]:
+    """E of GGX with the height-correlated Smith term at F = 1."""
+    return furnace(go.Metal(r0=1.0, edge=1.0, alpha=roughness * roughness), cosines)
+
+
+def asymmetry(one: BSDF, count: int = 4000) -> float:
+    """Largest relative difference of f(wo, wi) and f(wi, wo), of pairs to 89 degrees."""
+    random = np.random.default_rng(1)
+
+    def directions() -> np.ndarray:
+        z, phi = random.uniform(0.02, 1.0, count), random.uniform(0.0, 2.0 * np.pi, count)
+        r = np.sqrt(1.0 - z * z)
+        return np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
+
+    wo, wi = directions(), directions()
+    there, back = (np.asarray(one.f(*pair, precision="float64")) for pair in ((wo, wi), (wi, wo)))
+    return float(np.max(np.abs(there - back) / np.maximum(np.maximum(np.abs(there), np.abs(back)), 1e-12)))

@@ -1,0 +1,307 @@
+"""Write docs/report-cards/engines/: the verdicts on the shaders of engines, from packages of npm that the user has.
+
+    python docs/make_engine_cards.py PACKAGES [--only three,...]     measure, store cards.json, write pages and pictures
+    python docs/make_engine_cards.py [--check]                       the pages again from cards.json; --check: compare
+
+PACKAGES is a folder with one folder per release, each with its package.json, such as three-0.185.1 and three-0.187.0:
+
+    npm pack three@0.187.0 && mkdir three-0.187.0 && tar xzf three-0.187.0.tgz -C three-0.187.0 --strip-components=1
+
+What is measured of an engine, and the causes: docs/engine_cases.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import matplotlib
+from engine_cases import engines
+from engine_cases.base import COSINES, ROUGHNESSES, Engine, furnace, material
+from gonio.catalog import shaders
+from gonio.verify.severity import percent
+from gonio.verify.verdict import Verdict
+
+matplotlib.use("agg")
+import matplotlib.pyplot as plt
+
+FOLDER = Path(__file__).parent / "report-cards" / "engines"
+STORED = FOLDER / "cards.json"
+SEED = 1
+OVERVIEW = """Shaders of engines that are on npm, judged by the laws of [`gonio verify`](../../verify.md) and by white
+furnaces. Gonio contains no text of theirs: `gonio adopt node_modules/three` writes a program that includes the
+package's own ([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function
+or table, and how to see it without Gonio. The laws are those of a path tracer: a rasterizer need not be reciprocal, and
+several causes are deliberate. Corrections are welcome.
+"""
+
+
+# --------------------------------------------------------------------------- measuring
+
+
+def releases(packages: Path, only: set[str]) -> dict[str, list[shaders.Package]]:
+    """The packages in a folder by name, each with its releases in order."""
+    found: dict[str, list[shaders.Package]] = {}
+    for one in sorted([*packages.glob("*/package.json"), *packages.glob("@*/*/package.json")]):
+        try:
+            package = shaders.package_in(one.parent)
+        except go.InputError:
+            continue
+        if not only or package.name in only:
+            found.setdefault(package.name, []).append(package)
+    return {name: sorted(every, key=lambda one: _order(one.version)) for name, every in found.items()}
+
+
+def _order(version: str) -> list[int]:
+    return [int(part) for part in re.findall(r"\d+", version)]
+
+
+def measured(engine: Engine, package: shaders.Package) -> dict[str, Any]:
+    """All figures of a release."""
+    with tempfile.TemporaryDirectory(prefix="gonio-engine-") as place:
+        folder = Path(place)
+        shaders.adopt_package(package.folder, folder)
+        return {
+            "furnaces": {
+                one.title: [furnace(material(folder, one.material, **one.parameters(r))) for r in ROUGHNESSES]
+                for one in engine.furnaces
+            },
+            "trials": engine.trials(folder),
+            "laws": {name: _judged(folder, name) for name in engine.materials},
+        }
+
+
+def _judged(folder: Path, name: str) -> dict[str, Any]:
+    stem, _, settings = name.partition("(")  # "three-standard(metal=0)"
+    (card,) = go.verify(f"{folder / stem}.glsl{'(' * bool(settings)}{settings}", quick=True, seed=SEED).cards
+    return {
+        v.law: {
+            "status": v.status,
+            "grade": str(v.grade or ""),
+            "shown": v.shown,
+            "size": _size(v) if v.failed else "",
+            "at": ", ".join(f"{key} {value}" for key, value in _settings(v.why)) if v.failed else "",
+        }
+        for v in card.verdicts
+    }
+
+
+def _settings(why: list[str]) -> list[tuple[str, str]]:
+    """The parameter values in a verdict's words, "at rough = 0, metal = 0: ..."."""
+    match = re.match(r"at ((?:\w+ = [\d.e+-]+(?:, )?)+):", why[0]) if why else None
+    return re.findall(r"(\w+) = ([\d.e+-]+)", match[1]) if match else []
+
+
+def _size(v: Verdict) -> str:
+    if v.bias is not None and v.bias.kind in ("bias", "lost", "gained"):
+        verb = {"bias": "wrong by", "lost": "loses", "gained": "gains"}[v.bias.kind]
+        return f"{verb} {percent(v.bias.average)} of the light on average, {percent(v.bias.worst)} at worst"
+    return v.shown if v.bias is None else v.bias.words
+
+
+# --------------------------------------------------------------------------- pages
+
+
+def cause(engine: Engine, name: str, law: str, version: str, figures: dict[str, float]) -> str:
+    """The cause of a failure, with figures of the trials, or "unexplained"."""
+    text = engine.causes.get((name, law, version)) or engine.causes.get((name, law))
+    return text.format_map(figures) if text else "unexplained"
+
+
+def page(engine: Engine, results: dict[str, Any]) -> str:
+    """The page of an engine, from stored figures alone."""
+    versions = list(results)
+    last = results[versions[-1]]
+    stem = engine.package.rpartition("/")[2]
+    shown = " and ".join(versions)
+    lines = [
+        f"# {engine.title}",
+        "",
+        f"`{engine.package}` {shown} of npm; [repository]({engine.home}).",
+        "Written by `python docs/make_engine_cards.py`; all figures are in [cards.json](cards.json).",
+        "",
+        engine.intro,
+        "",
+        "## White furnace",
+        "",
+        "The albedo of white materials, whose every factor is 1, at five roughnesses and six angles. 1 is meant: below",
+        "it light is lost, above it gained.",
+        "",
+        f"![White furnaces of {engine.title}]({stem}.png)",
+    ]
+    for one in engine.furnaces:
+        lines += ["", f"### {one.title}", "", *_furnace_table(one.title, results)]
+        if remark := engine.remarks.get(one.title):
+            lines += ["", _wrapped(remark.format_map(last["trials"]))]
+    lines += (
+        ["", engine.sections({version: results[version]["trials"] for version in versions})] if engine.sections else []
+    )
+    lines += ["", "## Failures", "", *_failures(engine, results), "", *_again(engine, versions[-1], stem)]
+    return "\n".join(lines).replace("\n\n\n", "\n\n") + "\n"
+
+
+def _furnace_table(title: str, results: dict[str, Any]) -> list[str]:
+    lines = [
+        f"| roughness | {' | '.join(f'n.v {cosine:g}' for cosine in COSINES)} |",
+        "|---" * (len(COSINES) + 1) + "|",
+    ]
+    for place, roughness in enumerate(ROUGHNESSES):
+        cells = [
+            " → ".join(f"{result['furnaces'][title][place][column]:.3f}" for result in results.values())
+            for column in range(len(COSINES))
+        ]
+        lines.append(f"| {roughness:g} | {' | '.join(cells)} |")
+    return lines
+
+
+def _failures(engine: Engine, results: dict[str, Any]) -> list[str]:
+    laws = list(next(iter(next(iter(results.values()))["laws"].values())))
+    lines = [
+        f"`gonio verify --quick`, seed {SEED}, at the default values and over all ranges. The grades are explained",
+        "[here](../../verify.md#severity-of-a-failure).",
+        "",
+        f"| material | release | {' | '.join(laws)} |",
+        "|---" * (len(laws) + 2) + "|",
+    ]
+    for name in engine.materials:
+        for version, result in results.items():
+            cells = [_cell(result["laws"][name][law]) for law in laws]
+            lines.append(f"| {name} | {version} | {' | '.join(cells)} |")
+    for name in engine.materials:
+        lines += ["", f"### {name}", ""]
+        count = len(lines)
+        for law in laws:
+            for version, result in results.items():
+                one = result["laws"][name][law]
+                if one["status"] == "fail":
+                    at = f" ({one['at']})" if one["at"] else ""
+                    why = cause(engine, name, law, version, result["trials"])
+                    words = f"- **{law}**, {version}: {one['shown']}; {one['size']}{at}. Cause: {why}"
+                    lines.append(_wrapped(words, "  "))
+        lines += ["All laws hold."] if len(lines) == count else []
+    return lines
+
+
+def _cell(one: dict[str, str]) -> str:
+    if one["status"] != "fail":
+        return {"does not apply": "-", "breaks as declared": "declared"}.get(one["status"], one["status"])
+    return f"**fails**: {one['grade']}" if one["grade"] else "**fails**"
+
+
+def _again(engine: Engine, version: str, stem: str) -> list[str]:
+    lines = [
+        "## Again",
+        "",
+        f"    npm install {engine.package}@{version}",
+        f"    gonio adopt node_modules/{engine.package} -o {stem}",
+        *(f"    gonio verify {_operand(stem, name)}" for name in engine.materials),
+    ]
+    if engine.programs:
+        links = ", ".join(f"[{name}](programs/{name})" for name in engine.programs)
+        printed = sorted((FOLDER / "programs").glob(f"{stem}-*.txt"))
+        outputs = ", ".join(f"[{one.stem}](programs/{one.name})" for one in printed)
+        lines += ["", f"Without Gonio: {links}, whose first lines say how to run it.", f"What it printed: {outputs}."]
+    return lines
+
+
+def _operand(folder: str, name: str) -> str:
+    stem, _, settings = name.partition("(")
+    return f'"{folder}/{stem}.glsl({settings}"' if settings else f"{folder}/{stem}.glsl"
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def overview(stored: dict[str, Any]) -> str:
+    """The list of engines."""
+    lines = [
+        "# Report cards of engines",
+        "",
+        *OVERVIEW.split("\n"),
+        "| engine | releases | white metal, roughness 1, n.v 1 | largest gain of a white furnace | laws that fail |",
+        "|---|---|---|---|---|",
+    ]
+    for name, results in stored.items():
+        engine, last = engines()[name], list(results.values())[-1]
+        stem = name.rpartition("/")[2]
+        metal = last["furnaces"][engine.furnaces[0].title][-1][-1]
+        gain, title = max((max(map(max, rows)) - 1.0, title) for title, rows in last["furnaces"].items())
+        failed = sorted({law for laws in last["laws"].values() for law, one in laws.items() if one["status"] == "fail"})
+        lines.append(
+            f"| [{engine.title}]({stem}.md) | {', '.join(results)} | {metal:.3f} | "
+            f"{max(gain, 0.0):.3f} ({title[:1].lower()}{title[1:]}) | {', '.join(failed) or 'none'} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+# --------------------------------------------------------------------------- pictures
+
+
+def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
+    """All furnaces of an engine: a row per furnace, a column per release; blue loses light, red gains it."""
+    columns, rows = len(results), len(engine.furnaces)
+    figure, axes = plt.subplots(rows, columns, figsize=(5.2 * columns + 0.8, 2.75 * rows + 0.4), squeeze=False,
+                                constrained_layout=True)  # fmt: skip
+    image = None
+    for across, (version, result) in enumerate(results.items()):
+        for down, one in enumerate(engine.furnaces):
+            axis, values = axes[down][across], result["furnaces"][one.title]
+            image = axis.imshow(values, cmap="RdBu_r", vmin=0.5, vmax=1.5, aspect="auto", origin="lower")
+            for y, row in enumerate(values):
+                for x, value in enumerate(row):
+                    dark = abs(value - 1.0) > 0.32
+                    axis.text(x, y, f"{value:.2f}", ha="center", va="center", fontsize=8.5, color="w" if dark else "k")
+            axis.set_xticks(range(len(COSINES)), [f"{cosine:g}" for cosine in COSINES])
+            axis.set_yticks(range(len(ROUGHNESSES)), [f"{roughness:g}" for roughness in ROUGHNESSES])
+            axis.set_title(f"{one.title}\n{engine.title} {version}", fontsize=9.5)
+            axis.set_xlabel("n.v" if down == rows - 1 else "")
+            axis.set_ylabel("roughness" if across == 0 else "")
+            axis.tick_params(length=0)
+            for side in axis.spines.values():
+                side.set_visible(False)
+    bar = figure.colorbar(image, ax=axes, shrink=0.6, aspect=40, pad=0.015, extend="both")
+    bar.set_label("albedo; 1 is meant")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    plt.close(figure)
+
+
+def written(stored: dict[str, Any]) -> dict[Path, str]:
+    """All pages by path."""
+    pages = {FOLDER / f"{name.rpartition('/')[2]}.md": page(engines()[name], one) for name, one in stored.items()}
+    return {FOLDER / "README.md": overview(stored), **pages}
+
+
+def main() -> int:
+    """Measure, and write or check the pages; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("packages", nargs="?", type=Path)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--check", action="store_true")
+    options = parser.parse_args()
+    stored: dict[str, Any] = json.loads(STORED.read_text(encoding="utf-8")) if STORED.is_file() else {}
+    if options.packages is not None:
+        for name, packages in releases(options.packages, set(filter(None, options.only.split(",")))).items():
+            stored[name] = {one.version: measured(engines()[name], one) for one in packages}
+            picture(engines()[name], stored[name], FOLDER / f"{name.rpartition('/')[2]}.png")
+            print(f"{name}: {', '.join(stored[name])}", flush=True)
+        stored = dict(sorted(stored.items()))
+        STORED.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    stale = [path for path, text in written(stored).items() if not path.is_file() or path.read_text() != text]
+    if options.check:
+        print("\n".join(f"out of date: {path}" for path in stale) or "all pages are up to date")
+        return int(bool(stale))
+    for path, text in written(stored).items():
+        path.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,88 @@
+"""Adapters to the shaders of engines: a folder per engine, which holds no text of the engine.
+
+    adopt_package("node_modules/three", "three")     writes three-standard.glsl, its adapter, and the tables it reads
+
+A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
+of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`).
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import json
+import os
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .... import files
+from ....errors import InputError
+
+MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
+
+
+class Engine(NamedTuple):
+    """An engine: the name of its package on npm, our programs, and its tables by file name."""
+
+    package: str
+    folder: Path
+    tables: Callable[[Path], dict[str, np.ndarray]]
+
+
+class Package(NamedTuple):
+    """A package that a user has: its name and version by its package.json, and its folder."""
+
+    name: str
+    version: str
+    folder: Path
+
+
+def engines() -> dict[str, Engine]:
+    """All engines by the names of their packages."""
+    modules = [importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__)]
+    return {one.PACKAGE: Engine(one.PACKAGE, Path(one.__path__[0]), one.tables) for one in modules}
+
+
+def package_in(folder: str | os.PathLike[str]) -> Package:
+    """The package in a folder. Raises InputError if none of an engine is there."""
+    path = Path(folder).expanduser() / "package.json"
+    hint = f"the folder of {', '.join(engines())}, such as node_modules/three"
+    try:
+        if path.stat().st_size > MAX_DESCRIPTION:
+            raise InputError(f"over {MAX_DESCRIPTION >> 20} MB", str(path), hint)
+        about = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"no package: {error}", str(folder), hint) from None
+    name = about.get("name") if isinstance(about, dict) else None
+    if name not in engines():
+        raise InputError(f"no adapter to the package '{name}'", str(folder), hint)
+    return Package(name, str(about.get("version", "")), path.parent)
+
+
+def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]) -> list[Path]:
+    """Write the materials of a package of an engine into a folder: each a .glsl with its adapter.
+
+    folder  the package as npm installs it, such as node_modules/three; it is read again whenever a material is used
+    target  the folder to write, made if missing; the shaders name the package relative to it
+    Returns the shaders, one per material. Raises InputError if the package is none that Gonio knows.
+    """
+    package = package_in(folder)
+    engine = engines()[package.name]
+    place = Path(target)
+    tables = engine.tables(package.folder)
+    there = os.path.relpath(package.folder.resolve(), place.resolve()).replace(os.sep, "/")
+    place.mkdir(parents=True, exist_ok=True)
+    for source in sorted(engine.folder.glob("*.glsl*")):
+        text = source.read_text(encoding="utf-8")
+        if source.suffix == ".toml":
+            text = text.replace('"package/', f'"{there}/')
+        files.write_whole(place / source.name, text.encode())
+    for name, table in tables.items():
+        data = io.BytesIO()
+        np.save(data, table, allow_pickle=False)
+        files.write_whole(place / f"{name}.npy", data.getvalue())
+    return [place / one.stem for one in sorted(engine.folder.glob("*.glsl.toml"))]

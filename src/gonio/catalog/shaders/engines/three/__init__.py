@@ -1,0 +1,26 @@
+"""three.js: its fragment program for MeshStandardMaterial and MeshPhysicalMaterial."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .....errors import InputError
+from .....spirv.literals import array_in
+
+PACKAGE = "three"
+_TABLE = "src/renderers/shaders/DFGLUTData.js"
+
+
+def tables(package: Path) -> dict[str, np.ndarray]:
+    """The table of the split sum: rows by n.v, columns by roughness; half floats of scale and bias."""
+    try:
+        text = (package / _TABLE).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"no table: {error.strerror}", str(package / _TABLE), "three of 0.181 or later") from None
+    _, words = array_in(text, "DATA", _TABLE)
+    size = round((len(words) / 2) ** 0.5)
+    if len(words) != 2 * size * size or any(not 0 <= word < 1 << 16 for word in words):
+        raise InputError(f"{len(words)} numbers, two half floats per texel of a square expected", _TABLE)
+    return {"dfgLUT": np.array(words, np.uint16).view(np.float16).astype(np.float64).reshape(size, size, 2)}

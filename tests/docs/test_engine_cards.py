@@ -1,0 +1,51 @@
+"""The cards of engines: the pages are those of the stored figures, which the engines' own renderers confirm."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+FOLDER = DOCS / "report-cards" / "engines"
+CARDS = json.loads((FOLDER / "cards.json").read_text())
+ROUGHNESSES, COSINES = (0.1, 0.25, 0.5, 0.75, 1.0), (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
+ROW = re.compile(r"^(.*), roughness ([\d.]+), n\.v ([\d.]+): ([\d.]+)$", re.MULTILINE)
+
+
+def test_pages_are_made_of_the_stored_figures() -> None:
+    done = subprocess.run([sys.executable, DOCS / "make_engine_cards.py", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_figures_of_the_thread_about_rough_metals_are_met() -> None:
+    stated = {"0.5_0.5": (0.90, 1.00), "0.75_0.5": (0.84, 1.00), "1_0.5": (0.72, 0.94), "1_1": (0.58, 0.89)}
+    before, after = (CARDS["three"][version]["trials"] for version in ("0.185.1", "0.187.0"))
+    for place, (old, new) in stated.items():
+        assert abs(before[f"thread_{place}"] - old) < 0.01 and abs(after[f"thread_{place}"] - new) < 0.01
+
+
+def test_table_of_the_same_size_from_edge_to_edge_mends_white_metal() -> None:
+    figures = CARDS["three"]["0.187.0"]["trials"]
+    assert figures["own"] == pytest.approx(figures["exact_end"] / figures["texel"], abs=1e-3)
+    assert figures["texel"] == pytest.approx(figures["exact_texel"], abs=1e-3)  # its entries are right
+    assert abs(1.0 - figures["edges_16"]) < 0.05 * abs(1.0 - figures["own"])
+
+
+@pytest.mark.parametrize("output", sorted((FOLDER / "programs").glob("*.txt")), ids=lambda path: path.stem)
+def test_renderer_of_the_engine_returns_our_figures(output: Path) -> None:
+    package, _, version = output.stem.removesuffix(".txt").replace("-furnace-", " ").partition(" ")
+    furnaces = CARDS[package][version]["furnaces"]
+    rows = ROW.findall(output.read_text())
+    assert len(rows) >= 8
+    for title, roughness, cosine, albedo in rows:
+        ours = furnaces[title][ROUGHNESSES.index(float(roughness))][COSINES.index(float(cosine))]
+        assert float(albedo) == pytest.approx(ours, abs=1e-3), (title, roughness, cosine)
+
+
+def test_every_failure_has_a_size_and_a_cause() -> None:
+    for path in FOLDER.glob("*.md"):
+        for line in re.findall(r"^- \*\*.*?(?=^- |^#|\Z)", path.read_text(), re.MULTILINE | re.DOTALL):
+            assert re.search(r"\d", line.partition(":")[2]) and "Cause:" in line.replace("\n  ", " "), line

@@ -1,0 +1,113 @@
+"""Packages of engines as materials. The packages here are short ones of our own, in the layout of the engine's."""
+
+import json
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.catalog import shaders
+from gonio.catalog.shaders import engines
+from gonio.cli.app import app
+from gonio.errors import InputError
+from gonio.spirv.compiler import compiler
+from typer.testing import CliRunner
+
+# a program with the names that ours assigns and includes, and a formula of our own: color (1 + table) cos / pi
+PROGRAM = """
+uniform vec3 diffuse;
+uniform float roughness;
+uniform float metalness;
+uniform float opacity;
+varying vec3 vNormal;
+varying vec3 vViewPosition;
+#include <lights>
+#include <lights_physical_pars_fragment>
+void main() {
+    float view = normalize(vViewPosition).z + dFdx(vNormal.x);
+    float table = texture2D(dfgLUT, vec2(roughness, view)).y;
+    float light = dot(directionalLights[0].direction, vNormal);
+    vec3 color = diffuse * (1.0 + table) * light / 3.14159265;
+    gl_FragColor = linearToOutputTexel(vec4(color * directionalLights[0].color, opacity));
+}
+"""
+LIGHTS = """
+struct DirectionalLight { vec3 direction; vec3 color; };
+uniform DirectionalLight directionalLights[ NUM_DIR_LIGHTS ];
+"""
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Path:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    package = tmp_path / "node_modules" / "three"
+    folder = package / "src" / "renderers" / "shaders"
+    for name, text in {
+        "ShaderLib/meshphysical.glsl.js": f"export const vertex = ``;\nexport const fragment = `{PROGRAM}`;\n",
+        "ShaderChunk/lights.glsl.js": f"export default /* glsl */`{LIGHTS}`;\n",
+        "ShaderChunk/lights_physical_pars_fragment.glsl.js": "export default `uniform sampler2D dfgLUT;`;\n",
+        "DFGLUTData.js": "const DATA = new Uint16Array( [ 0, 0x3c00, 0, 0x3c00, 0, 0x3800, 0, 0x3800 ] );\n",
+    }.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    (package / "package.json").write_text(json.dumps({"name": "three", "version": "0.999.0"}))
+    return package
+
+
+def test_program_of_the_package_is_the_material(three: Path, tmp_path: Path) -> None:
+    written = shaders.adopt_package(three, tmp_path / "three")
+    assert "three-standard.glsl" in {one.name for one in written}
+    assert str(tmp_path) not in (tmp_path / "three" / "three-standard.glsl.toml").read_text()
+    material = go.Shader(tmp_path / "three" / "three-standard.glsl", color=(0.2, 0.4, 0.6), rough=0.3)
+    assert list(material.parameters()) == ["color", "rough", "metal"]
+    wo, wi = np.array([[0.0, 0.6, 0.8], [0.6, 0.0, 0.8]]), np.array([[0.0, 0.0, 1.0], [0.8, 0.0, 0.6]])
+    table = 1.0 - 0.5 * (0.8 * 2.0 - 0.5)  # linear between 1 at n.v = 1/4 and 0.5 at 3/4, and constant beyond
+    expected = np.array([[0.2, 0.4, 0.6]]) * (1.0 + max(table, 0.5)) * wi[:, 2:] / np.pi
+    np.testing.assert_allclose(material.eval(wo, wi, precision="float64"), expected, rtol=1e-6)
+
+
+def test_changed_package_is_read_again(three: Path, tmp_path: Path) -> None:
+    file = shaders.adopt_package(three, tmp_path / "three")[-1]
+    program = three / "src/renderers/shaders/ShaderLib/meshphysical.glsl.js"
+    program.write_text(program.read_text().replace("gl_FragColor =", "gl_FragColr ="))
+    with pytest.raises(InputError, match="gl_FragColr") as error:
+        go.Shader(file)
+    assert str(error.value.where).endswith("meshphysical.glsl.js:16")
+
+
+def test_verb_writes_the_package_and_keeps_what_is_there(
+    three: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke(app, ["adopt", "node_modules/three"])
+    assert run.exit_code == 0 and "three/three-standard.glsl" in run.output
+    again = CliRunner().invoke(app, ["adopt", "node_modules/three"])
+    assert again.exit_code != 0
+    assert CliRunner().invoke(app, ["adopt", "node_modules/three", "--force"]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("", "no package"), ("[]", "no adapter to the package 'None'"), ('{"name": "left-pad"}', "'left-pad'")],
+)
+def test_other_packages_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "package.json").write_text(text)
+    with pytest.raises(InputError, match=message) as error:
+        shaders.adopt_package(tmp_path, tmp_path / "out")
+    assert "node_modules/three" in str(error.value.hint)
+
+
+def test_table_of_another_size_is_refused(three: Path, tmp_path: Path) -> None:
+    (three / "src/renderers/shaders/DFGLUTData.js").write_text("const DATA = new Uint16Array( [ 1, 2, 3 ] );")
+    with pytest.raises(InputError, match="3 numbers"):
+        shaders.adopt_package(three, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_adapter_names_its_program() -> None:
+    for engine in engines.engines().values():
+        for adapter in engine.folder.glob("*.glsl.toml"):
+            assert adapter.with_suffix("").is_file()

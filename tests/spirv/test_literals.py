@@ -1,0 +1,76 @@
+"""Template literals of JavaScript as data: names, comments, strings, escapes, code inside."""
+
+from pathlib import Path
+
+import pytest
+from gonio.errors import InputError
+from gonio.spirv import Machine, compile_text, parse
+from gonio.spirv.compiler import compiler
+from gonio.spirv.literals import array_in, literals, shader_in
+
+TEXT = r"""
+// a comment with a ` in it
+/* and `one` more */
+const quoted = "a ` in a string", other = 'and \' ` here';
+export default /* glsl */`
+float two() { return 2.0; } // it's GLSL's own: \`, \\ and \${
+`;
+export const named = `first`, typed: string = `second`;
+const made = { shader: `third ${ `inside ${ 1 } }` } end`, plain: `fourth` };
+"""
+
+
+def test_literals_have_their_names_and_lines() -> None:
+    found = literals(TEXT, "x.js")
+    assert [one.name for one in found] == ["default", "named", "typed", "shader", "plain"]
+    assert [one.line for one in found] == [5, 8, 8, 9, 9]
+    assert found[0].text == "\nfloat two() { return 2.0; } // it's GLSL's own: `, \\ and ${\n"
+    assert [one.code for one in found] == [0, 0, 0, 9, 0]
+
+
+def test_text_that_is_made_by_code_is_refused() -> None:
+    assert shader_in(TEXT, "plain", "x.js").text == "fourth"
+    with pytest.raises(InputError, match=r"running JavaScript") as refused:
+        shader_in(TEXT, "shader", "x.js")
+    assert refused.value.where == "x.js:9"
+    with pytest.raises(InputError, match="5 template literals") as several:
+        shader_in(TEXT, "", "x.js")
+    assert "named, typed" in several.value.hint
+    with pytest.raises(InputError, match="0 template literals named missing"):
+        shader_in(TEXT, "missing", "x.js")
+
+
+@pytest.mark.parametrize("text", ["`", "a = `b ${ c", "`${ `${ `", "x = `\\"])
+def test_literal_without_an_end_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="does not end"):
+        literals(text, "x.js")
+
+
+def test_array_of_numbers() -> None:
+    assert array_in("const D = new Uint16Array( [\n0x3c00, 1, 2e1,\n] );", "D", "x.js") == (
+        "Uint16Array",
+        [15360, 1, 20],
+    )
+    for text in ("D = [1]", "D = new Float32Array([f()])", "E = new Float32Array([1])"):
+        with pytest.raises(InputError, match="no array D"):
+            array_in(text, "D", "x.js")
+    with pytest.raises(InputError, match="D: "):
+        array_in("D = new Float32Array([1-2])", "D", "x.js")
+
+
+def test_shader_includes_text_from_javascript(tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    (tmp_path / "two.glsl.js").write_text(TEXT.partition("export const")[0])
+    (tmp_path / "both.js").write_text(
+        "const a = `float f() { return 1.0; }`;\nconst b = `\nfloat g() { return h(); }`;\n"
+    )
+    module = parse(compile_text("#include <two>\n#include <both.js#a>\n", "x.glsl", folders=[tmp_path]))
+    assert [Machine(module).call(module.function(name)[0], []) for name in ("two", "f")] == [2.0, 1.0]
+    with pytest.raises(InputError) as broken:
+        compile_text("#include <both.js#b>\n", "x.glsl", folders=[tmp_path])
+    assert str(broken.value.where).endswith("both.js:3")
+    with pytest.raises(InputError, match=r"'\[0..2\]' after an include"):
+        compile_text("#include <two>[0..2]\n", "x.glsl", folders=[tmp_path])
