@@ -132,7 +132,7 @@ def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[
     except (Fault, InputError):
         values = None
     if together is None or values is None:
-        return [case for limit in limits for case in _alone(subject, axes, limit, rng, wo, wi)]
+        return [case for limit in limits for case in _at_one(subject, axes, limit, rng, wo, wi)]
     changed = [_changed(axes, limit, block, rng) for limit, block in zip(limits, blocks, strict=False)]
     muted = _values(_in_blocks(subject, [*changed, blocks[-1]]), blocks, wo, wi)
     cases: list[_Case] = []
@@ -177,7 +177,7 @@ def _named(
     return failed or [case]
 
 
-def _alone(
+def _at_one(
     subject: Subject,
     axes: Mapping[str, box.Axis],
     limit: Limit,
