@@ -123,7 +123,8 @@ class BSDF(Material):
         mode    "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
         derivatives  of arrays: paths of parameters; the result is stacked: values, then their derivative by each
         wavelengths  of arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are no spectrum
-        Returns (N, channels); for arrays of shape (..., 3), (..., channels).
+        parameters   of tensors of PyTorch or JAX (wo, wi or these): path -> tensor, which receives gradients
+        Returns (N, channels); for arrays of shape (..., 3), (..., channels); for tensors a tensor, on the device of wo.
         """
         raise NotImplementedError(f"{type(self).__name__} has no eval")
 
