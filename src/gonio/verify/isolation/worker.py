@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from ...bridge.faults import wide_vectors
 from ...catalog import notation, outside
 from ...errors import GonioError, GonioWarning, InputError, MachineError
 from ...material import BSDF
@@ -68,7 +67,6 @@ def main() -> None:
 
 def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
     say("step", -1, LOADING)
-    wide_vectors.narrow()  # most of the time goes into compiling kernels
     subjects = [one for item in task.items for one in _subjects(item)]
     laws = chosen(task.laws)
     say("loaded", [one.title for one in subjects], [law.name for law in laws])
