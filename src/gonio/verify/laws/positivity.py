@@ -167,7 +167,7 @@ def _batches(
         try:
             together = subject.replace(**columns)
             # a guide of its own, for parameters that vary, takes seconds; signs do not depend on it
-            guide_search.lend(subject.model, together.model)
+            guide_search.lend(subject.sampler.model, together.model)
             probe = directions.at(np.full(len(changes) * count, 30.0), 10.0)
             together.eval(probe, probe)
             return [(changes, together)]
