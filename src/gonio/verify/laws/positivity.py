@@ -35,7 +35,7 @@ class Positivity(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo, wi, u = _grid(subject, effort, seed)
-        variants = [({}, subject), *(_extremes(subject) if effort.full else ())]
+        variants = [({}, subject), *(_extremes(subject) if effort.full else ()), *_corners(subject)]
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
@@ -211,6 +211,19 @@ def _values(
 def _own_axes(subject: Subject) -> list[box.Axis]:
     """The ranges of its own parameters, without angles."""
     return [axis for axis in box.axes(subject) if axis.path in subject.parameters and axis.kind != "angle"]
+
+
+def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
+    """The subject with all parameters at the low, or at the high, ends of their ranges. Arrays with both of them need
+    the code of all parts, so that all other values share their kernels."""
+    corners = []
+    for end in ("low", "high"):
+        values = {axis.path: getattr(axis, end) for axis in _own_axes(subject)}
+        try:
+            corners.append((values, subject.replace(**values)))
+        except InputError:
+            continue  # the model rejects the values together
+    return corners if len(_own_axes(subject)) > 1 else []
 
 
 def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
