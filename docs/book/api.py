@@ -21,7 +21,7 @@ wavelengths in nanometers ([Conventions](../../conventions.md)).
 Every model is a class too: see [Models](../models/index.md).
 """
 TOPICS = {
-    "Materials": "material materials fits models model mix two_sided BSDF Sample Preset KnownViolation Parameter",
+    "Materials": "material materials fits models model mix two_sided BSDF Sample Preset KnownViolation Limit Parameter",
     "Declare your own": "number spectrum width angle index choice flag file bsdf method never register "
     "Angle Colour Index Number Width Direction Mask Mode Pair Scalar Spectrum NDF Stretched Masking Fresnel Interface "
     "Integrator Law Panel ops",

@@ -37,7 +37,19 @@ _PLACES = {
     "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
     # for user-defined materials
     "material": (
-        *("Angle", "BSDF", "KnownViolation", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
+        *(
+            "Angle",
+            "BSDF",
+            "KnownViolation",
+            "Limit",
+            "Colour",
+            "Index",
+            "Number",
+            "Parameter",
+            "Preset",
+            "Sample",
+            "Width",
+        ),
         *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number"),
         *("spectrum", "width"),
     ),
@@ -85,7 +97,7 @@ if TYPE_CHECKING:
     from .instruments.capture.run import capture
     from .instruments.goniometer.run import measure
     from .instruments.pictures import fit_picture
-    from .material import BSDF, KnownViolation, Parameter, Preset, Sample, method, model, models, never
+    from .material import BSDF, KnownViolation, Limit, Parameter, Preset, Sample, method, model, models, never
     from .material.parameters import (
         Angle,
         Colour,
@@ -214,6 +226,7 @@ __all__ = [
     "KullaConty",
     "Lambert",
     "Law",
+    "Limit",
     "MachineError",
     "Mask",
     "Masking",

@@ -208,3 +208,24 @@ def test_merged_meshes_come_in_any_order() -> None:
 def test_no_method_returns_the_frame_of_a_bump_map() -> None:
     bumps = mi.load_dict({"type": "bumpmap", "texture": {"type": "checkerboard"}, "bsdf": {"type": "diffuse"}})
     assert [name for name in dir(bumps) if "frame" in name or "normal" in name] == []
+
+
+NARROWED = """
+import gonio as go, numpy as np
+from gonio.bridge.faults import wide_vectors
+w = np.random.default_rng(1).normal(size=(2, 1000, 3))
+w[..., 2] = abs(w[..., 2])
+w /= np.linalg.norm(w, axis=-1, keepdims=True)
+wide = wide_vectors.lanes()
+with wide_vectors.narrow():
+    assert wide_vectors.lanes() == min(wide, wide_vectors.LANES), wide_vectors.lanes()
+    narrow = go.Conductor(alpha=0.3).eval(*w, precision="float64")
+assert wide_vectors.lanes() == wide
+assert np.allclose(narrow, go.Conductor(alpha=0.3).eval(*w, precision="float64"), rtol=1e-12)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the names of libdrjit-core's functions are those on Linux")
+def test_no_function_of_python_sets_the_number_of_lanes() -> None:
+    assert not [name for name in (*dir(dr), *dir(dr.detail)) if "vector_width" in name or "set_target" in name]
+    subprocess.run([sys.executable, "-c", NARROWED], check=True, timeout=60)

@@ -12,7 +12,7 @@ from gonio.viewer import families
 ROOT = Path(__file__).parents[2]
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
 WORDS = dict(enumerate(NUMBERS))
-CHINESE = {11: "十一"}
+CHINESE = {11: "十一", 12: "十二"}
 
 
 def count(kind: str) -> int:

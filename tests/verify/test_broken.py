@@ -8,10 +8,11 @@ from gonio.verify import verify
 
 from broken.facets import FACETS
 from broken.glass import GLASS
+from broken.limits import LIMITS
 from broken.surfaces import SURFACES
 from broken.third_edition import THIRD
 
-CONTROLS = [*FACETS, *SURFACES, *GLASS, *THIRD]
+CONTROLS = [*FACETS, *SURFACES, *GLASS, *LIMITS, *THIRD]
 BROKEN = [cls for cls in CONTROLS if cls.caught_by]
 SOUND = [cls for cls in CONTROLS if not cls.caught_by]
 
@@ -29,6 +30,7 @@ def test_there_are_enough_controls_and_every_judging_law_has_one() -> None:
         "linearity",
         "gradients",
         "precision",
+        "limits",
     }
     assert caught == expected
 

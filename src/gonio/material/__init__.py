@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 
 from ..errors import InputError, did_you_mean
-from .bsdf import BSDF, KnownViolation, Microsurface, Preset
+from .bsdf import BSDF, KnownViolation, Limit, Microsurface, Preset
 from .calling import method
 from .parameters import (
     Angle,
@@ -36,6 +36,7 @@ __all__ = [
     "Colour",
     "Index",
     "KnownViolation",
+    "Limit",
     "Member",
     "Microsurface",
     "Number",

@@ -34,7 +34,7 @@ from . import binding, equality, notebook, recording, tree
 from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
 from .constructing import accepted, with_pair
-from .facts import Interior, KnownViolation, Microsurface, Preset
+from .facts import Interior, KnownViolation, Limit, Microsurface, Preset
 from .former_names import add_former_names, move_former_names
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .polarization import Polarized
@@ -54,6 +54,7 @@ class BSDF(Material):
     """Base of every material. Subclasses are frozen dataclasses; `name` is derived from the class name by default.
 
     known_violations    law -> KnownViolation, for laws that the model violates by design (Phong: reciprocity, energy)
+    limits      what the model equals where one of its parts is switched off
     spelling    the file that a class was made from, by which texts name it; "" for classes written in Python
     only_rgb    whether eval returns red, green and blue regardless of the renderer's channels
     stochastic  whether eval, pdf and weight are random estimates whose expectation is the exact value
@@ -66,6 +67,7 @@ class BSDF(Material):
     name: ClassVar[str] = ""
     spelling: ClassVar[str] = ""
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {}
+    limits: ClassVar[tuple[Limit, ...]] = ()
     stochastic: ClassVar[bool] = False
     only_rgb: ClassVar[bool] = False
     reads_wavelengths: ClassVar[bool] = False
@@ -121,7 +123,8 @@ class BSDF(Material):
         mode    "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
         derivatives  of arrays: paths of parameters; the result is stacked: values, then their derivative by each
         wavelengths  of arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are no spectrum
-        Returns (N, channels); for arrays of shape (..., 3), (..., channels).
+        parameters   of tensors of PyTorch or JAX (wo, wi or these): path -> tensor, which receives gradients
+        Returns (N, channels); for arrays of shape (..., 3), (..., channels); for tensors a tensor, on the device of wo.
         """
         raise NotImplementedError(f"{type(self).__name__} has no eval")
 

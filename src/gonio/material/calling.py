@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..arguments import shown
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from ..owner import COMPUTING
-from . import binding, blocks, requests, tree
+from . import binding, blocks, requests, tensors, tree
 from .parameters import Material
 from .sample import Floats, Sample, SampleArrays
 
@@ -37,7 +37,7 @@ DrJit: TypeAlias = Any  # a Dr.Jit value, whose type is not expressible
 
 
 MISSING: Any = object()
-EXTRAS = ("derivatives", "wavelengths")  # of eval and pdf on arrays
+EXTRAS = ("derivatives", "wavelengths", "parameters")  # of eval and pdf on arrays
 
 
 class EvalMethod(Protocol):
@@ -58,6 +58,16 @@ class EvalMethod(Protocol):
         derivatives: Sequence[str] = ...,
         wavelengths: ArrayLike | None = ...,
     ) -> Floats: ...
+    @overload
+    def __call__(
+        self,
+        wo: tensors.Tensor,
+        wi: tensors.Tensor,
+        mode: Mode = ...,
+        precision: Precision | None = ...,
+        *,
+        parameters: Mapping[str, tensors.Tensor] = ...,
+    ) -> tensors.Tensor: ...
 
 
 class PdfMethod(Protocol):
@@ -75,6 +85,15 @@ class PdfMethod(Protocol):
         derivatives: Sequence[str] = ...,
         wavelengths: ArrayLike | None = ...,
     ) -> Floats: ...
+    @overload
+    def __call__(
+        self,
+        wo: tensors.Tensor,
+        wi: tensors.Tensor,
+        *,
+        precision: Precision | None = ...,
+        parameters: Mapping[str, tensors.Tensor] = ...,
+    ) -> tensors.Tensor: ...
 
 
 class SampleMethod(Protocol):
@@ -140,6 +159,10 @@ def method(formula: Callable[..., object], /) -> object:
         if not isinstance(mode, str) or mode not in MODES:
             where = f"{type(self).__name__}.{formula.__name__}"
             raise InputError(f"unknown mode {shown(mode)}", where, " or ".join(MODES))
+        given = extra.pop("parameters", {})
+        kind = tensors.library(wo, other, *given.values())
+        if kind or given:
+            return _on_tensors(self, formula.__name__, (wo, other, mode, precision), kind, given, extra)
         with COMPUTING:
             if extra:
                 return _on_request(self, formula.__name__, enter, (wo, other, mode, precision), **extra)
@@ -203,6 +226,28 @@ def _on_numpy(
     if len(shape) != 1 and not many:
         arrays = [array.reshape(*shape, *array.shape[1:]) for array in arrays]
     return type(result)(*arrays) if isinstance(result, tuple) else arrays[0]  # a NamedTuple
+
+
+def _on_tensors(
+    material: Material,
+    name: str,
+    arguments: tuple[Given, Given, Mode, Precision | None],
+    kind: str,
+    parameters: Mapping[str, Given],
+    extra: Mapping[str, Given],
+) -> object:
+    """`eval` and `pdf` on tensors of PyTorch or JAX."""
+    wo, other, mode, precision = arguments
+    if not kind:
+        hint = "give the values to the material: go.Conductor(alpha=0.2)"
+        raise InputError("parameters without tensors of PyTorch or JAX", f"{name}: parameters", hint)
+    if name not in ("eval", "pdf") or extra:
+        what = f"tensors of PyTorch or JAX in {name}" + (f" with {next(iter(extra))}" if extra else "")
+        raise InputError(what, name, "give NumPy arrays; eval and pdf take tensors")
+    double = any("float64" in str(getattr(x, "dtype", "")) for x in (wo, other, *parameters.values()))
+    precision = precision or ("float64" if double else backend.get_precision())
+    call = tensors.Call(material, name, tuple(parameters), mode, precision, _rows)
+    return tensors.called(call, kind, wo, other, parameters)
 
 
 def _on_request(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from ..ops import Pair, Scalar, Spectrum
@@ -21,6 +21,24 @@ class KnownViolation(NamedTuple):
     reason: str
     size: Any
     certain: bool = True
+
+
+class Limit(NamedTuple):
+    """Values at which a part of a model is switched off, and what this means; the law `limits` checks it.
+
+        limits = (
+            Limit({"coat_weight": 0.0}, mutes=("coat_*",)),
+            Limit({"thickness": 0.0}, equals=lambda one: one.base),
+        )
+
+    values  the parameters that switch it off, by name; numbers within their ranges
+    mutes   patterns of the parameters that then change no value of `eval`, as in `fnmatch`
+    equals  function of the model with these values that returns the model without that part; None to state only `mutes`
+    """
+
+    values: Mapping[str, float]
+    mutes: tuple[str, ...] = ()
+    equals: Callable[[Any], Any] | None = None
 
 
 class Preset(NamedTuple):

@@ -366,8 +366,19 @@ def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
 
 
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
+    """`per_ray_of`; None if the subject takes no arrays."""
+    try:
+        together = per_ray_of(subject, values)
+        probe = directions.at(np.full(len(next(iter(values.values()))), 30.0), 10.0)
+        together.eval(probe, probe)
+    except (Fault, InputError):
+        return None
+    return together
+
+
+def per_ray_of(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject:
     """The subject with one value per ray of some parameters, by path: for a color (N,) or (N, 3), for a pair of alphas
-    (N,) or (N, 2); None if it takes no arrays."""
+    (N,) or (N, 2). Raises InputError for values that it rejects."""
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():
@@ -377,13 +388,7 @@ def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | Non
             arrays[path] = (
                 np.repeat(column[:, None], 3, 1) if kinds[path] == "spectrum" and column.ndim == 1 else column
             )
-    try:
-        together = subject.replace(**arrays)
-        probe = directions.at(np.full(len(column), 30.0), 10.0)
-        together.eval(probe, probe)
-    except (Fault, InputError):
-        return None
-    return together
+    return subject.replace(**arrays)
 
 
 def _short(value: Any) -> str:
@@ -392,4 +397,4 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-__all__ = ["Axis", "Place", "axes", "jumps", "per_ray", "places"]
+__all__ = ["Axis", "Place", "axes", "jumps", "per_ray", "per_ray_of", "places"]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.bsdf import BSDF, Delta, InnerAlbedo
+from ...material.bsdf import BSDF, Delta, InnerAlbedo, Limit
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.polarization import Polarized
@@ -19,6 +21,11 @@ class Mix(BSDF):
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
     weight: Number = number(default=0.5, doc="share of b", low=0.0, high=1.0)
+
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"weight": 0.0}, equals=lambda one: one.a),
+        Limit({"weight": 1.0}, equals=lambda one: one.b),
+    )
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:

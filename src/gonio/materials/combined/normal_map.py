@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Delta, KnownViolation
+from ...material.bsdf import BSDF, Delta, KnownViolation, Limit
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
@@ -54,6 +54,7 @@ class NormalMap(BSDF):
     lean_x: Number = number(default=0.0, doc="tilt of the normal along x", low=-STEEPEST, high=STEEPEST)
     lean_y: Number = number(default=0.0, doc="tilt of the normal along y", low=-STEEPEST, high=STEEPEST)
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"lean_x": 0.0, "lean_y": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
             "the view bends the normal, and light sent below the surface is reflected up again",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.bsdf import BSDF, Delta, InnerAlbedo
+from ...material.bsdf import BSDF, Delta, InnerAlbedo, Limit
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
@@ -22,6 +24,8 @@ class Opacity(BSDF):
 
     base: BSDF = bsdf("the material where there is one")
     opacity: Number = number(default=0.5, doc="fraction of the surface that the base covers", low=0.0, high=1.0)
+
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"opacity": 1.0}, equals=lambda one: one.base),)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, InnerAlbedo
+from ...material.bsdf import BSDF, InnerAlbedo, Limit
 from ...material.calling import method
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, atan2, dot, fma, function, inv_pi, maximum, sqr, vec3, where
 from ...optics import frame
 from ...optics.frame import rotate, rotate_back, sin2
+from .lambert import Lambert
 
 # FON's albedo is A (1 + r G / pi): G(0) / pi, and the mean of G / pi with the cosine (Portsmouth2025, eq. 17 and 21)
 GRAZING = 0.5 - 2.0 / (3.0 * math.pi)
@@ -45,6 +46,7 @@ class Eon(BSDF):
     roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
     energy: str = choice("exact", "how E is found", FORMS)
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"roughness": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     lossless_tolerance: ClassVar[float | None] = 1e-3  # the error of the fit; "exact" has none
 
     @function

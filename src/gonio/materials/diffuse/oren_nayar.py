@@ -7,11 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import BSDF, KnownViolation
+from ...material.bsdf import BSDF, KnownViolation, Limit
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
+from .lambert import Lambert
 
 
 class OrenNayar(BSDF):
@@ -31,6 +32,7 @@ class OrenNayar(BSDF):
     )
     sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"sigma": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",

@@ -8,13 +8,14 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, KnownViolation
+from ...material.bsdf import BSDF, KnownViolation, Limit
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, clamp, function, inv_pi, mean, sqr, where
 from ...optics.frame import mirror
 from ...optics.warp import power_about, square_to_cosine_hemisphere, square_to_power_lobe, to_frame
+from ..diffuse.lambert import Lambert
 from ..historic.glossy import lit
 
 
@@ -32,6 +33,7 @@ class ModifiedPhong(BSDF):
     )
     p: Number = number(default=32.0, doc="falloff of the lobe", low=0.0)
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, equals=lambda one: Lambert(one.kd)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
             "kd + ks is over 1",

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import ops
 from ...errors import InputError
-from ...material.bsdf import BSDF, KnownViolation
+from ...material.bsdf import BSDF, KnownViolation, Limit
 from ...material.calling import method
 from ...material.parameters import Colour, Number, flag, number, spectrum
 from ...material.sample import Sample
@@ -31,6 +31,7 @@ class _Empirical(BSDF):
     ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, mutes=("p", "ka")), Limit({"kd": 0.0}, mutes=("ka",)))
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
             "the specular term has no cosine, so f divides it by cos theta_i",

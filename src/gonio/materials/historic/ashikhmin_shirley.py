@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import KnownViolation
+from ...material.bsdf import KnownViolation, Limit
 from ...material.parameters import Angle, Colour, Width, choice, flag, spectrum, width
 from ...ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
 from ...optics import frame, fresnel
@@ -34,6 +34,7 @@ class AshikhminShirley(_Glossy):
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
     coupled: bool = flag(default=False, doc="the paper's diffuse part, which is reduced by the lobe")
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, mutes=("exponent", "rotation", "eta")),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:

@@ -10,13 +10,14 @@ import numpy as np
 
 from ... import ops
 from ...catalog import library
-from ...material.bsdf import BSDF, KnownViolation, Preset
+from ...material.bsdf import BSDF, KnownViolation, Limit, Preset
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
 from ...optics.frame import TINY, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
+from ..diffuse.lambert import Lambert
 
 # Maximum fraction of samples that follow the lobe: where the lobe exceeds its sampling density, as at grazing light,
 # the cosine keeps the weight bounded.
@@ -32,6 +33,8 @@ class _Glossy(BSDF):
     overridable: ClassVar[bool] = True
 
     diffuse: Colour = spectrum(default=0.2, doc="albedo of Lambert's part", low=0.0, high=1.0, soft_high=True)
+
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, equals=lambda one: Lambert(one.diffuse)),)
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:

@@ -10,7 +10,7 @@ import numpy as np
 from ... import ops
 from ...errors import GonioWarning, InputError
 from ...material import BSDF, Colour, Number, choice, flag, number, spectrum
-from ...material.bsdf import Delta, Interior
+from ...material.bsdf import Delta, Interior, Limit
 from ...ops import (
     Direction,
     Mask,
@@ -130,6 +130,19 @@ class _OpenPBR(BSDF):
     )
     geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an interior")
     layering: str = choice("reciprocal", "how a coat attenuates the layers below", LAYERINGS)
+
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"base_weight": 0.0}, mutes=("base_color",)),
+        Limit({"base_metalness": 1.0}, mutes=("base_diffuse_roughness", "transmission_*", "subsurface_*")),
+        Limit({"transmission_weight": 0.0}, mutes=("transmission_*",)),
+        Limit({"transmission_weight": 1.0}, mutes=("base_diffuse_roughness", "subsurface_*")),
+        Limit({"subsurface_weight": 0.0}, mutes=("subsurface_*",)),
+        Limit({"coat_weight": 0.0}, mutes=("coat_*",)),
+        Limit({"fuzz_weight": 0.0}, mutes=("fuzz_*",)),
+        Limit({"thin_film_weight": 0.0}, mutes=("thin_film_*",)),
+        Limit({"thin_film_thickness": 0.0}, mutes=("thin_film_*",)),
+        Limit({"thin_film_ior": 1.0, "coat_weight": 0.0}, mutes=("thin_film_*",)),  # a coat's index lies over the film
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,6 +11,7 @@ from ...material import (
     BSDF,
     Colour,
     KnownViolation,
+    Limit,
     Member,
     Number,
     Sample,
@@ -61,6 +62,7 @@ class Coat(BSDF):
     and derivatives omit the change of the tables.
     """
 
+    limits: ClassVar[tuple[Limit, ...]] = (Limit({"index": 1.0, "absorption": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
             "reflection and transmission of a rough top have this error, by sampling of rough glass",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple, Self
 
 from ... import ops
-from ...material.bsdf import BSDF, KnownViolation
+from ...material.bsdf import BSDF, KnownViolation, Limit
 from ...material.calling import method
 from ...material.parameters import Angle, Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -82,6 +82,13 @@ class Disney(BSDF):
     clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
 
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
+        Limit({"clearcoat": 0.0}, mutes=("clearcoat_gloss",)),
+        Limit({"specular": 0.0}, mutes=("specular_tint",)),
+        Limit({"metallic": 1.0}, mutes=("subsurface", "specular", "specular_tint", "sheen", "sheen_tint")),
+        Limit({"anisotropic": 0.0}, mutes=("rotation",)),
+    )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
             "the lobes are added, and rough diffuse reflection gains at grazing angles: their sum has no bound",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ... import ops
-from ...material import BSDF, Colour, KnownViolation, Number, Sample, binding, flag, method, number, spectrum
+from ...material import BSDF, Colour, KnownViolation, Limit, Number, Sample, binding, flag, method, number, spectrum
 from ...material.bsdf import Delta, Interior
 from ...material.parameters import Angle
 from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_component, sqrt, where
@@ -90,6 +90,12 @@ class DisneyBSDF(BSDF):
     flatness: Number = number(default=0.0, doc="1 removes the roughness of the diffuse lobe", low=0.0, high=1.0)
     thin: bool = flag(default=False, doc="whether it is a sheet without an interior")
 
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
+        Limit({"clearcoat": 0.0}, mutes=("clearcoat_gloss",)),
+        Limit({"metallic": 1.0}, mutes=("specular_tint", "spec_trans", "sheen*", "diff_trans", "flatness")),
+        Limit({"spec_trans": 1.0}, mutes=("diff_trans", "flatness")),
+    )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
             "the sheen's table of lobes depends on the viewer's direction only",
@@ -99,6 +105,11 @@ class DisneyBSDF(BSDF):
         "energy": KnownViolation(
             OpenPBR.known_violations["energy"].reason,
             lambda model: 0.15 if _some(model.anisotropic) else 0.01,
+            certain=False,
+        ),
+        "limits": KnownViolation(
+            OpenPBR.known_violations["limits"].reason,
+            0.02,
             certain=False,
         ),
         "linearity": KnownViolation(

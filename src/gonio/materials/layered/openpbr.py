@@ -80,6 +80,11 @@ class OpenPBR(_OpenPBR):
             lambda model: 0.15 if model.any_anisotropic else 0.01,
             certain=False,
         ),
+        "limits": KnownViolation(
+            "the table of a metal's multiple scattering is coarser for two widths, and for widths that vary",
+            0.02,
+            certain=False,
+        ),
         "linearity": KnownViolation(
             "colors of layers multiply, and interreflected light applies them more than once", 10.0, certain=False
         ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from ...material.bsdf import Limit
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
@@ -29,6 +30,11 @@ def film_form() -> str:
     return choice("local", "how RGB colors follow from the waves", film.FORMS)
 
 
+def bare(one: Conductor) -> Conductor:
+    """The metal without its film."""
+    return Conductor(**{name: getattr(one, name) for name in Conductor.parameters()})
+
+
 class FilmConductor(Conductor):
     """Rough metal under a thin clear film: a `conductor` with the interference colors of F (Belcour2017).
 
@@ -46,6 +52,10 @@ class FilmConductor(Conductor):
     film_eta: Number = film_index()
     form: str = film_form()
 
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
+        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
+    )
     reads_wavelengths: ClassVar[bool] = True
 
     @function

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.bsdf import InnerAlbedo, KnownViolation, Microsurface
+from ...material.bsdf import InnerAlbedo, KnownViolation, Limit, Microsurface
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...ops import Mask, Scalar, Spectrum, abs, function, mean, ones_like, safe_div, sqr, where, zeros_like
 from ...optics import fresnel
@@ -17,6 +17,11 @@ from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from .dielectric import Dielectric, _Facet
 from .film_conductor import FRESNELS, film_form, film_index, thickness_number
+
+
+def bare(one: Dielectric) -> Dielectric:
+    """The glass without its film."""
+    return Dielectric(**{name: getattr(one, name) for name in Dielectric.parameters()})
 
 
 class FilmDielectric(Dielectric):
@@ -36,6 +41,10 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
+    limits: ClassVar[tuple[Limit, ...]] = (
+        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
+        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
+    )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "delta": KnownViolation("it reflects by its film, not by the bare index", 1.0, certain=False)
     }

@@ -19,7 +19,7 @@ from ..verdict import Finding
 class Law:
     """A law: for a subject it returns a Finding, or raises DoesNotApply.
 
-    number   its place in the report; Gonio's own are 1 to 10
+    number   its place in the report; Gonio's own are 1 to 13
     name     its name on the command line and in `breaks`
     title    the law as a sentence
     meaning  the effect of a violation on pictures

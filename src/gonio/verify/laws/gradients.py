@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...bridge.faults import wide_vectors
 from ...errors import InputError
 from ...material import BSDF, Parameter, binding, tree
 from ...ops import backend
@@ -177,8 +178,9 @@ def _derivatives(
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):
         some = paths[first : first + most]
-        for path, one in zip(some, _together(model, some, wo, wi, step), strict=True):
-            derivatives[path] = one if np.isfinite(one.exact).all() else _together(model, [path], wo, wi, step)[0]
+        with wide_vectors.narrow():
+            for path, one in zip(some, _together(model, some, wo, wi, step), strict=True):
+                derivatives[path] = one if np.isfinite(one.exact).all() else _together(model, [path], wo, wi, step)[0]
     return derivatives
 
 

@@ -35,7 +35,7 @@ class Positivity(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo, wi, u = _grid(subject, effort, seed)
-        variants = [({}, subject), *(_extremes(subject) if effort.full else ())]
+        variants = [({}, subject), *(_extremes(subject) if effort.full else ()), *_corners(subject)]
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
@@ -146,9 +146,12 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings combined in one call, one value per ray; one by one if the subject takes no arrays."""
+    """Settings combined in one call, one value per ray; one by one if the subject takes no arrays.
+
+    All parameters that have a range are arrays, so that one kernel serves the given values and all others.
+    """
     changes = [changed for changed, _ in variants]
-    names = dict.fromkeys(name for changed in changes for name in changed)
+    names = [axis.path for axis in _own_axes(subject)]
     columns: dict[str, Any] = {}
     for name in names:
         given = getattr(subject.model, name, None)
@@ -164,7 +167,7 @@ def _batches(
         try:
             together = subject.replace(**columns)
             # a guide of its own, for parameters that vary, takes seconds; signs do not depend on it
-            guide_search.lend(subject.model, together.model)
+            guide_search.lend(subject.sampler.model, together.model)
             probe = directions.at(np.full(len(changes) * count, 30.0), 10.0)
             together.eval(probe, probe)
             return [(changes, together)]
@@ -205,15 +208,30 @@ def _values(
     yield "wi", s.wi[drawn], wo[drawn], shown[drawn], rows[drawn]
 
 
+def _own_axes(subject: Subject) -> list[box.Axis]:
+    """The ranges of its own parameters, without angles."""
+    return [axis for axis in box.axes(subject) if axis.path in subject.parameters and axis.kind != "angle"]
+
+
+def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
+    """The subject with all parameters at the low, or at the high, ends of their ranges. Arrays with both of them need
+    the code of all parts, so that all other values share their kernels."""
+    corners = []
+    for end in ("low", "high"):
+        values = {axis.path: getattr(axis, end) for axis in _own_axes(subject)}
+        try:
+            corners.append((values, subject.replace(**values)))
+        except InputError:
+            continue  # the model rejects the values together
+    return corners if len(_own_axes(subject)) > 1 else []
+
+
 def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
     """The subject with one parameter at an end of its declared range, for each of its own parameters and ends."""
     variants = []
-    for axis in box.axes(subject):
-        parameter = subject.parameters.get(axis.path)
-        if parameter is None or parameter.kind == "angle":
-            continue
+    for axis in _own_axes(subject):
         ends = [axis.low, axis.high]
-        if parameter.kind == "alpha" or axis.path.startswith("alpha"):
+        if axis.kind == "alpha" or axis.path.startswith("alpha"):
             ends.insert(1, max(axis.low, 1e-4))
         for end in ends:
             try:

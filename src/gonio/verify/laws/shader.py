@@ -22,7 +22,7 @@ TOLERANCE = 1e-8
 class Shader(Law):
     """The shader code of a material, read again, gives the material's values in 64 bits: GLSL, HLSL and WGSL."""
 
-    number = 12
+    number = 13
     on_request = True
     everywhere = False
     at_ends = False
