@@ -7,13 +7,16 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from .. import completion
 from ..options import Json, Material, output_option
 from .base import MATERIALS, verb
+
+if TYPE_CHECKING:
+    from ...shaders.bundle import Bundle
 
 SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
@@ -28,9 +31,16 @@ class Place:
 
 
 @dataclass
-class Short:
-    """Code in place of the material's whole functions."""
+class Content:
+    """What of the material is written, or what instead of its whole functions."""
 
+    functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample"
+    lean: Annotated[
+        bool, Option("--lean", help="Omit layers that are off at these values, such as a coat of weight 0.")
+    ] = False
+    constants: Annotated[
+        bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
+    ] = False
     fit: Annotated[
         str, Option(metavar="N|N/M", help="Instead write albedos as rational fits of this order; N/0: polynomials.")
     ] = ""
@@ -61,20 +71,13 @@ def emit(
             autocompletion=completion.languages,
         ),
     ] = "glsl",
-    functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample",
+    content: Content,
     made: Material,
     output: Annotated[
         list[str] | None,
         output_option("FILE|DIR/", "The shader; or a folder, for it, manifest.json and tables."),
     ] = None,
-    lean: Annotated[
-        bool, Option("--lean", help="Omit layers that are off at these values, such as a coat of weight 0.")
-    ] = False,
-    constants: Annotated[
-        bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
-    ] = False,
     place: Place,
-    short: Short,
     check: Annotated[
         int, Option(metavar="N", help="Instead of a shader write N pairs of directions with their 64-bit values, JSON.")
     ] = 0,
@@ -110,13 +113,19 @@ def emit(
     for path in folders:
         files.check_folder(path, parents=True)
     if check:
-        _write_pairs(made.texts(model), check, functions, single, folders)
+        _write_pairs(made.texts(model), check, content.functions, single, folders)
         return
     at = Placement(place.prefix, place.group, place.first_binding)
-    choice = Choice(functions, lean, constants, **vars(short))
-    shader, errors = written_for(made.texts(model), lang, choice, at)
+    shader, errors = written_for(made.texts(model), lang, Choice(**vars(content)), at)
     for line in errors:
         print(line, file=sys.stderr)
+    _write_shader(shader, single, folders, as_json)
+
+
+def _write_shader(shader: Bundle, single: list[Path], folders: list[Path], as_json: bool) -> None:
+    """Write a shader to files and folders, or print it."""
+    from ... import files
+
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())

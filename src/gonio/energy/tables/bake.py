@@ -11,7 +11,7 @@ The axes are defined in `axes`, files and the homework's pictures in `baked`.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -77,10 +77,7 @@ def bake(
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
     _check(lut, size, spp, points, layout)
-    _check_floor(floor, method)
-    for name, given in (("masking", masking), ("aspect", aspect)):
-        if material and given is not None:
-            raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
+    _check_options(method, floor, {"masking": masking, "aspect": aspect} if material else {})
     if isinstance(target, BSDF) and target.microsurface is None:
         return _any_material(target, lut, size, method, layout)
     asked, axes = _resolved(target, masking, layout, size, aspect, azimuths)
@@ -112,7 +109,10 @@ def bake(
     return _sealed(arrays, nodes, dims, errors, manifest)
 
 
-def _check_floor(floor: float, method: str) -> None:
+def _check_options(method: str, floor: float, of_material: Mapping[str, object]) -> None:
+    for name, given in of_material.items():
+        if given is not None:
+            raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
     if floor < 0.0 or (floor > 0.0 and method != "cosine"):
         hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
         raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
