@@ -22,7 +22,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from .arguments import checked
-from .errors import out_of_loop
+from .errors import GonioError, InputError, out_of_loop, user_line
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -50,20 +50,22 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
             try:
                 return call(*args, **kwargs)
             except BaseException as error:
-                forget_frames(error)
                 cause = out_of_loop(error)
+                forget_frames(error, names_line=isinstance(cause, GonioError))
                 if cause is error:
                     raise
-                raise cause from error
+                # an inner error is raised again without the outer one: errors that cause each other have no end
+                raise cause from (error if isinstance(cause, InputError) else None)
             finally:
                 settle()
 
     return held
 
 
-def forget_frames(error: BaseException) -> None:
+def forget_frames(error: BaseException, names_line: bool = True) -> None:
     """Drop what the frames hold that an exception and its causes have left.
 
+    names_line  its text names the line of the user's code, which is otherwise looked for in its causes
     A notebook stores its last exception and with it the scene: Dr.Jit's virtual calls go to every living BSDF, so that
     each later render would raise the same error. Of errors that Dr.Jit wraps, the lines go too, since from Python 3.12
     on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves all of it for a debugger.
@@ -78,7 +80,8 @@ def forget_frames(error: BaseException) -> None:
         waiting += [x for x in (one.__cause__, one.__context__) if x is not None and x not in causes]
     wrapped = [one for one in causes if isinstance(one, RuntimeError) and (one is not error or len(causes) > 1)]
     for one in wrapped:
-        one.__traceback__ = None
+        if names_line or not user_line(one):
+            one.__traceback__ = None
     if wrapped:
         gc.collect()  # a scene is part of cycles
 
