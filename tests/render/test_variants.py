@@ -185,9 +185,13 @@ def _reflectance(eta: np.ndarray, k: np.ndarray) -> np.ndarray:
     return ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
 
 
-def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values() -> None:
+@pytest.mark.parametrize("by", ["preset", "numbers"])
+def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values(by: str) -> None:
+    """Mitsuba would turn numbers into a reflectance, of 1 at most."""
     mi.set_variant("llvm_ad_spectral")
-    bsdf = mi.load_dict({"type": "gonio_conductor", "preset": "Ti", "alpha": 0.0})
+    metal = go.Conductor.presets()["Ti"].values
+    given = {"preset": "Ti"} if by == "preset" else {name: rgb(*metal[name]) for name in ("eta", "k")}
+    bsdf = mi.load_dict({"type": "gonio_conductor", "alpha": 0.0, **given})
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi, si.sh_frame = mi.Vector3f(0, 0, 1), mi.Frame3f(mi.Normal3f(0, 0, 1))
     si.wavelengths = type(si.wavelengths)(650.0, 550.0, 450.0, 830.0)

@@ -61,7 +61,7 @@ _TAKEN = {
 
 
 def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str) -> Kind:
-    """The kind of a word, among those that are accepted.
+    """The kind of a word, which must be one of the accepted kinds.
 
     where  the operand, "SCENE", for errors
     Raises InputError, with the actual and the expected kinds, if it has none of these kinds.

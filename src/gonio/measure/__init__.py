@@ -53,7 +53,7 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
 
 
 def read(file: str | os.PathLike[str]) -> Measurement:
-    """The table in a file, read once per saved version.
+    """The table in a file, which is read again only if the file has changed.
 
     file  a path, followed by :ITEM if the file holds several materials
     Raises InputError for files that are missing, damaged, or of unknown format.

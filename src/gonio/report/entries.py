@@ -54,7 +54,7 @@ class Facts:
 
 
 class PictureKeys(Part):
-    """Options of pictures, of a figure or of all; they are those of `gonio render`."""
+    """Options of pictures, of one figure or of all: those of `gonio render` that change the picture."""
 
     spp: Whole | None = Field(default=None, ge=1)
     size: str | None = None

@@ -35,7 +35,7 @@ def read(
     allow_outside  allow textures and meshes outside the scene's folder
     allow_code     allow materials that are classes in Python files, "ward.py:Ward", which are then executed
     overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
-    names_output   whether the picture is written under the scene's name for it, which is then checked
+    names_output   whether the picture is written to the file that the scene names; the name is then checked
     Raises InputError for any error in the file or in the files that it names.
 
         description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})

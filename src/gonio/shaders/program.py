@@ -204,9 +204,9 @@ class Program(Routines):
 
 
 def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
-    """A recording of the functions of a material of symbols, whose result is theirs in order.
+    """A recording of functions of a material whose parameters are symbols; its results are theirs, in order.
 
-    single  whether for a language of float32 values, which lacks some functions of the vocabulary
+    single  whether the recording is for a language of float32 values, which lacks some functions of the vocabulary
     """
 
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:

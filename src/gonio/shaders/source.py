@@ -45,7 +45,8 @@ def _comment_on(path: str, name: str) -> str | None:
 def returned_by(op: str, source: str, own: str) -> str:
     """The name of the plain function that returned a value, if it was recorded as part of another; "" otherwise.
 
-    source  the line that wrote the value, "file:line";  own  that of the function that contains it
+    source  the line that wrote the value, "file:line"
+    own     the line of the function that contains it
     """
     path, _, line = source.rpartition(":")
     for function, statement in _returns(path) if path.startswith(_PACKAGE) else ():

@@ -50,7 +50,7 @@ class SceneData:
 
     sampler_name      a name of `sampler.SAMPLERS`, or "default"
     ambient_color     scene-wide ambient radiance; None or 0 for none
-    mis_compensation  whether BSDFs are sampled in addition to the lights
+    mis_compensation  whether BSDFs are sampled too, which then sample the uniform part of an environment map
     """
 
     def __init__(

@@ -7,7 +7,7 @@ given as `alpha`, or as `alpha_x` and `alpha_y`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import drjit as dr
 import numpy as np
@@ -69,20 +69,29 @@ class Slot:
                 raise InputError(f"'{props[name]}' given, a number or a texture expected", self.location)
             if given in (kinds.Float, kinds.Integer):
                 return self._constant(name, float(props[name]))
-            if given == kinds.Color and not variant.spectral:
-                return self._constant(name, np.asarray(props[name], dtype=float).ravel())
+            if given == kinds.Color and not (variant.spectral and parameter.high <= 1.0):
+                color = np.asarray(props[name], dtype=float).ravel()
+                return self._through_rgb(name, color) if variant.spectral else self._constant(name, color)
             return self._texture(name, props.get_unbounded_texture(name))
         if parameter.required and name not in preset.values:
             raise InputError("missing", self.location, parameter.doc)
         value = preset.values.get(name, parameter.default)
         if np.ndim(value) == 0 or not variant.spectral:
             return self._constant(name, value)
+        measured = variant.measured(preset.name, name) if name in preset.values else None
+        if measured is None:
+            return self._through_rgb(name, value)
+        self.textures[name] = measured
+        return value
+
+    def _through_rgb(self, name: str, value: Any) -> Plain:
+        """A spectrum through a color that may exceed 1, as an index does."""
         if np.min(value) < 0.0:
             what = f"{np.min(value):g} given, but a negative color has no spectrum"
             raise InputError(what, self.location, "render it in an RGB variant, such as llvm_ad_rgb")
-        measured = variant.measured(preset.name, name) if name in preset.values else None
-        self.textures[name] = variant.through_rgb(value) if measured is None else measured
-        return value
+        self.parameter.check(value, self.location)
+        self.textures[name] = self.variant.through_rgb(value)
+        return value  # type: ignore[no-any-return]
 
     def _constant(self, name: str, value: Plain) -> Plain:
         self.parameter.check(value, self.location)

@@ -1,6 +1,7 @@
 """Mitsuba 3.9: merging rectangles of equal material makes a mesh that has no bounding box.
 
     wall = {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}
+    aside = mi.ScalarTransform4f().translate([3, 0, 0])
     mi.load_dict({"type": "merge", "a": wall, "b": {**wall, "to_world": aside}}).bbox().valid()      # False
 
 The scene's box does not include it, and nothing outside the scene's box blocks a sky or a beam: under a distant roof a

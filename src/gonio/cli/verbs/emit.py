@@ -75,17 +75,17 @@ def emit(
     made: Material,
     output: Annotated[
         list[str] | None,
-        output_option("FILE|DIR/", "The shader; or a folder, for it, manifest.json and tables."),
+        output_option("FILE|DIR/", "The shader; or a folder for the shader, manifest.json and tables."),
     ] = None,
     place: Place,
     check: Annotated[
-        int, Option(metavar="N", help="Instead of a shader write N pairs of directions with their 64-bit values, JSON.")
+        int, Option(metavar="N", help="Instead of a shader, write N pairs of directions with 64-bit values as JSON.")
     ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, Python, or a language of yours.
+    """Write a material, traced from its own source, as code in GLSL, WGSL, HLSL, Python or a language of yours.
 
-    -o may be given twice: a name that ends in / is a folder, whose tables are raw float32.
+    -o may be given twice. A name that ends in / is a folder; its tables are raw float32.
 
     \b
     Examples:

@@ -37,7 +37,7 @@ class Settings:
     seed        any integer of 32 bits; the same seed gives the same picture to the bit
     ambient     scene-wide ambient radiance (r, g, b): every shaded vertex adds `ambient` times the BSDF's own
                 attribute "ambient", if it has one (Phong's ka)
-    radius      for integrators that blur: factor of the initial radius that it would choose
+    radius      factor of the initial radius that an integrator that blurs would choose
     measures    whether such an integrator also measures its blur
     """
 

@@ -178,7 +178,7 @@ class LightTransport(Integrator):
 
         One call of the BSDF gives them all where both are needed.
 
-        Without a light the first two are 0; if only lights are sampled, the others are.
+        Without a light the first two are 0; if only lights are sampled, the last two are 0.
         """
         mi, scattering = self.mi, self.scattering
         value, pdf = mi.Spectrum(0), mi.Float(0)
