@@ -561,7 +561,7 @@ def test_the_doctor_finds_something_to_render_with() -> None:
     code, report = _doctor()
     assert code == 0 and report["can_render"] is True
     subjects = [finding["subject"] for finding in report["findings"]]  # type: ignore[attr-defined]
-    assert {"Mitsuba", "Dr.Jit", "threads", "denoiser", "render on cpu"} <= set(subjects)
+    assert {"Mitsuba", "Dr.Jit", "threads", "denoiser", "shader compiler", "render on cpu"} <= set(subjects)
 
 
 def test_the_doctor_prints_brackets(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -81,9 +81,9 @@ def user_line(error: BaseException) -> str:
     """FILE:LINE of the innermost frame in user code called by Gonio (neither Gonio's own nor a library's); "" if there
     is none. The program that calls Gonio does not count as user code."""
     cause: BaseException | None = error
-    seen: list[BaseException] = []
-    while cause is not None and cause not in seen:
-        seen.append(cause)
+    visited: list[BaseException] = []
+    while cause is not None and cause not in visited:
+        visited.append(cause)
         within, line = False, ""
         place = cause.__traceback__
         while place is not None:

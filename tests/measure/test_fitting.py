@@ -54,6 +54,15 @@ def test_a_metal_is_found_again_with_its_indices() -> None:
     assert any("tied" in note for note in found.notes)
 
 
+def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> None:
+    """The channels of a Lambertian are independent, though the gloss that it lacks moves all three."""
+    found = fit(table(PLASTIC), "lambert")
+    assert abs(found.correlation[0, 1]) > 0.98, "the case that this is about"
+    assert not any("tied" in note for note in found.notes)
+    ends = fit(table(METAL), "oren-nayar").interval
+    assert np.all(ends[:, 0] >= 0.0) and np.all(ends[:3, 1] <= 1.0)
+
+
 def test_a_sum_of_lobes_is_found_again() -> None:
     found = fit(table(PLASTIC), "lambert+ggx")
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.01)

@@ -50,10 +50,12 @@ class Certainty:
 
     covariance    (K, K); parameters in the null space have infinite variance
     undetermined  groups of parameter indices: one without effect, or several of which only a combination is determined
+    inverse       pseudoinverse of J^T J, (K, K)
     """
 
     covariance: Floats
     undetermined: list[list[int]]
+    inverse: Floats
 
     @property
     def errors(self) -> Floats:
@@ -63,11 +65,22 @@ class Certainty:
     @property
     def correlation(self) -> Floats:
         """Correlation matrix, (K, K); 0 for undetermined parameters."""
-        told = np.isfinite(self.errors) & (self.errors > 0.0)
-        size = np.where(told, self.errors, 1.0)
-        matrix = np.where(np.outer(told, told), self.covariance, 0.0) / np.outer(size, size)
-        np.fill_diagonal(matrix, 1.0)
-        return np.asarray(matrix)
+        return _correlation(self.covariance)
+
+    @property
+    def coupling(self) -> Floats:
+        """Correlation matrix for independent errors of equal size, (K, K): how far the data tell parameters apart. A
+        misfit that several parameters share correlates their values, but does not couple them."""
+        return _correlation(self.inverse)
+
+
+def _correlation(covariance: Floats) -> Floats:
+    variance = np.diag(covariance)
+    told = np.isfinite(variance) & (variance > 0.0)
+    size = np.sqrt(np.where(told, variance, 1.0))
+    matrix = np.where(np.outer(told, told), covariance, 0.0) / np.outer(size, size)
+    np.fill_diagonal(matrix, 1.0)
+    return np.asarray(matrix)
 
 
 def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int) -> tuple[Floats, Floats]:
@@ -100,4 +113,4 @@ def certainty(hessian: Floats, scores: Floats) -> Certainty:
     for number in [one for group in undetermined for one in group]:
         matrix[number, :] = matrix[:, number] = 0.0
         matrix[number, number] = np.inf
-    return Certainty(matrix, undetermined)
+    return Certainty(matrix, undetermined, inverse)

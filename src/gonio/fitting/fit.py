@@ -56,6 +56,7 @@ class Fit:
     count        number of fitted values
     notes        remarks on the quality of the fit
     seconds      duration of the fit
+    ranges       (K, 2), the least and the largest value that each number can have; None for any
     """
 
     material: BSDF
@@ -71,11 +72,13 @@ class Fit:
     notes: tuple[str, ...]
     seconds: float
     data: Data
+    ranges: Floats | None = None
 
     @property
     def interval(self) -> Floats:
-        """95 % intervals, (K, 2)."""
-        return np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
+        """95 % intervals within the parameters' ranges, (K, 2)."""
+        ends = np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
+        return ends if self.ranges is None else np.clip(ends, self.ranges[:, :1], self.ranges[:, 1:])
 
     @property
     def text(self) -> str:
@@ -97,8 +100,12 @@ class Fit:
             "left_out": dict(self.data.out),
             "seconds": round(self.seconds, 3),
             "parameters": {
-                name: {"value": float(v), "error": float(e) if np.isfinite(e) else None}
-                for name, v, e in zip(self.names, self.values, self.errors, strict=True)
+                name: {
+                    "value": float(v),
+                    "error": float(e) if np.isfinite(e) else None,
+                    "interval": [float(x) for x in ends] if np.isfinite(e) else None,
+                }
+                for name, v, e, ends in zip(self.names, self.values, self.errors, self.interval, strict=True)
             },
             "correlation": [[round(float(x), 4) for x in row] for row in self.correlation],
             "notes": list(self.notes),
@@ -218,7 +225,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
     material = with_values(problem.material, problem.free, numbers)
     value = material.eval(data.wo, data.wi)
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
-    told = notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.undetermined)
+    told = notes_on(problem.free, numbers, sure.errors, sure.coupling, names, sure.undetermined)
     mean = cost / max(3 * len(data), 1)
     return Fit(
         material,
@@ -238,6 +245,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
         ),
         seconds,
         data,
+        np.array([(one.low, one.high) for one in problem.free for _ in range(one.count)]).reshape(-1, 2),
     )
 
 
@@ -245,12 +253,13 @@ def notes_on(
     free: Sequence[Free],
     numbers: Floats,
     errors: Floats,
-    correlation: Floats,
+    coupling: Floats,
     names: tuple[str, ...],
     undetermined: Sequence[Sequence[int]] = (),
 ) -> list[str]:
     """Remarks that a reader needs to judge the values.
 
+    coupling      correlations of the parameters for errors that are independent
     undetermined  groups of parameter indices of which the data determine at most a combination
     """
     notes, at = [], 0
@@ -266,10 +275,10 @@ def notes_on(
             elif numbers[k] <= one.low or numbers[k] >= one.high:
                 notes.append(f"{names[k]} ends at {numbers[k]:.4g}, a bound of its range")
         at += one.count
-    size = np.abs(correlation)
+    size = np.abs(coupling)
     for i, j in itertools.combinations(range(len(names)), 2):
         if size[i, j] > TIED:
-            notes.append(f"{names[i]} and {names[j]} are tied (correlation {correlation[i, j]:.3f}): fix one of them")
+            notes.append(f"{names[i]} and {names[j]} are tied (correlation {coupling[i, j]:.3f}): fix one of them")
     return notes
 
 

@@ -16,7 +16,10 @@ from dataclasses import asdict, dataclass
 from .. import llvm
 from .._version import __version__
 from ..bridge import engine
+from ..errors import MachineError
 from ..pictures import denoise
+from ..spirv.compiler import INSTALL
+from ..spirv.compiler import compiler as shader_compiler
 
 # Traces rays by Embree or OptiX, evaluates a Gonio material and compiles a kernel: all that a render needs.
 _TRIAL = """
@@ -90,7 +93,15 @@ def examine() -> Report:
         findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {pyoidn_version}"))
     else:
         findings.append(Finding("missing", "denoiser", f"for --denoise: {denoise.INSTALL}"))
+    findings.append(_shader_compiler())
     return Report(tuple(findings), devices)
+
+
+def _shader_compiler() -> Finding:
+    try:
+        return Finding("ok", "shader compiler", shader_compiler())
+    except MachineError:
+        return Finding("missing", "shader compiler", f"to read GLSL and HLSL: {INSTALL}")
 
 
 def _package(name: str, subject: str, install: str) -> Finding:

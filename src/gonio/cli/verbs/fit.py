@@ -182,13 +182,9 @@ def _print(row: dict) -> None:
         print(f"{rank}. {one['material']}")
         table = listing("", "value", "95 % interval")
         for name, about in one["parameters"].items():
-            value, error = about["value"], about["error"]
-            reach = (
-                "not determined by the data"
-                if error is None
-                else f"{value - 1.96 * error:.5g} to {value + 1.96 * error:.5g}"
-            )
-            table.add_row(name, f"{value:.5g}", reach)
+            ends = about["interval"]
+            reach = "not determined by the data" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}"
+            table.add_row(name, f"{about['value']:.5g}", reach)
         print_rich(table)
         print(
             f"   {100.0 * one['relative']:.3g} % off on average, {one['error']:.4g} ({one['metric']}), "

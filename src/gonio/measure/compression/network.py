@@ -37,7 +37,7 @@ class NetworkMethod(Method):
 def trained(table: Measurement, seed: int = 1) -> Network:
     """The network of a table, trained in about half a minute: by Adam in Dr.Jit, then by Levenberg-Marquardt.
 
-    The loss is |log(f + c) - log(f' + c)| over the cells of a half-difference table, where c is a fraction of the median.
+    The loss is |log(f + c) - log(f' + c)| over the cells of a half-difference table; c is a fraction of the median.
     """
     data = Data.of(over_half_vectors(table))
     rng = np.random.default_rng([seed, 97])

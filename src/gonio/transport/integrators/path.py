@@ -26,8 +26,8 @@ class Path(LightTransport):
         super().__init__(data, settings)
         depth = self.depth(settings)
         # The last ray can only find light. If the only lamp is a single rectangle, the vertex before adds its light by
-        # a shadow ray (`light_along`). Otherwise it is a ray like the others, since media attenuate it or any of several
-        # lights may be its first hit; handled apart, it would add a second ray and its surface to each vertex.
+        # a shadow ray (`light_along`). Otherwise it is a ray like the others, since media attenuate it or any of
+        # several lights may be its first hit; handled apart, it would add a second ray and its surface to each vertex.
         self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
         self.one_vertex = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
 
