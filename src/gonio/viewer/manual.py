@@ -26,13 +26,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Page:
-    """The manual page of a material; `breaks` has the reason by the name of the law."""
+    """The manual page of a material; `breaks` has the reason by the name of the law, `presets` the title by name."""
 
     name: str
     title: str
     doc: str
     parameters: tuple[Row, ...]
     breaks: dict[str, str]
+    presets: dict[str, str]
     plugin: str
     source: str
 
@@ -48,6 +49,9 @@ class Page:
             lines.append(f"| `{row.name}` | {row.kind} | {allowed} | {row.unit or '-'} | {default} | {row.doc} |")
         for law, reason in self.breaks.items():
             lines += ["", f"Breaks **{law}** by nature: {reason}."]
+        if self.presets:
+            named = ", ".join(f"`{name}`{_also(name, title)}" for name, title in self.presets.items())
+            lines += ["", f"Presets: {named}."]
         return "\n".join([*lines, "", f"Mitsuba plugin `{self.plugin}`. Source: `{self.source}`.", ""])
 
     def text(self, width: int = _WIDTH) -> str:
@@ -68,8 +72,15 @@ class Page:
             lines += [filled(row.doc, indent, f"  {row.name}"), " " * indent + ", ".join(facts)]
             lines += [filled(f"{choice}: {meaning}", indent + 2) for choice, meaning in row.choices.items()]
         lines += [""] * bool(self.parameters)
+        if self.presets:
+            named = ", ".join(f"{name}{_also(name, title)}" for name, title in self.presets.items())
+            lines += [filled(named, 11, "  presets"), ""]
         lines += [filled(f"Breaks {law} by nature: {reason}.", 0) for law, reason in self.breaks.items()]
         return "\n".join([*lines, f"Mitsuba plugin: {self.plugin}", f"Source: {self.source}"])
+
+
+def _also(name: str, title: str) -> str:
+    return f" ({title})" if title and title != name else ""
 
 
 def page(model: type[BSDF]) -> Page:
@@ -92,6 +103,7 @@ def page(model: type[BSDF]) -> Page:
         title=model.__name__,
         doc=inspect.getdoc(model) or "",
         parameters=rows,
+        presets={name: preset.title for name, preset in model.presets().items()},
         breaks={law: breach.reason for law, breach in model.known_violations.items()},
         plugin="gonio_" + model.name.replace("-", "_"),
         source="src/" + model.__module__.replace(".", "/") + ".py" if own else inspect.getfile(model),
