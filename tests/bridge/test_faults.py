@@ -147,8 +147,8 @@ from gonio.bridge import engine
 from gonio.bridge.faults.denormal_numbers import denormals_rounded
 mi = engine.load()
 
-def product():
-    small, smaller = dr.opaque(mi.Float, 1e-30, 16), dr.opaque(mi.Float, 1e-10)
+def product(count=1 << 20):
+    small, smaller = dr.opaque(mi.Float, 1e-30, count), dr.opaque(mi.Float, 1e-10)
     return int(np.array(dr.reinterpret_array(mi.UInt32, small * smaller)).max())
 
 dr.set_thread_count(2)

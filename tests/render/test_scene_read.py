@@ -541,5 +541,6 @@ def test_the_project_s_own_examples_read_and_are_small():
     files = sorted((REPOSITORY / "examples").glob("*/scene.json"))
     for file in files:
         assert scene.read(file.parent).warnings == []
-    size = sum(path.stat().st_size for path in (REPOSITORY / "examples").glob("*/**/*") if path.is_file())
-    assert size < 2.5e6
+    for folder in {file.parent for file in files}:
+        sizes = {path.name: path.stat().st_size for path in folder.glob("**/*") if path.is_file()}
+        assert sum(sizes.values()) < 4e5, sizes

@@ -1,9 +1,10 @@
 """Dr.Jit 1.5: kernels keep denormal numbers with one thread, and round them to 0 with two or more.
 
     dr.set_thread_count(1)                                       # 2: 0
-    dr.opaque(mi.Float, 1e-30, 16) * dr.opaque(mi.Float, 1e-10)  # 1e-40
+    dr.opaque(mi.Float, 1e-30, 1 << 20) * dr.opaque(mi.Float, 1e-10)  # 1e-40
 
-The threads of its pool are told to round, the caller's, which computes alone if there is no other, is not. Products of
+The threads of its pool are told to round, the caller's, which computes alone if there is no other and where the arrays
+are short, is not. Products of
 small densities pass through such numbers, so a dark pixel had other bits with `--threads 1`.
 
 Workaround: let the calling thread round as well, by the C library on Linux, whose `fenv_t` is known. Elsewhere pictures
