@@ -5,7 +5,7 @@ BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel audit
 
 install: .venv/installed
 
@@ -106,6 +106,14 @@ book: .venv/book
 # a wheel and a source archive, tried in empty environments outside the repository, and a bill of materials
 wheel:
 	$(PYTHON) tools/wheel.py
+
+# Known vulnerabilities of the installed packages. Needs the registry's own service, which a mirror may lack: a package
+# that could not be looked up fails it, too.
+audit: .venv/installed
+	@mkdir -p out
+	test -x out/audit/bin/pip-audit || { $(PYTHON) -m venv out/audit && out/audit/bin/python -m pip install --quiet pip-audit; }
+	$(BIN)/python -m pip freeze --exclude-editable > out/requirements.txt
+	out/audit/bin/pip-audit --strict --no-deps --disable-pip -r out/requirements.txt
 
 clean:
 	rm -rf .venv out build dist docs/reference docs/gallery docs/project
