@@ -91,6 +91,7 @@ bench: .venv/installed
 docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
 	$(BIN)/python docs/make_options.py
+	$(BIN)/python docs/make_scenes.py
 
 # The book, in out/book/index.html, which opens from disk. Only pages whose sources changed are built again.
 .venv/book: pyproject.toml
