@@ -69,7 +69,8 @@ class Slot:
                 raise InputError(f"'{props[name]}' given, a number or a texture expected", self.location)
             if given in (kinds.Float, kinds.Integer):
                 return self._constant(name, float(props[name]))
-            if given == kinds.Color and not (variant.spectral and parameter.high <= 1.0):
+            # Mitsuba's own conversion of colors to spectra is exact for reflectances, and clamps an index to 1
+            if given == kinds.Color and (not variant.spectral or np.max(np.asarray(props[name])) > 1.0):
                 color = np.asarray(props[name], dtype=float).ravel()
                 return self._through_rgb(name, color) if variant.spectral else self._constant(name, color)
             return self._texture(name, props.get_unbounded_texture(name))
