@@ -10,14 +10,13 @@ SUFFIXES = (".glsl", ".frag", ".hlsl", ".wgsl", ".spv", ".brdf")
 
 def names_shader(text: str) -> bool:
     """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
-    path = Path(os.path.expanduser(text.strip()))
-    suffix = path.suffix.lower()
+    suffix = Path(text.strip()).suffix.lower()
     if suffix not in SUFFIXES or "\0" in text:
         return False
     if suffix != ".brdf":
         return True
     try:
-        with path.open("rb") as file:
+        with Path(os.path.expanduser(text.strip())).open("rb") as file:
             from . import explorer
 
             return explorer.is_explorer(file.read(1 << 16).decode("utf-8", "replace"))
