@@ -13,12 +13,14 @@ from a file that was loaded anew.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import pkgutil
 import sys
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from .arguments import shown
@@ -143,13 +145,25 @@ class Family(Generic[Member]):
             warnings.warn(f"{where} is ignored: {type(error).__name__}: {error}", GonioWarning, stacklevel=4)
 
     def _in_package(self, package: str) -> Iterable[tuple[str, Member]]:
-        module = importlib.import_module(package)
-        for entry in pkgutil.iter_modules(module.__path__):
-            name = f"{package}.{entry.name}"
-            for thing in vars(importlib.import_module(name)).values():
+        for module in _modules(package):
+            name = module.__name__
+            for thing in list(vars(module).values()):
                 # objects that a module imports belong to the module that defines them
                 if getattr(thing, "__module__", name) == name and (pair := self._member(thing)) is not None:
                     yield pair
+
+
+def _modules(package: str) -> list[ModuleType]:
+    """The modules of a package, imported. Meanwhile the garbage collector pauses: imports leave no garbage, and it
+    would take 7 % of a command's start."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        entries = pkgutil.iter_modules(importlib.import_module(package).__path__)
+        return [importlib.import_module(f"{package}.{entry.name}") for entry in entries]
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _entry_points(group: str) -> Iterable[EntryPoint]:
