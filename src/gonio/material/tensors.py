@@ -1,4 +1,4 @@
-"""PyTorch tensors and JAX arrays as arguments, with gradients, exchanged by DLPack.
+"""Tensors of PyTorch, exchanged by DLPack, and arrays of JAX, exchanged as NumPy arrays, with gradients.
 
 value = gold.eval(wo, wi, parameters={"alpha": alpha})     # tensors in, a tensor out
 value.sum().backward()                                     # alpha.grad, wo.grad, wi.grad

@@ -166,10 +166,10 @@ def _named(
     if case.size <= TOLERANCE or len(names) == 1:
         return [case]
     cases = []
+    values = _values(_in_blocks(subject, blocks), blocks, wo, wi)[number]
     for name in names:
         moved = {**blocks[number], name: changed[name]}
         all_ = [moved if n == number else block for n, block in enumerate(blocks)]
-        values = _values(_in_blocks(subject, blocks), blocks, wo, wi)[number]
         other = _values(_in_blocks(subject, all_), blocks, wo, wi)[number]
         part = box.per_ray_of(subject, moved)
         cases.append(_case(case.limit, f"{name} changes values", case.one, part, values, other, wo, wi))
