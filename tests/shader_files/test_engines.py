@@ -91,10 +91,16 @@ def test_verb_writes_the_package_and_keeps_what_is_there(
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("", "no package"), ("[]", "no adapter to the package 'None'"), ('{"name": "left-pad"}', "'left-pad'")],
+    [
+        ("", "is no JSON"),
+        (None, "no package.json"),
+        ("[]", "no adapter to the package 'None'"),
+        ('{"name": "left-pad"}', "'left-pad'"),
+    ],
 )
-def test_other_packages_are_refused(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "package.json").write_text(text)
+def test_other_packages_are_refused(tmp_path: Path, text: str | None, message: str) -> None:
+    if text is not None:
+        (tmp_path / "package.json").write_text(text)
     with pytest.raises(InputError, match=message) as error:
         shaders.adopt_package(tmp_path, tmp_path / "out")
     assert "node_modules/three" in str(error.value.hint)

@@ -249,3 +249,9 @@ def test_samples_below_an_opaque_surface_fail(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.asarray(drawn.pdf)[below], 0.0)
     assert not np.any(np.asarray(drawn.weight)[below]) and np.all(np.asarray(drawn.weight)[~below] > 0.0)
     np.testing.assert_allclose(np.asarray(drawn.pdf)[~below], material.pdf(WO, drawn.wi)[~below], rtol=1e-6)
+
+
+def test_the_page_of_a_shader_names_its_file(tmp_path: Path) -> None:
+    shader = tmp_path / "red.wgsl"
+    shader.write_text("fn brdf(L: vec3f, V: vec3f, N: vec3f) -> vec3f { return vec3f(0.3, 0.1, 0.1); }\n")
+    assert str(go.explain(str(shader))).endswith(f"Source: {shader}")

@@ -97,7 +97,7 @@ def page(model: type[BSDF]) -> Page:
         )
         for parameter in model.parameters().values()
     )
-    own = model.__module__.startswith("gonio.")
+    own = model.__module__.startswith("gonio.") and not model.spelling
     return Page(
         name=model.name,
         title=model.__name__,
@@ -106,5 +106,5 @@ def page(model: type[BSDF]) -> Page:
         presets={name: preset.title for name, preset in model.presets().items()},
         breaks={law: breach.reason for law, breach in model.known_violations.items()},
         plugin="gonio_" + model.name.replace("-", "_"),
-        source="src/" + model.__module__.replace(".", "/") + ".py" if own else inspect.getfile(model),
+        source="src/" + model.__module__.replace(".", "/") + ".py" if own else model.spelling or inspect.getfile(model),
     )

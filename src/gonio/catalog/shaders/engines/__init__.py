@@ -55,8 +55,10 @@ def package_in(folder: str | os.PathLike[str]) -> Package:
         if path.stat().st_size > MAX_DESCRIPTION:
             raise InputError(f"over {MAX_DESCRIPTION >> 20} MB", str(path), hint)
         about = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"no package: {error}", str(folder), hint) from None
+    except OSError as error:
+        raise InputError(f"no package.json that can be read: {error.strerror}", str(folder), hint) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"its package.json is no JSON: {error}", str(folder), hint) from None
     name = about.get("name") if isinstance(about, dict) else None
     if name not in engines():
         raise InputError(f"no adapter to the package '{name}'", str(folder), hint)
