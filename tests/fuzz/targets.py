@@ -12,6 +12,7 @@ import functools
 import importlib.util
 import io
 import json
+import os
 import shlex
 import struct
 import warnings
@@ -19,6 +20,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -626,11 +628,6 @@ def link(data: bytes, folder: Path) -> object:
 ], [b"--", b"-o", b"--size", b"--param", b"=", b"''", b"1e999", b"nan", b"auto"])  # fmt: skip
 def options(data: bytes, folder: Path) -> object:
     """The command line, in an empty folder; of verbs that compute or serve, only what names nothing to work on."""
-    import os
-
-    from gonio.cli import app
-
-    os.environ["GONIO_DEBUG"] = "1"  # a traceback is a find
     try:
         words = shlex.split(data.decode("utf-8", "surrogateescape").replace("\0", ""))
     except ValueError:
@@ -641,8 +638,29 @@ def options(data: bytes, folder: Path) -> object:
     if named is not None and named not in words:
         return None
     os.chdir(folder)
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+    return command_line(words)
+
+
+def command_line(words: list[str]) -> int:
+    """The exit code of a command; what it prints is dropped, and a traceback is a find."""
+    from gonio import scene
+    from gonio.cli import app
+
+    with (
+        mock.patch.dict(os.environ, {"GONIO_DEBUG": "1"}),
+        mock.patch.object(scene, "json_schema", _schema),
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()),
+    ):
         return app.run(words)
+
+
+@functools.cache
+def _schema() -> dict[str, object]:
+    """Made once: it depends on no input and takes more time than all the rest of a command."""
+    from gonio.scene.schema import json_schema
+
+    return json_schema()
 
 
 # ---------------------------------------------------------------------- the harness itself

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import io
 import os
 import struct
 import tempfile
@@ -13,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
 
-from .targets import SHAPES, XML, _load_xml, saved, scenes, target
+from .targets import SHAPES, XML, _load_xml, command_line, saved, scenes, target
 
 # ---------------------------------------------------------------------- checkpoints
 
@@ -156,7 +155,6 @@ _FIRST = b"a.exr"
 def file_name(data: bytes, folder: Path) -> object:
     """Files of any name, read and written by verbs; `/` would lead elsewhere."""
     import numpy as np
-    from gonio.cli import app
     from gonio.pictures import images
 
     os.chdir(folder)
@@ -165,12 +163,7 @@ def file_name(data: bytes, folder: Path) -> object:
     with contextlib.suppress(OSError):
         Path(name).write_bytes(b"{}")
     commands = (_NAMED[zlib.crc32(data) % len(_NAMED)],) if data != _FIRST else _NAMED  # imports count for no input
-    with _debugging(), contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        return [app.run([part.format(name) for part in command.split()]) for command in commands]
-
-
-def _debugging() -> contextlib.AbstractContextManager[object]:
-    return mock.patch.dict(os.environ, {"GONIO_DEBUG": "1"})  # a traceback is a find
+    return [command_line([part.format(name) for part in command.split()]) for command in commands]
 
 
 # ---------------------------------------------------------------------- the environment
@@ -195,7 +188,6 @@ _USUAL = b"LANG=C\nLC_ALL=\nCOLUMNS=20"
 def environment(data: bytes, folder: Path) -> object:
     """Verbs in an environment of any values, which lead to no other folder."""
     import numpy as np
-    from gonio.cli import app
     from gonio.energy import cache
 
     os.chdir(folder)
@@ -205,12 +197,12 @@ def environment(data: bytes, folder: Path) -> object:
         name, _, value = line.partition(b"=")
         if name in _VARIABLES:
             values[os.fsdecode(name)] = os.fsdecode(value.replace(b"/", b"").replace(b"..", b"").replace(b"~", b"_"))
-    quiet = contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO())
-    with mock.patch.dict(os.environ, values), _debugging(), quiet[0], quiet[1]:
+    with mock.patch.dict(os.environ, values):
         cache.remember(("environment",), lambda: np.ones(2))
         first = data == _USUAL  # imports count for no input
         return [
-            app.run(_ASKED[(zlib.crc32(data) + at) % len(_ASKED)].split()) for at in range(len(_ASKED) if first else 1)
+            command_line(_ASKED[(zlib.crc32(data) + at) % len(_ASKED)].split())
+            for at in range(len(_ASKED) if first else 1)
         ]
 
 

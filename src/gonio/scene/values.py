@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import sys
-import textwrap
 from collections.abc import Mapping
 from itertools import pairwise
+from types import ModuleType
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import (
@@ -82,16 +83,26 @@ def _docstrings(cls: type[Part]) -> dict[str, str]:
     """The string below each field of a class and of its bases, as far as they were written in a module."""
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
-        if not issubclass(base, Part) or getattr(sys.modules[base.__module__], base.__name__, None) is not base:
+        module = sys.modules[base.__module__]
+        if issubclass(base, Part) and getattr(module, base.__name__, None) is base:
+            texts.update(_documented(module)[base.__name__])
+    return texts
+
+
+@functools.cache
+def _documented(module: ModuleType) -> dict[str, dict[str, str]]:
+    """The docstrings of fields of each class of a module."""
+    classes: dict[str, dict[str, str]] = {}
+    for node in ast.parse(inspect.getsource(module)).body:
+        if not isinstance(node, ast.ClassDef):
             continue
-        body = ast.parse(textwrap.dedent(inspect.getsource(base))).body[0]
-        assert isinstance(body, ast.ClassDef)
-        for line, below in pairwise(body.body):
+        texts = classes[node.name] = {}
+        for line, below in pairwise(node.body):
             if not isinstance(line, ast.AnnAssign) or not isinstance(line.target, ast.Name):
                 continue
             if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
                 texts[line.target.id] = inspect.cleandoc(str(below.value.value))
-    return texts
+    return classes
 
 
 def _not_a_flag(value: object) -> object:
