@@ -409,7 +409,7 @@ def test_settings_are_shared_by_the_materials_that_have_them(
 ) -> None:
     from gonio.cli.options import Material
 
-    made = Material(["alpha=.3"], "Au")
+    made = Material(param=["alpha=.3"], preset="Au")
     assert made.texts(["conductor", "lambert", "dielectric(eta=1.3,alpha=.1)"]) == [
         "conductor(preset=Au,alpha=.3)",
         "lambert",

@@ -13,8 +13,10 @@ from a file that was loaded anew.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import importlib
+import os
 import pkgutil
 import sys
 import warnings
@@ -169,14 +171,23 @@ def _modules(package: str) -> list[ModuleType]:
 def _entry_points(group: str) -> Iterable[EntryPoint]:
     """The entry points of a group. Metadata files are first searched for the group's name, since loading
     importlib.metadata takes longer than the rest of `gonio --help`."""
-    for place in map(Path, sys.path):
-        files = place.glob("*-info/entry_points.txt")
-        # importlib.metadata can read inside a zip
-        if place.is_file() or any(group.encode() in file.read_bytes() for file in files):
-            from importlib.metadata import entry_points
+    # importlib.metadata can read inside a zip
+    if any(Path(place).is_file() or _declares(place, group.encode()) for place in sys.path):
+        from importlib.metadata import entry_points
 
-            return entry_points(group=group)
+        return entry_points(group=group)
     return ()
+
+
+def _declares(folder: str, group: bytes) -> bool:
+    """Whether a package that is installed in a folder may declare entry points of a group."""
+    with contextlib.suppress(OSError):
+        for name in os.listdir(folder or "."):
+            if name.endswith("-info"):
+                with contextlib.suppress(OSError):
+                    if group in Path(folder, name, "entry_points.txt").read_bytes():
+                        return True
+    return False
 
 
 Thing = TypeVar("Thing")

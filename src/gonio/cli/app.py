@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from ..errors import GonioError, GonioWarning, InputError, MachineError, in_user_code, out_of_loop
 from ..files import check_current_folder
-from . import renamed, streams
+from . import streams
 from .signals import Ended, exit_code
 from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
@@ -32,6 +32,8 @@ def _styled(text: str) -> str:
 class _Command(TyperCommand):
     def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
         parser = super().make_parser(ctx)  # type: ignore[arg-type]
+        from . import renamed  # the list of verbs needs none
+
         renamed.accept(parser, self.name or "")
         return parser
 

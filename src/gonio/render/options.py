@@ -24,7 +24,7 @@ class Shown(NamedTuple):
     help: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # fewer methods to compile whenever `gonio` starts
 class RenderOptions:
     """Options of a render; None takes the scene's value."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,13 +9,12 @@ from typer import Argument, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Executor, Json, Material, Seed, output_option, samples_option
+from ..options import Executor, Json, Material, Options, Seed, output_option, samples_option
 from ..output import print_tables
 from .base import MATERIALS, verb
 
 
-@dataclass(frozen=True)
-class Baking:
+class Baking(Options):
     """What is baked, and how."""
 
     lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""

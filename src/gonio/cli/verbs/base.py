@@ -5,18 +5,20 @@
         \"\"\"Print the sheen of a material.\"\"\"
 
 The file stands in `cli/verbs`; a package of its own names the verb as an entry point of the group `gonio.verbs`.
-A parameter whose type is a dataclass of options, such as `Material`, becomes one option for each of its fields.
+A parameter whose type is a group of options, such as `Material` or a dataclass of your own, becomes one option for each
+of its fields.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import inspect
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from typing import ClassVar, get_type_hints
 
 from ...members import Family
+from ..options import Options
 
 PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
 
@@ -40,25 +42,24 @@ class Verb:
         return inspect.cleandoc(self.function.__doc__ or "").partition("\n")[0]
 
     def with_single_options(self) -> Callable[..., None]:
-        """The function with an option for each field of each dataclass that it takes, as Typer reads it."""
+        """The function with an option for each field of each group that it takes, as Typer reads it."""
         hints = get_type_hints(self.function, include_extras=True)
-        groups: dict[str, type] = {}
+        groups: dict[str, tuple[type, list[str]]] = {}
         single: list[inspect.Parameter] = []
         for parameter in inspect.signature(self.function).parameters.values():
             kind = hints[parameter.name]
-            if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-                groups[parameter.name] = kind
+            if isinstance(kind, type) and (issubclass(kind, Options) or is_dataclass(kind)):
                 types = get_type_hints(kind, include_extras=True)
-                for field in dataclasses.fields(kind):
-                    single.append(
-                        parameter.replace(name=field.name, annotation=types[field.name], default=field.default)
-                    )
+                groups[parameter.name] = kind, list(types)
+                for name, annotation in types.items():
+                    default = getattr(kind, name, parameter.empty)
+                    single.append(parameter.replace(name=name, annotation=annotation, default=default))
             else:
                 single.append(parameter.replace(annotation=kind))
 
         def verb(**values: object) -> None:
-            for name, kind in groups.items():
-                values[name] = kind(**{field.name: values.pop(field.name) for field in dataclasses.fields(kind)})
+            for name, (kind, fields) in groups.items():
+                values[name] = kind(**{field: values.pop(field) for field in fields})
             self.function(**values)
 
         verb.__doc__ = self.function.__doc__

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ from typer import Argument, Exit, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Code, Json, Material, Outside
+from ..options import Code, Json, Material, Options, Outside
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
     from ...check import Finding, Report
 
 
-@dataclass(frozen=True)
-class Judging:
+class Judging(Options):
     """By what the work is judged, and how it is reported."""
 
     scene: Annotated[

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Exit, Option
 
 from .. import completion
-from ..options import Json, Material, output_option
+from ..options import Json, Material, Options, output_option
 from ..output import listing, print_rich
 from .base import PICTURES, verb
 
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
     from ...pictures.metrics import Comparison
 
 
-@dataclass(frozen=True)
-class Judging:
+class Judging(Options):
     """By which metric, and up to which difference, A passes."""
 
     tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 if the metric exceeds X.")] = None

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from .. import completion
-from ..options import Json, Material, output_option
+from ..options import Json, Material, Options, output_option
 from .base import MATERIALS, verb
 
 if TYPE_CHECKING:
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
 SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
 
-@dataclass
-class Place:
+class Place(Options):
     """The place of a shader in a module with other code."""
 
     prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
@@ -30,8 +28,7 @@ class Place:
     first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
 
 
-@dataclass
-class Content:
+class Content(Options):
     """What of the material is written, or what instead of its whole functions."""
 
     functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample"

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from ...errors import InputError
-from ..options import Fitting, Json, Spp, output_option
+from ..options import Fitting, Json, Options, Spp, output_option
 from ..output import Bar, listing, print_intervals, print_rich
 from .base import MATERIALS, verb
 
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
 PICTURES = (".exr", ".hdr", ".png")
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(Options):
     """What is fitted to measured values."""
 
     model: Annotated[
@@ -33,8 +31,7 @@ class Model:
     loss: Annotated[str, Option(metavar="NAME", help="relative, log, log1p, cuberoot or linear.")] = "relative"
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(Options):
     """What a picture shows, to which a scene's materials are fitted."""
 
     scene: Annotated[

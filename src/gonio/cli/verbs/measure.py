@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from .. import completion
-from ..options import Device, Json, Material, Seed, output_option, samples_option
+from ..options import Device, Json, Material, Options, Seed, output_option, samples_option
 from ..output import Bar, listing, print_rich
 from .base import MATERIALS, verb
 
@@ -20,8 +19,7 @@ if TYPE_CHECKING:
 MAX_ROWS = 12  # angles of incidence that are listed
 
 
-@dataclass(frozen=True)
-class Detector:
+class Detector(Options):
     """Where the detector stands, and its imperfections."""
 
     theta_i: Annotated[
@@ -40,8 +38,7 @@ class Detector:
     ] = ""
 
 
-@dataclass(frozen=True)
-class Specimen:
+class Specimen(Options):
     """A surface of facets, and the rays that are sent to it."""
 
     surface: Annotated[

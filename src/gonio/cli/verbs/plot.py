@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from typer import Argument, Option
 
 from .. import completion
-from ..options import Json, Material, output_option
+from ..options import Json, Material, Options, output_option
 from .base import MATERIALS, verb
 
 
-@dataclass(frozen=True)
-class Interface:
+class Interface(Options):
     """The interface of `gonio plot fresnel`."""
 
     eta: Annotated[float | None, Option(metavar="ETA", help="Relative index of fresnel: inside over outside.")] = None

@@ -6,13 +6,13 @@ import json
 import os
 import shlex
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from ..options import Checkpoint, Executor, Json, Material, Rendering, SceneFile, Timeout, output_option
+from ..options import Checkpoint, Executor, Json, Material, Options, Rendering, SceneFile, Timeout, output_option
 from ..output import Bar, print_warnings
 from ..signals import exit_code, words
 from .base import PICTURES, verb
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from ...render.request import Request
 
 
-@dataclass(frozen=True)
-class Until:
+class Until(Options):
     """When a render stops, and where it is stored meanwhile."""
 
     timeout: Timeout = None

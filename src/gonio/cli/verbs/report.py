@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from typer import Argument, Option
 
-from ..options import Executor, Json, Rendering, output_option
+from ..options import Executor, Json, Options, Rendering, output_option
 from ..output import Bar, print_warnings
 from .base import PICTURES, verb
 
 
-@dataclass(frozen=True)
-class Figures:
+class Figures(Options):
     """Figures that are listed on the command line, besides the scene's own picture."""
 
     study: Annotated[

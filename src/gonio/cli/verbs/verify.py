@@ -6,14 +6,13 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Exit, Option
 
 from .. import completion
-from ..options import Executor, Json, Material, Seed, output_option
+from ..options import Executor, Json, Material, Options, Seed, output_option
 from ..output import Bar
 from .base import MATERIALS, verb
 
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from ...verify.report import Report
 
 
-@dataclass(frozen=True)
-class Files:
+class Files(Options):
     """Reports for people, and for continuous integration."""
 
     output: Annotated[Path | None, output_option("DIR", "Write report.html and report.json there.")] = None
@@ -43,8 +41,7 @@ class Files:
     ] = ""
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(Options):
     """What is judged, and how thoroughly."""
 
     vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card for each value; a range has five.")] = ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,7 @@ from typer import Argument, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Code, Device, Json, Material, Outside
+from ..options import Code, Device, Json, Material, Options, Outside
 from ..output import print_warnings
 from .base import PICTURES, verb
 
@@ -20,8 +19,7 @@ if TYPE_CHECKING:
     from ...viewer.stage import Stage
 
 
-@dataclass(frozen=True)
-class Address:
+class Address(Options):
     """Where the page is served."""
 
     host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1"
