@@ -10,6 +10,7 @@ from typing import Any
 LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+CARDS = ("report-cards/README", "report-cards/engines/README")
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "project/contributing.md", "CHANGELOG.md": "project/changelog.md"}
 
 
@@ -17,7 +18,7 @@ def rewrite(app: Any, name: str, source: list[str]) -> None:
     """Sphinx's source-read: the text of a page, with its links led to where the book has their target."""
     folder = (DOCS / name).parent
     source[0] = LINK.sub(lambda link: _led(link, origin(name), folder), source[0])
-    if name == "report-cards/README":  # which is shown on its own too, where a table of contents would be noise
+    if name in CARDS:  # these pages are shown on their own too, where a table of contents would be noise
         source[0] += "\n:::{toctree}\n:hidden:\n:glob:\n\n*\n:::\n"
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import gonio as go
 import pytest
-from gonio.viewer import stage
+from gonio.viewer import page, stage
 
 import browser
 
@@ -95,6 +95,11 @@ def test_a_live_page_opens_with_color_in_the_studio() -> None:
     assert opened.lights == (stage.STUDIO,)
     assert opened.materials["m0"].bsdf.k == go.Conductor.preset("Au").k  # type: ignore[attr-defined]
     assert len(opened.rows[0].balls) == 5
+
+
+def test_a_material_of_a_file_has_a_live_page(tmp_path: Path) -> None:
+    made = page.export(models.opening("measured"), tmp_path / "measured.html")
+    assert "rough-copper.gonio" in made.read_text(encoding="utf-8")
 
 
 def test_docstrings_become_markdown() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -145,6 +146,8 @@ def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
 def _plain(value: object) -> object:
     if isinstance(value, bool | str) or value is None:
         return value
+    if isinstance(value, Path):
+        return str(value)
     array = np.asarray(value, dtype=float)
     return float(array) if array.ndim == 0 else array.tolist()
 
