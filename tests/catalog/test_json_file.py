@@ -212,3 +212,12 @@ def test_types_are_the_labs_or_gonios() -> None:
     whole = documents.for_scenes(plain)
     assert whole["type"] == "gonio-mix" and whole["a"] == {"type": "gonio-conductor"}
     assert whole["b"] == {"type": "own.py:Own"} and documents.from_scenes(whole) == plain
+
+
+def test_a_material_given_as_text_is_written_as_json(tmp_path: Path) -> None:
+    text = "kulla-conty(base=conductor(preset=Au,alpha=0.3))"
+    go.convert(text, tmp_path / "gold.json")
+    assert go.material(tmp_path / "gold.json") == go.material(text)
+    with pytest.raises(go.InputError, match=r"'\.gltf' is not a format of materials"):
+        go.convert(text, tmp_path / "gold.gltf")
+    assert not (tmp_path / "gold.gltf").exists()

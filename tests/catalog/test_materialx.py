@@ -119,6 +119,11 @@ if importlib.util.find_spec("MaterialX"):
             "base_color": [pytest.approx(c) for c in values["base_color"]],
         }
 
+    def test_an_openpbr_given_as_text_is_written(tmp_path: Path) -> None:
+        text = "openpbr(base_metalness=1,base_color=1,.75,.5,specular_roughness=.5)"
+        go.convert(text, tmp_path / "gold.mtlx")
+        assert go.material(tmp_path / "gold.mtlx") == go.material(text)
+
     def test_a_material_that_the_format_does_not_hold_is_not_written(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"type": "conductor", "alpha": 0.3}')
         with pytest.raises(InputError, match="a conductor given, but materialx holds openpbr"):

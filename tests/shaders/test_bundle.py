@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import http.server
+import io
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +15,13 @@ import pytest
 from gonio.shaders import bundle
 from gonio.shaders.languages import languages
 from gonio.shaders.manifest import layout
+from PIL import Image
 from variants import EVERY
 
 import browser
 
+ROOT = Path(__file__).parents[2]
+THREE = ROOT / "web/node_modules/three"
 SIDE = 32
 
 
@@ -34,10 +38,10 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
-    shutil.copy(Path(__file__).with_name("alone.html"), tmp_path)
+    shutil.copy(ROOT / "docs/guides/program.html", tmp_path)
     handler = functools.partial(_Folder, directory=str(tmp_path))
     with browser.serving(handler) as root:
-        yield f"{root}alone.html"
+        yield f"{root}program.html"
 
 
 @pytest.mark.sample(3)
@@ -60,6 +64,42 @@ def test_a_bundle_is_enough_to_draw_with(name: str, lang: str, chromium: Any, ad
     expected = np.asarray(material.eval(wo, wi)).reshape(SIDE, SIDE, 3)
     assert expected.max() > 0.01 and np.all(drawn[..., 3] == 1.0)
     assert np.allclose(drawn[..., :3], expected, rtol=1e-4, atol=1e-6)
+
+
+def test_the_page_of_three_js_draws_what_gonio_says(chromium: Any, tmp_path: Path) -> None:
+    """The ball of docs/guides/three.html in its ring of lamps, at pixels well inside it."""
+    if not THREE.exists():
+        pytest.skip("NOT TRIED in three.js: `npm ci` in web/ installs it")
+    shutil.copy(ROOT / "docs/guides/three.html", tmp_path)
+    (tmp_path / "node_modules").mkdir()
+    (tmp_path / "node_modules/three").symlink_to(THREE)
+    material = EVERY["kulla-conty"]
+    bundle(material, "glsl").write(tmp_path / "gold")
+    page = chromium.new_page(viewport={"width": 480, "height": 360})
+    with browser.serving(functools.partial(_Folder, directory=str(tmp_path))) as root:
+        page.goto(f"{root}three.html")
+        page.wait_for_function("window.drawn")
+        drawn = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), float) / 255.0
+    page.close()
+    eye = np.array([0.0, 0.8, 4.4])
+    back = eye / np.linalg.norm(eye)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    for x, y in [(180.5, 140.5), (240.5, 180.5), (300.5, 200.5), (250.5, 110.5)]:
+        right_, up = (np.array([x, 360 - y]) / 180.0 - [480 / 360, 1.0]) * np.tan(np.radians(15.0))
+        ray = right_ * right + up * np.cross(back, right) - back
+        ray /= np.linalg.norm(ray)
+        middle = -eye @ ray
+        n = eye + (middle - np.sqrt(middle**2 - eye @ eye + 1.0)) * ray
+        t = np.cross([0.3, 1.0, 0.2], n)
+        local = np.stack([t / np.linalg.norm(t), np.cross(n, t / np.linalg.norm(t)), n])
+        phi = np.arange(24) * 2.0 * np.pi / 24
+        low = np.arange(24) % 6 < 3
+        toward = np.stack([np.cos(phi), np.where(low, 0.4, 1.5), np.sin(phi)], -1)
+        toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
+        values = material.eval(np.broadcast_to(local @ -ray, toward.shape), toward @ local.T)
+        linear = np.sum(np.where(low, 0.09, 0.3)[:, None] * np.asarray(values), axis=0)
+        shown = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        assert np.abs(drawn[int(y), int(x)] - np.clip(shown, 0.0, 1.0)).max() < 2.5 / 255.0
 
 
 def test_fields_lie_in_a_buffer_as_the_language_has_it() -> None:

@@ -6,7 +6,8 @@ import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..catalog import documents, operands
+from ..catalog import documents, notation, operands
+from ..catalog.material import material as as_material
 from ..catalog.operands import Kind
 from ..errors import GonioWarning, InputError
 from ..measure import compare
@@ -47,7 +48,8 @@ def convert(
         go.convert("ball.exr", "ball.png", exposure="auto")
         go.convert("gold.binary", "gold.bsdf").facts["error"]
 
-    source    a picture, a file of measured values, or one that describes a material (.gltf, .mtlx, .json)
+    source    a picture, a file of measured values, one that describes a material (.gltf, .mtlx, .json), or a material
+              as a text, such as "openpbr(base_metalness=1)"
     output    the file to write
     exposure  of a .png: stops, or "auto"
     phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
@@ -68,12 +70,15 @@ def converted(
     location: str = "source",
 ) -> Conversion:
     """As `convert`, without its warnings; `location` is the place of an error about the source."""
-    kind = operands.kind_of(source, {Kind.PICTURE, Kind.TABLE, Kind.DOCUMENT}, location)
+    kind = operands.kind_of(source, {Kind.PICTURE, Kind.NAME, Kind.TABLE, Kind.DOCUMENT}, location)
     if phi is not None and kind is not Kind.TABLE:
         raise InputError(f"{phi} given for {source}, which is not a table of measured values", "phi", "omit it")
     if kind is Kind.DOCUMENT:
         notices = documents.convert(source, output)
         return Conversion(output, str(output), notices, {"notices": notices})
+    if kind is Kind.NAME:
+        documents.write(notation.as_json(as_material(source)), output)
+        return Conversion(output, str(output))
     if kind is Kind.TABLE:
         table = compare.convert(source, output, phi)
         return Conversion(output, _table_summary(table), (), table.as_dict())

@@ -157,21 +157,28 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     if operand is None:
         raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
     described = read(*operand)
+    write(described.notation, output)
+    return described.notices
+
+
+def write(notation: Notation, output: Path) -> None:
+    """Write a material as JSON in Gonio's notation, or as a document: .json, or the suffix of a document's format.
+
+    Raises InputError for another suffix, and for a material that the format cannot hold.
+    """
     files.check_file(output)
     if output.suffix.lower() == ".json":
-        text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
-        files.write_whole(output, text.encode())
-        return described.notices
+        files.write_whole(output, (json.dumps(for_scenes(notation), indent=2) + "\n").encode())
+        return
     known = {suffix: one for one in Document.family.all().values() if one.writes for suffix in one.suffixes}
     target = known.get(output.suffix.lower())
     if target is None:
         hint = f"{', '.join(sorted(known))} or .json"
         raise InputError(f"'{output.suffix}' is not a format of materials", str(output), hint)
-    kind = described.notation["type"]
+    kind = notation["type"]
     if kind != target.writes:
         raise InputError(f"a {kind} given, but {target.name} holds {target.writes}", str(output))
-    files.write_whole(output, target.write(described.notation, output.stem))
-    return described.notices
+    files.write_whole(output, target.write(notation, output.stem))
 
 
 PREFIX = "gonio-"  # of types in scenes, where some names without it are the lab's, with other defaults

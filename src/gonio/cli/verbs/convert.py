@@ -29,7 +29,7 @@ def convert(
 
     A picture is tone-mapped without rendering it again. Measured values are copied if both formats have the same kind
     of table; otherwise they are resampled, and the measured error is reported. A material of a glTF or MaterialX file
-    becomes JSON as scenes hold it, and an openpbr in JSON a MaterialX file.
+    becomes JSON as scenes hold it, and an openpbr a MaterialX file.
 
     \b
     Examples:
@@ -39,6 +39,7 @@ def convert(
       gonio convert gold.binary -o gold.bsdf
       gonio convert paint.bsdf -o paint.binary --phi 360
       gonio convert paint.mtlx -o paint.json
+      gonio convert "openpbr(base_metalness=1)" -o metal.mtlx
     """
     from ...pictures import exposures
     from ...viewer.conversion import converted
