@@ -13,10 +13,10 @@ from gonio import ops
 from gonio.errors import InputError
 from gonio.material import KnownViolation
 from gonio.verify import report, verify
-from gonio.verify.laws import Law
+from gonio.verify.laws import Law, chosen
 from gonio.verify.run import decide
 from gonio.verify.subject import of
-from gonio.verify.verdict import Finding, Trial, Verdict
+from gonio.verify.verdict import DECLARED, PASS, Card, Finding, Trial, Verdict
 
 
 class Idle(Law):
@@ -157,7 +157,27 @@ def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
 
 def test_a_report_prints_as_the_terminal_shows_it() -> None:
     text = str(verify(go.Lambert(0.5), quick=True, law=["reciprocity"]))
-    assert "reciprocity" in text and "all laws hold" in text
+    assert "reciprocity holds  quick" in text
+
+
+def _verdict(law: str, status: str) -> Verdict:
+    return Verdict(0, law, "", status)
+
+
+def test_the_summary_names_laws_that_were_not_all_judged_or_break_as_declared() -> None:
+    every = [law.name for law in chosen(None)]
+    cases = {
+        "all laws hold": [_verdict(law, PASS) for law in every],
+        "all laws hold, but energy as declared": [
+            _verdict(law, DECLARED if law == "energy" else PASS) for law in every
+        ],
+        "pdf and weight hold": [_verdict("pdf", PASS), _verdict("weight", PASS)],
+        "pdf holds, energy breaks as declared": [_verdict("pdf", PASS), _verdict("energy", DECLARED)],
+        "energy breaks as declared": [_verdict("energy", DECLARED)],
+    }
+    for text, verdicts in cases.items():
+        found = report.Report([Card(of(go.Lambert()), verdicts)], 1, "quick", 0, 0.01)
+        assert str(found).splitlines()[-1].startswith(f"{text}  quick")
 
 
 class SlightlyBright(go.Lambert):

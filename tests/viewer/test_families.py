@@ -61,3 +61,13 @@ def test_it_is_printed(name: str, words: list[str], capsys: pytest.CaptureFixtur
 def test_what_is_none_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["explain", "smith-corelated"]) == 2
     assert "did you mean 'smith-correlated'?" in capsys.readouterr().err
+
+
+def test_a_part_in_a_file_is_used_by_the_name_that_commands_take(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "parts.py").write_text(
+        "import gonio as go\nclass Hazy(go.NDF):\n    def D(self, m, alpha):\n        return m.z * go.ops.inv_pi\n"
+    )
+    assert cli.run(["explain", f"{tmp_path}/parts.py:Hazy"]) == 0
+    assert f"Use: --param ndf={tmp_path}/parts.py:Hazy" in capsys.readouterr().out

@@ -22,7 +22,7 @@ from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from ..owner import COMPUTING
 from . import binding, blocks, requests, tensors, tree
 from .parameters import Material
-from .sample import Floats, Sample, SampleArrays
+from .sample import Floats, Sample, SampleArrays, checked
 
 MODES = ("radiance", "importance")
 
@@ -155,7 +155,8 @@ def method(formula: Callable[..., object], /) -> object:
         args = (mode,) if takes_mode else ()
         if self.is_bound:
             with backend.formula_of(wo):
-                return inner(self, wo, other, *args)
+                result = inner(self, wo, other, *args)
+            return checked(result, f"{type(self).__name__}.sample") if second == "u" else result
         if not isinstance(mode, str) or mode not in MODES:
             where = f"{type(self).__name__}.{formula.__name__}"
             raise InputError(f"unknown mode {shown(mode)}", where, " or ".join(MODES))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
+from ..errors import InputError
 from ..ops import Direction, Mask, Scalar, Spectrum
 
 if TYPE_CHECKING:  # typing.TypeVar has defaults since Python 3.13
@@ -54,3 +55,22 @@ def never(like: Scalar) -> Mask:
 
 Floats: TypeAlias = "NDArray[np.floating]"
 SampleArrays: TypeAlias = "Sample[Floats, Floats, Floats, NDArray[np.bool_]]"  # the result for NumPy arguments
+
+
+def checked(result: object, where: str) -> Sample:
+    """What `sample` of a material returned, with plain numbers and truth values in `pdf`, `delta` and `eta` as values
+    of each ray. Raises InputError for another type, and for `delta` that is no mask.
+    """
+    if not isinstance(result, Sample):
+        what = f"{type(result).__name__} returned, go.Sample expected"
+        raise InputError(what, where, "return go.Sample(wi, weight, pdf, delta, eta)")
+    delta = result.delta
+    if callable(delta) or len(getattr(delta, "shape", ())) > 1:
+        what = f"delta is {'a function' if callable(delta) else 'a vector'}, one truth value per ray expected"
+        raise InputError(what, where, "where no sample comes from a delta lobe, give go.never(pdf)")
+    like = result.wi.x
+    if isinstance(delta, bool):
+        result = result._replace(delta=like == like if delta else never(like))
+    numbers = {name: getattr(result, name) for name in ("pdf", "eta")}
+    plain = {name: value + ops.zeros_like(like) for name, value in numbers.items() if isinstance(value, int | float)}
+    return result._replace(**plain) if plain else result

@@ -290,7 +290,7 @@ class Bake(Figure):
 
 
 class Check(Figure):
-    """A table of verdicts about the student's own work, as by `gonio check`."""
+    """A table of verdicts about the student's own work, as by gonio check."""
 
     suffix: ClassVar[str] = ".csv"
     type: Literal["check"]
@@ -305,7 +305,7 @@ class Check(Figure):
         return f"Check of {Path(self.work).name}"
 
     def description(self) -> str:
-        return f"Judgment of {Path(self.work).name} by `gonio check`."
+        return f"Judgment of {Path(self.work).name} by gonio check."
 
     def command(self, given: RenderOptions) -> str:
         words = [self.work, *([self.against] if self.against else [])]

@@ -1,4 +1,4 @@
-"""The scene that shows a single material: a ball on a checkered floor, with two lamps and a dim sky."""
+"""The scene that shows a single material: a ball on a checkered floor in a dark studio with three soft lamps."""
 
 from __future__ import annotations
 
@@ -38,8 +38,10 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         for x in range(TILES)
         for z in range(TILES)
     ]
-    side_lamp = {"type": "parallelogram", "base": [-3.5, 4.5, 1.0], "edge0": [1.4, 0, 1.4], "edge1": [0, 1.2, 0]}
-    rear_lamp = {"type": "parallelogram", "base": [2.2, 2.0, -3.5], "edge0": [1.5, 0, 0], "edge1": [0, 1.5, 0]}
+    # outside the picture, also of a wide one: a large lamp at the left, a strip at the right, one above
+    key = {"type": "parallelogram", "base": [-4.6, 0.8, 1.6], "edge0": [1.6, 0, 1.6], "edge1": [0, 2.6, 0]}
+    strip = {"type": "parallelogram", "base": [3.6, 0.4, -0.4], "edge0": [0, 2.8, 0], "edge1": [0.3, 0, 0.7]}
+    top = {"type": "parallelogram", "base": [-1.3, 4.4, -1.2], "edge0": [2.6, 0, 0], "edge1": [0, 0, 1.6]}
     return {
         "output": {"filename": f"{name}.png"},
         "sampler": {"type": "independent", "samples": 64},
@@ -53,9 +55,10 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         "scene": {
             "shapes": [{"type": "sphere", "center": [0, 1, 0], "radius": 1, "material": material}, *floor],
             "lights": [
-                {"type": "areaLight", "energy": [14, 14, 14], "shape": side_lamp},
-                {"type": "areaLight", "energy": [7, 7.4, 8], "shape": rear_lamp},
-                {"type": "environmentLight", "radiance": [0.35, 0.38, 0.42]},
+                {"type": "areaLight", "energy": [4, 4, 4], "shape": key},
+                {"type": "areaLight", "energy": [5, 5, 5], "shape": strip},
+                {"type": "areaLight", "energy": [4, 4, 4], "shape": top},
+                {"type": "environmentLight", "radiance": [0.05, 0.05, 0.05]},
             ],
         },
     }

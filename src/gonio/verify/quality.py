@@ -1,7 +1,7 @@
 """The quality of a BSDF's sampling: figures, not verdicts.
 
     gonio models --quality
-    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % fail, variance 0.013, ..."
+    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples lost, variance 0.013, ..."
 
 A path tracer multiplies by the weight of each sample, so the weight's variance is noise in the picture, and a failed
 sample is a wasted path. Both can be poor while every law holds.
@@ -50,14 +50,14 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """ "sampling: 2.1 % fail, variance 0.04, 31 x cosine sampling, 96 % of the ideal"."""
+        """ "sampling: 2.1 % of samples lost, variance 0.04, 31 x cosine sampling, 96 % of the ideal"."""
         return "sampling: " + ", ".join(text for text in self.texts if text)
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
         """The four figures as text; "" for one that is None."""
         return (
-            f"{100.0 * self.failed:.2g} % fail",
+            f"{100.0 * self.failed:.2g} % of samples lost",
             f"variance {_short(self.variance)}",
             "" if self.cosine is None else f"{_short(self.cosine)} x cosine sampling",
             f"{100.0 * self.ideal:.3g} % of the ideal",

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from .._version import __version__
 from . import statistics, terminal
+from .laws import chosen
 from .severity import Grade
-from .verdict import Card, Verdict
+from .verdict import DECLARED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -83,10 +84,22 @@ class Report:
         for line in self.mended:
             console.print(f"fixed: {line}", markup=False)
         broken = len(self.failures)
-        word = "[green]all laws hold[/]" if not broken else f"[bold red]{broken} violated[/]"
+        word = f"[green]{self._holding()}[/]" if not broken else f"[bold red]{broken} violated[/]"
         tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (0.01 over all)"
         asked = tests if self.tests else "no statistical test"
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
+
+    def _holding(self) -> str:
+        """ "all laws hold", or the laws that were judged where not all were; and those that break as declared."""
+        statuses = [(verdict.law, verdict.status) for card in self.cards for verdict in card.verdicts]
+        judged = dict.fromkeys(law for law, _ in statuses)
+        declared = dict.fromkeys(law for law, status in statuses if status == DECLARED)
+        sound = [law for law in judged if law not in declared]
+        if all(law.name in judged for law in chosen(None)):
+            return "all laws hold" + (f", but {' and '.join(declared)} as declared" if declared else "")
+        holding = f"{' and '.join(sound)} hold{'s' if len(sound) == 1 else ''}" if sound else ""
+        breaking = f"{' and '.join(declared)} break{'s' if len(declared) == 1 else ''} as declared" if declared else ""
+        return ", ".join(filter(None, [holding, breaking]))
 
     def __str__(self) -> str:
         """The same as plain text."""

@@ -132,7 +132,7 @@ def _of_code(name: str) -> MemberPage:
     if home is None:
         hint = "gonio explain without a name lists the families"
         raise InputError(f"{name} is not a member of a family", "MODEL", hint)
-    return _page(cls, home)
+    return _page(cls, home, name)
 
 
 def _base(home: Home) -> type:
@@ -140,7 +140,8 @@ def _base(home: Home) -> type:
     return base
 
 
-def _page(member: Any, home: Home) -> MemberPage:
+def _page(member: Any, home: Home, called: str = "") -> MemberPage:
+    """The page of a member; `called` is how a command names it, by default by its name."""
     cls = member if isinstance(member, type) else type(member)
     formulas = {
         name: (inspect.getdoc(thing) or "").partition("\n")[0]
@@ -157,7 +158,7 @@ def _page(member: Any, home: Home) -> MemberPage:
         kind,
         inspect.cleandoc(cls.__doc__ or ""),
         formulas,
-        home.use.format(name=name),
+        home.use.format(name=called or name),
         source,
     )
 

@@ -33,12 +33,12 @@ def study(
 
     One --vary gives a row, two a grid (the first goes down, the second across), more give a grid each. A path leads
     into the scene; of a material it names a parameter, such as p or base.alpha. Several paths of one --vary change
-    together, for instance with a constant sum: kd,ks=(0.2,0.8),(0.5,0.5).
+    together, for instance with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
 
     \b
     Examples:
       gonio study examples/phong --vary shapes.1.material.p=4,16,64
-      gonio study phong --vary p=4,16,64 --vary "kd,ks=(0.2,0.8),(0.5,0.5),(0.8,0.2)"
+      gonio study phong --vary p=4,16,64 --vary "kd,ks=(.05,.25),(.15,.15),(.25,.05)"
       gonio study kulla-conty -p base=conductor --vary base.alpha=0.1,0.3,0.5 --vary base.preset=Au,Cu
       gonio study examples/phong-kd-p -o kd-p.png --size 200x200 \\
         --vary "shapes.*.material.kd=[0.1,0.1,0.1],[0.5,0.5,0.5]" \\
