@@ -13,6 +13,14 @@ Every family of parts has a page here; each member has its description, its own 
 ([CONTRIBUTING](../../project/contributing.md)).
 """
 
+# below the introduction of a family
+PICTURES = {
+    "law": """![Pairs of balls, sound and with one mistake that a law finds](../../../examples/broken-laws/laws.jpg)
+
+What a violation looks like: [a ball for each broken law](../../gallery/broken-laws.md).
+"""
+}
+
 
 def pages() -> dict[str, str | bytes]:
     """A page for each family, without the materials, and their index."""
@@ -33,7 +41,7 @@ def pages() -> dict[str, str | bytes]:
 def _page(kind: str, names: list[str]) -> str:
     title = families.pages(kind)[0]
     assert isinstance(title, families.FamilyPage)
-    parts = [f"# {families._plural(kind).capitalize()}", markdown(title.doc)]
+    parts = [f"# {families._plural(kind).capitalize()}", markdown(title.doc), PICTURES.get(kind, "")]
     for name in names:
         for page in families.pages(name):
             if isinstance(page, families.MemberPage) and page.kind == kind:

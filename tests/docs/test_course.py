@@ -42,7 +42,7 @@ def cheap(command: str) -> list[str]:
             if option in words:
                 del words[words.index(option) : words.index(option) + 2]
             words += [option, "2" if option == "--spp" else "48x32"]
-    if words[0] == "view" and "--export" not in words:
+    if words[0] == "view" and not {"-o", "--export"} & {*words}:
         words += ["--export", "page.html"]
     if words[0] == "measure" and "--samples" not in words:
         words += ["--samples", "20000"]

@@ -54,7 +54,7 @@ def _more(manifest: Mapping[str, Any]) -> list[str]:
 
 def title(manifest: Mapping[str, Any]) -> str:
     """A one-line description of the tables and the method."""
-    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
+    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"{manifest['layout']} axes"]
     facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
     return ", ".join(filter(None, facts))
 
