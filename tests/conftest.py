@@ -70,7 +70,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
-        fixtures = {*getattr(item, "fixturenames", ())}
+        parameters = getattr(item, "callspec", None)  # which may be called as a fixture is: `page`
+        fixtures = {*getattr(item, "fixturenames", ())} - set(parameters.params if parameters else ())
         if "shared" in fixtures:
             item.add_marker("shared")
         if fixtures & BROWSERS:

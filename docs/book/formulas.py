@@ -2,7 +2,8 @@
 
 A formula is lines of `name = expression` in Python's syntax, the last of which is f, in 1/sr. Symbols: no, ni, nh, oh,
 oi are cosines between n (normal), o (wo), i (wi) and h (half vector); vr is that of the view and the mirrored light;
-ox, hx, ... are components in the local frame. All other names are parameters.
+ox, hx, ... are components in the local frame; f_base, f_a, f_b are values of the materials inside, E albedos at F = 1.
+All other names are parameters.
 """
 
 from __future__ import annotations
@@ -57,6 +58,13 @@ F_0 = ((eta - 1) / (eta + 1))**2
 F = F_0 + (1 - F_0) * (1 - oh)**5
 p_h = sqrt((n_x + 1) * (n_y + 1)) / (2 * pi) * nh**((n_x * hx**2 + n_y * hy**2) / (1 - nh**2))
 f = diffuse / pi + specular * F * p_h / (4 * oh * max(no, ni))""",
+    "kulla-conty": """\
+f_ms = (1 - E_o) * (1 - E_i) / (pi * (1 - E_avg))
+f_add = F_avg * E_avg / (1 - F_avg * (1 - E_avg))
+f = f_base + f_add * f_ms""",
+    "turquin": "f = f_base * (1 + F_0 * (1 - E_o) / E_o)",
+    "mix": "f = (1 - weight) * f_a + weight * f_b",
+    "sum": "f = f_a + f_b",
 }
 
 # Those that refer to other materials, tables or random numbers, and no closed form of the directions.
@@ -78,11 +86,8 @@ SET = {
         r" \rho_{ms} = \frac{\rho^2 E_{avg}}{1-\rho\,(1-E_{avg})}",
     ],
     "kulla-conty": [
-        r"f = f_{base} + f_{add}\, f_{ms}",
-        r"f_{ms} = \frac{(1-E(\mu_o))(1-E(\mu_i))}{\pi\,(1-E_{avg})}, \quad E_{avg} = 2\int_0^1 E(\mu)\,\mu\, d\mu",
-        r"f_{add} = \frac{F_{avg}\,E_{avg}}{1-F_{avg}(1-E_{avg})}, \quad F_{avg} = 2\int_0^1 F(\mu)\,\mu\, d\mu",
+        r"E_{avg} = 2\int_0^1 E(\mu)\,\mu\, d\mu, \quad F_{avg} = 2\int_0^1 F(\mu)\,\mu\, d\mu",
     ],
-    "turquin": [r"f = f_{base} \left(1 + F_0\, \frac{1-E(\mu_o)}{E(\mu_o)}\right)"],
     "fdez-aguera": [
         r"f = f_{base} + \frac{F_{ms}\, E_{ms}}{\pi}",
         r"F_{ms} = \frac{F_{ss}E_{ss}\, F_{avg}}{1-E_{ms}F_{avg}}, \quad E_{ms} = 1-(A+B), \quad"
@@ -125,8 +130,6 @@ SET = {
         r"D = \frac{\mathrm{normalization}\; e^{-x}}{x^p\,\pi\cos^4\theta_h}, \quad"
         r" x = \alpha + \frac{\tan^2\theta_h}{\alpha}",
     ],
-    "mix": [r"f = (1-\mathrm{weight})\, f_a + \mathrm{weight}\; f_b"],
-    "sum": [r"f = f_a + f_b"],
     "two-sided": [r"f(o, i) = f_{base}(\pm o, \pm i)"],
     "opacity": [r"f = \mathrm{opacity}\; f_{base} + (1-\mathrm{opacity})\,\frac{\delta(i+o)}{|\cos\theta_i|}"],
     "normal-map": [r"f\cos\theta_i = b(o, i) + b(o, -i), \quad n' \propto (\mathrm{lean}_x, \mathrm{lean}_y, 1)"],
@@ -141,6 +144,8 @@ NAMES = {
     "kd": "k_d", "ks": "k_s", "cx": "C_x", "cy": "C_y", "cz": "C_z", "r0": "r_0", "p_h": "p_h",
     "pi": r"\pi", "alpha": r"\alpha", "sigma": r"\sigma", "eta": r"\eta",
     "alpha_x": r"\alpha_x", "alpha_y": r"\alpha_y",
+    "f_base": r"f_{base}", "f_add": r"f_{add}", "f_ms": r"f_{ms}", "F_avg": r"F_{avg}",
+    "E_o": r"E(\mu_o)", "E_i": r"E(\mu_i)", "E_avg": r"E_{avg}",
     "Lambda_o": r"\Lambda(o)", "Lambda_i": r"\Lambda(i)",
 }  # fmt: skip
 FUNCTIONS = {"max": r"\max", "min": r"\min", "exp": r"\exp"}

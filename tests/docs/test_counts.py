@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import gonio as go
 import pytest
 from gonio.viewer import families
+
+import pages
 
 ROOT = Path(__file__).parents[2]
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
@@ -40,6 +43,18 @@ PHONG = len(re.findall(r"^## \d\.", (ROOT / "docs/phong-limits.md").read_text(en
 def test_a_count_is_that_of_the_code(page: str, sentence: str) -> None:
     text = " ".join((ROOT / page).read_text(encoding="utf-8").lower().split())
     assert sentence in text
+
+
+def test_versions_are_those_that_the_package_needs_and_the_cards_judged() -> None:
+    """Of Python and, to the last digit, of Mitsuba, on every page."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    python = project["requires-python"].removeprefix(">=")
+    cards = (ROOT / "docs/report-cards/README.md").read_text(encoding="utf-8")
+    mitsuba = re.findall(r"Mitsuba (\d+\.\d+\.\d+)", cards)[0]
+    for page in [page for page in pages.PAGES if page.stem != "CHANGELOG"]:
+        text = page.read_text(encoding="utf-8")
+        assert set(re.findall(r"Python (3\.\d+)", text)) <= {python}, page
+        assert set(re.findall(r"Mitsuba (\d+\.\d+\.\d+)", text)) <= {mitsuba}, page
 
 
 def test_every_masking_term_is_in_the_conventions() -> None:

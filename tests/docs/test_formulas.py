@@ -41,7 +41,38 @@ def symbols(o: np.ndarray, i: np.ndarray) -> dict[str, object]:
                     "min": lambda *terms: np.minimum.reduce(np.broadcast_arrays(*terms))}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [name for name, lines in formulas.RUN.items() if "f = " in lines])
+ROUGH = {"alpha": 0.8, "eta": 0.3, "k": 2.5}
+METAL, WHITE = go.Conductor(fresnel="schlick", **ROUGH), go.Conductor(fresnel="one", **ROUGH)
+PLASTER, F_0 = go.Lambert(albedo=0.5), ((0.3 - 1.0) ** 2 + 2.5**2) / ((0.3 + 1.0) ** 2 + 2.5**2)
+COMPOSED = {
+    "kulla-conty": go.KullaConty(METAL, color="sheet"),
+    "turquin": go.Turquin(METAL),
+    "mix": go.Mix(METAL, PLASTER, weight=0.3),
+    "sum": go.Sum(METAL, PLASTER),
+}
+
+
+@pytest.mark.parametrize("name", COMPOSED)
+def test_the_formula_is_the_material_composed_of_others(name: str) -> None:
+    o, i = directions()
+    albedo = lambda mu: go.albedo(WHITE, mu=mu).value[:, 0]  # noqa: E731
+    x, weights = np.polynomial.legendre.leggauss(16)
+    mu = (x + 1.0) / 2.0
+    scope: dict[str, object] = {
+        "E_o": albedo(o[:, 2]),
+        "E_i": albedo(i[:, 2]),
+        "E_avg": np.sum(albedo(mu) * mu * weights),
+    }
+    scope |= {"F_avg": F_0 + (1.0 - F_0) / 21.0, "F_0": F_0, "pi": math.pi, "weight": 0.3}
+    for key, one in {"f_base": METAL, "f_a": METAL, "f_b": PLASTER}.items():
+        scope[key] = one.f(o, i, precision="float64")[:, 0]
+    exec(formulas.RUN[name], scope)
+    np.testing.assert_allclose(scope["f"], COMPOSED[name].f(o, i, precision="float64")[:, 0], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, lines in formulas.RUN.items() if "f = " in lines and name not in COMPOSED]
+)
 def test_the_formula_is_the_model(name: str) -> None:
     model = go.models()[name](**SETTINGS.get(name, {}))
     o, i = directions()

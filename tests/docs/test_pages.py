@@ -1,7 +1,9 @@
-"""What the pages name is there: files, modules, members of `gonio`, links."""
+"""What the pages name is there: files, modules, members of `gonio`, links and the headings that they lead to."""
 
 from __future__ import annotations
 
+import difflib
+import functools
 import importlib
 import importlib.util
 import re
@@ -11,31 +13,62 @@ from pathlib import Path
 import gonio as go
 import pytest
 
-ROOT = Path(__file__).parents[2]
-PAGES = [
-    *ROOT.glob("*.md"),
-    *(ROOT / "docs").glob("*.md"),
-    *(ROOT / "docs/course").glob("*.md"),
-    *(ROOT / "examples").glob("*/*.md"),
-]
+import pages
+from pages import PAGES, ROOT
+
+FOLDERS = ("benchmarks", "docs", "examples", "src", "tests", "tools", "web")
+SUFFIX = re.compile(r"[\w*]\.(?:bib|csv|exr|glsl|hdr|html|ipynb|jpg|js|json|md|obj|ply|png|py|svg|toml|ts|txt|webp)")
+# the history names what was once there; cards of engines name files of the engines' packages
+NOT_OURS = ("CHANGELOG", "report-cards/engines/")
+OURS = [page for page in PAGES if not pages.name(page).startswith(NOT_OURS)]
 
 
 def _quoted(page: Path) -> Iterator[str]:
     return iter(re.findall(r"`([^`\n]+)`", page.read_text(encoding="utf-8")))
 
 
-def _name(page: Path) -> str:
-    return page.parent.name if page.parent.parent.name == "examples" else page.stem
+@functools.cache
+def _tree() -> tuple[set[str], str]:
+    """Names of all files and folders; the text of the programs, which name the files that they write."""
+    every = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if "node_modules" not in path.parts]
+    programs = [path for path in every if path.suffix == ".py" and path.is_file()] + [ROOT / "Makefile"]
+    return {path.name for path in every + list(ROOT.iterdir())}, "".join(
+        path.read_text(encoding="utf-8") for path in programs if path != Path(__file__)
+    )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_name)
+def _is_file(text: str, page: Path, listed: str) -> bool:
+    """A path of the repository exists; a file that a program or a listing of the page writes is named there."""
+    if any((root / text).exists() or ("*" in text and list(root.glob(text))) for root in (ROOT, _PACKAGE, page.parent)):
+        return True
+    if "NAME" in text:
+        return True
+    if "/" in text and difflib.get_close_matches(text.partition("/")[0], FOLDERS, cutoff=0.75):
+        return False
+    names, programs = _tree()
+    name = text.rstrip("/").rpartition("/")[2]
+    return name in names or any(
+        part in whole for part in (name, name.partition(".")[0]) for whole in (listed, programs)
+    )
+
+
+_PACKAGE = ROOT / "src/gonio"
+
+
+@pytest.mark.parametrize("page", OURS, ids=pages.name)
 def test_files_that_a_page_names_are_there(page: Path) -> None:
-    files = [text for text in _quoted(page) if re.fullmatch(r"[\w.-]+/(?:[\w.-]+/)*[\w.-]+\.(?:py|ts|md)", text)]
-    roots = (ROOT, ROOT / "src/gonio")
-    assert [file for file in files if not any((root / file).exists() for root in roots)] == []
+    text = page.read_text(encoding="utf-8")
+    listed = "".join(f"{one.file} {one.text}" for one in pages.listings(text))
+    paths = [one for one in _quoted(page) if re.fullmatch(r"[\w.*-]+(?:/[\w.*-]+)*/?", one)]
+    files = [
+        one
+        for one in paths
+        if SUFFIX.search(one) or ("/" in one and difflib.get_close_matches(one.partition("/")[0], FOLDERS, cutoff=0.75))
+    ]
+    assert [file for file in files if not _is_file(file, page, listed)] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_name)
+@pytest.mark.parametrize("page", PAGES, ids=pages.name)
 def test_modules_and_names_that_a_page_names_are_there(page: Path) -> None:
     for text in _quoted(page):
         if re.fullmatch(r"gonio(\.\w+)+", text) and not NO_MODULES.match(text):
@@ -55,11 +88,33 @@ def _is_there(dotted: str) -> bool:
     return importlib.util.find_spec(dotted) is not None or hasattr(importlib.import_module(module), name)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_name)
+def _links(page: Path) -> Iterator[tuple[str, str]]:
+    """File, empty for the page itself, and heading of every link and picture that leads into the repository."""
+    text = re.sub(r"`[^`\n]+`", "", pages.without_listings(page.read_text(encoding="utf-8")))  # code is an example
+    for markdown, html in re.findall(r"\]\(([^)\s]+)\)|(?:href|src)=\"([^\"]+)\"", text):
+        if not re.match(r"[a-z]+:", markdown or html):
+            file, _, heading = (markdown or html).partition("#")
+            yield file, heading
+
+
+@functools.cache
+def _headings(page: Path) -> set[str]:
+    """The anchors that GitHub and the book give to the headings of a page."""
+    heads = re.findall(r"^#+ (.*)$", pages.without_listings(page.read_text(encoding="utf-8")), re.MULTILINE)
+    return {
+        re.sub(r"[^\w\- ]", "", re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", head).lower()).replace(" ", "-")
+        for head in heads
+    }
+
+
+@pytest.mark.parametrize("page", PAGES, ids=pages.name)
 def test_links_lead_somewhere(page: Path) -> None:
-    text = re.sub(r"`[^`\n]+`", "", page.read_text(encoding="utf-8"))  # a link in code is an example
-    links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)
-    assert [link for link in links if not (page.parent / link).exists()] == []
+    broken = []
+    for file, heading in _links(page):
+        target = page.parent / file if file else page
+        if not target.exists() or (heading and target.is_file() and heading not in _headings(target)):
+            broken.append(f"{file}#{heading}")
+    assert broken == []
 
 
 def test_the_map_names_what_is_in_the_file() -> None:

@@ -1,0 +1,161 @@
+"""Write docs/record.json: the figures that pages state and the pictures that they show, as they were last reviewed.
+
+    python docs/make_record.py --check       what is not as recorded; exit code 1 if there is anything
+    python docs/make_record.py PATH ...      after a review: record these pages and pictures; without PATH all of them
+
+Most figures of the documentation take minutes, a GPU or another program to measure, and most pictures take a renderer,
+so no test can make them again. The record holds, by page and section, every number that the page states, and for each
+picture a digest of it and of the scene that it shows. A number, a picture or a scene that has changed fails the tests
+until somebody has measured or rendered again and says so here; in a review, the line that changes shows which figure
+it was. Pages that a test computes anew, or compares with what computes them, are not in the record.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from book import formulas
+
+ROOT = Path(__file__).parents[1]
+RECORD = ROOT / "docs/record.json"
+
+# made anew and compared by tests: make_options.py, make_scenes.py, make_pages.py, make_engine_cards.py, make_errata.py
+COMPUTED = ("docs/options.md", "docs/scenes.md", "docs/models/", "docs/report-cards/engines/", "docs/errata.md")
+# copies that building the book makes; translations, which a test compares with the English pages
+COPIES = ("docs/reference/", "docs/gallery/", "docs/project/")
+# README's tables of pictures and models are made by make_pages.py
+TABLES = re.compile(r"<!-- (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
+WORDS = (
+    "two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen eighteen"
+)
+WORDS += " nineteen twenty thirty forty fifty hundred thousand million billion half twice third quarter"
+NUMBER = re.compile(
+    rf"(?<![A-Za-z_\d])-?\.?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?|\b(?:{'|'.join(WORDS.split())})\b", re.IGNORECASE
+)
+# written by programs that take minutes or need files of others: recorded whole
+WRITTEN = (
+    "docs/phong-limits.md",  # make_phong_limits.py
+    "docs/published-fits.md",  # make_published_fits.py
+    "docs/published-fits/cards.json",
+    "docs/report-cards/*.*",  # make_report_cards.py
+    "docs/report-cards/programs/*.py",
+    "docs/thin-film.md",  # make_thin_film.py
+)
+PICTURES = (".png", ".jpg", ".svg", ".webp")
+SOURCES = (".json", ".ply", ".obj", ".hdr", ".glsl", ".toml", ".gonio")
+
+
+def written() -> list[Path]:
+    """The files that are recorded whole."""
+    return sorted(path for pattern in WRITTEN for path in ROOT.glob(pattern))
+
+
+def pages() -> Iterator[Path]:
+    """The pages that somebody writes, whose figures nothing computes again within a test."""
+    whole = {*written()}
+    for page in sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*/*.md")]):
+        if page not in whole and not _name(page).startswith(COMPUTED + COPIES) and not page.name.endswith(".zh.md"):
+            yield page
+
+
+def pictures() -> Iterator[Path]:
+    """The pictures of the pages and of the gallery, and what its scenes read."""
+    for folder in ("docs", "examples"):
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in PICTURES and not _name(path).startswith(COMPUTED + COPIES):
+                yield path
+
+
+def figures(page: Path) -> dict[str, str]:
+    """The numbers of each section, in digits or words, in their order; those of listings and tables too."""
+    found: dict[str, list[str]] = {}
+    heading, fenced = "", False
+    for line in TABLES.sub("", page.read_text(encoding="utf-8")).splitlines():
+        fenced ^= line.startswith("```")
+        if line.startswith("#") and not fenced:
+            heading = line.lstrip("# ")
+        found.setdefault(heading, []).extend(number.lower() for number in NUMBER.findall(line))
+    return {heading: " ".join(numbers) for heading, numbers in found.items() if numbers}
+
+
+def digests(file: Path) -> dict[str, str]:
+    """Of the file and, in the gallery, of those of its folder that it shows; JSON by value, whatever its layout."""
+    shown = [file]
+    if file.is_relative_to(ROOT / "examples"):
+        shown += [path for path in sorted(file.parent.iterdir()) if path.suffix in SOURCES]
+    return {path.name: _digest(path) for path in shown}
+
+
+def formulas_set() -> dict[str, str]:
+    """Of the formulas of the book that no test evaluates, by model."""
+    return {name: _short("\n".join(lines).encode()) for name, lines in formulas.SET.items()}
+
+
+def _digest(path: Path) -> str:
+    data = path.read_bytes()
+    if path.suffix == ".json":
+        data = json.dumps(json.loads(data), sort_keys=True).encode()
+    elif path.suffix in (".glsl", ".md", ".obj", ".ply", ".py", ".svg", ".toml"):
+        data = data.replace(b"\r\n", b"\n")
+    return _short(data)
+
+
+def _short(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:12]
+
+
+def _name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def current() -> dict[str, dict[str, str]]:
+    """The record of what is there now, by page or picture."""
+    whole = {_name(one): digests(one) for one in [*pictures(), *written()]}
+    return {_name(page): figures(page) for page in pages()} | whole | {"docs/book/formulas.py": formulas_set()}
+
+
+def differences(stored: dict[str, dict[str, str]], now: dict[str, dict[str, str]]) -> list[str]:
+    """A line for each section or file that is not as recorded."""
+    lines = []
+    for name in sorted(stored.keys() | now.keys()):
+        old, new = stored.get(name, {}), now.get(name, {})
+        for part in sorted(old.keys() | new.keys()):
+            if old.get(part) != new.get(part):
+                lines.append(f"{name}, {part}: {_change(old.get(part, ''), new.get(part, ''))}")
+    return lines
+
+
+def _change(old: str, new: str) -> str:
+    """The first number that differs, with what it was."""
+    before, after = old.split(), new.split()
+    at = next((i for i, pair in enumerate(zip(before, after, strict=False)) if pair[0] != pair[1]), None)
+    if at is None:
+        at = min(len(before), len(after))
+    return f"{' '.join(after[at : at + 3]) or 'nothing'}, recorded as {' '.join(before[at : at + 3]) or 'nothing'}"
+
+
+def main() -> int:
+    """Check or write the record; returns the exit code."""
+    now = current()
+    stored: dict[str, Any] = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    if sys.argv[1:] == ["--check"]:
+        lines = differences(stored, now)
+        hint = "measure or render again, then python docs/make_record.py PATH"
+        print("\n".join([*lines, hint] if lines else [f"{_name(RECORD)} is up to date"]))
+        return 1 if lines else 0
+    chosen = {_name(Path(word).resolve()) for word in sys.argv[1:]} or stored.keys() | now.keys()
+    kept = {name: now.get(name, {}) if name in chosen else stored.get(name, {}) for name in stored.keys() | now.keys()}
+    kept = {name: parts for name, parts in sorted(kept.items()) if parts}
+    RECORD.write_text(json.dumps(kept, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(f"{len(kept)} pages and pictures")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
