@@ -1,7 +1,7 @@
 """Write docs/record.json: the figures that pages state and the pictures that they show, as they were last reviewed.
 
     python docs/make_record.py --check       what is not as recorded; exit code 1 if there is anything
-    python docs/make_record.py PATH ...      after a review: record these pages and pictures; without PATH all of them
+    python docs/make_record.py PATH ...      after a review: record these pages and pictures, or a folder's
 
 Most figures of the documentation take minutes, a GPU or another program to measure, and most pictures take a renderer,
 so no test can make them again. The record holds, by page and section, every number that the page states, and for each
@@ -140,6 +140,13 @@ def _change(old: str, new: str) -> str:
     return f"{' '.join(after[at : at + 3]) or 'nothing'}, recorded as {' '.join(before[at : at + 3]) or 'nothing'}"
 
 
+def _below(word: str, known: set[str]) -> set[str]:
+    """The recorded names of a file, or of all files of a folder."""
+    path = Path(word).resolve()
+    inside = _name(path) if path.is_relative_to(ROOT) else ""
+    return {name for name in known if inside in (name, ".") or name.startswith(f"{inside}/")}
+
+
 def main() -> int:
     """Check or write the record; returns the exit code."""
     now = current()
@@ -149,8 +156,12 @@ def main() -> int:
         hint = "measure or render again, then python docs/make_record.py PATH"
         print("\n".join([*lines, hint] if lines else [f"{_name(RECORD)} is up to date"]))
         return 1 if lines else 0
-    chosen = {_name(Path(word).resolve()) for word in sys.argv[1:]} or stored.keys() | now.keys()
-    kept = {name: now.get(name, {}) if name in chosen else stored.get(name, {}) for name in stored.keys() | now.keys()}
+    known = stored.keys() | now.keys()
+    chosen = {name for word in sys.argv[1:] for name in _below(word, known)}
+    if not chosen:
+        print("name pages or pictures, or a folder with some: python docs/make_record.py PATH ...", file=sys.stderr)
+        return 2
+    kept = {name: now.get(name, {}) if name in chosen else stored.get(name, {}) for name in known}
     kept = {name: parts for name, parts in sorted(kept.items()) if parts}
     RECORD.write_text(json.dumps(kept, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"{len(kept)} pages and pictures")

@@ -29,7 +29,8 @@ RECORD = script()
 
 def test_figures_and_pictures_are_as_recorded() -> None:
     stored = json.loads((DOCS / "record.json").read_text(encoding="utf-8"))
-    assert RECORD.differences(stored, RECORD.current()) == []
+    changed = RECORD.differences(stored, RECORD.current())
+    assert changed == [], "measure or render again, then python docs/make_record.py PATH"
 
 
 def test_every_page_is_recorded_computed_or_a_translation() -> None:
