@@ -27,6 +27,9 @@ def _quoted(page: Path) -> Iterator[str]:
     return iter(re.findall(r"`([^`\n]+)`", page.read_text(encoding="utf-8")))
 
 
+PICTURES = (".jpg", ".png", ".svg", ".webp")
+
+
 @functools.cache
 def _tree() -> tuple[set[str], str]:
     """Names of all files and folders; the text of the programs, which name the files that they write."""
@@ -115,6 +118,25 @@ def test_links_lead_somewhere(page: Path) -> None:
         if not target.exists() or (heading and target.is_file() and heading not in _headings(target)):
             broken.append(f"{file}#{heading}")
     assert broken == []
+
+
+def test_every_picture_is_shown_by_a_page_or_read_by_a_scene() -> None:
+    """A link that leads to another picture leaves its own without a page."""
+    shown = {(page.parent / file).resolve() for page in PAGES for file, _ in _links(page) if file}
+    pictures = [
+        path for folder in ("docs", "examples") for path in (ROOT / folder).rglob("*.*") if path.suffix in PICTURES
+    ]
+    copies = tuple((ROOT / "docs" / copy).as_posix() for copy in pages.COPIES)
+    own = [path for path in pictures if not path.as_posix().startswith(copies)]
+    own = [path for path in own if not (path.parent / "calibration.json").exists()]  # photographs, taken as a folder
+    left = [path for path in own if path.resolve() not in shown and path.name not in _beside(path.parent)]
+    assert [path.name for path in left] == []
+
+
+@functools.cache
+def _beside(folder: Path) -> str:
+    """The scenes and programs of a folder."""
+    return "".join(one.read_text(encoding="utf-8") for one in folder.iterdir() if one.suffix in (".json", ".py"))
 
 
 def test_the_map_names_what_is_in_the_file() -> None:
