@@ -92,9 +92,10 @@ def digests(file: Path) -> dict[str, str]:
     return {path.name: _digest(path) for path in shown}
 
 
-def formulas_set() -> dict[str, str]:
-    """Of the formulas of the book that no test evaluates, by model."""
-    return {name: _short("\n".join(lines).encode()) for name, lines in formulas.SET.items()}
+def set_formulas() -> dict[str, str]:
+    """Of each model's formulas as the book sets them: a test evaluates some of the expressions, and no LaTeX."""
+    names = sorted(formulas.RUN.keys() | formulas.SET.keys())
+    return {name: _short("\n".join(formulas.of_model(name)).encode()) for name in names}
 
 
 def _digest(path: Path) -> str:
@@ -117,7 +118,7 @@ def _name(path: Path) -> str:
 def current() -> dict[str, dict[str, str]]:
     """The record of what is there now, by page or picture."""
     whole = {_name(one): digests(one) for one in [*pictures(), *written()]}
-    return {_name(page): figures(page) for page in pages()} | whole | {"docs/book/formulas.py": formulas_set()}
+    return {_name(page): figures(page) for page in pages()} | whole | {"docs/book/formulas.py": set_formulas()}
 
 
 def differences(stored: dict[str, dict[str, str]], now: dict[str, dict[str, str]]) -> list[str]:
