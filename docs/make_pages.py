@@ -1,4 +1,4 @@
-"""Write docs/models/NAME.md for every model, the page that `gonio explain` prints, and README's tables.
+"""Write docs/models/NAME.md for every model, the page that `gonio explain` prints, and the tables of README files.
 
 python docs/make_pages.py [--check] [--tables]   --check writes nothing and fails where a page is out of date
                                                  --tables leaves out docs/models, which take a minute
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import gonio as go
@@ -18,7 +19,7 @@ from gonio.viewer import manual
 FOLDER = Path(__file__).parent / "models"
 ROOT = Path(__file__).parents[1]
 NUMBER = re.compile(r"\d*\.?\d+")
-PICTURE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
+PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
 GROUPS = {  # folder of gonio.materials -> title, in English and Chinese
     "diffuse": ("diffuse", "漫反射"),
     "empirical": ("empirical", "经验模型"),
@@ -65,12 +66,17 @@ def _told(stale: list[Path]) -> int:
 
 
 def _tables(check: bool) -> list[Path]:
-    """Write the tables between the marks of README in both languages; the files in which they were out of date."""
+    """Write the tables between the marks of the pages that have them; the files in which they were out of date."""
+    tables = {
+        "README.md": {"models": _models(0), "gallery": _gallery()},
+        "README.zh.md": {"models": _models(1), "gallery": _gallery()},
+        "examples/README.md": {"gallery": _index()},
+    }
     stale = []
-    for name, language in (("README.md", 0), ("README.zh.md", 1)):
+    for name, marks in tables.items():
         path = ROOT / name
         text = new = path.read_text(encoding="utf-8")
-        for mark, table in (("models", _models(language)), ("gallery", _gallery())):
+        for mark, table in marks.items():
             start, end = f"<!-- {mark} -->\n", f"<!-- /{mark} -->"
             before, _, rest = new.partition(start)
             new = before + start + table + end + rest.partition(end)[2]
@@ -91,17 +97,30 @@ def _models(language: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _gallery() -> str:
-    """A thumbnail of every example that has a picture, with a link to its page."""
-    shown = []
+def _examples() -> Iterator[tuple[str, str, str, str]]:
+    """Folder, title, file of the picture and caption of every example that shows a picture."""
     for page in sorted((ROOT / "examples").glob("*/README.md")):
         text = page.read_text(encoding="utf-8")
         if picture := PICTURE.search(text):
-            folder = page.parent.name
-            title = text.partition("\n")[0].removeprefix("# ")
-            source = f"examples/{folder}/{picture[1]}"
-            shown.append(f'<a href="examples/{folder}"><img src="{source}" height="90" alt="{title}"></a>')
-    return "\n".join(shown) + "\n"
+            yield page.parent.name, text.partition("\n")[0].removeprefix("# "), picture[2], picture[1]
+
+
+def _gallery() -> str:
+    """A thumbnail of every example, with a link to its page."""
+    lines = [
+        f'<a href="examples/{folder}"><img src="examples/{folder}/{file}" height="90" alt="{title}"></a>'
+        for folder, title, file, _ in _examples()
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _index() -> str:
+    """A row for every example: thumbnail, title with a link, and caption."""
+    lines = ["| picture | example | what it shows |", "|---|---|---|"]
+    for folder, title, file, caption in _examples():
+        thumbnail = f'<a href="{folder}"><img src="{folder}/{file}" width="240" alt="{title}"></a>'
+        lines.append(f"| {thumbnail} | [{title}]({folder}/README.md) | {caption} |")
+    return "\n".join(lines) + "\n"
 
 
 def _alike(old: str, new: str) -> bool:

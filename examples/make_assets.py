@@ -9,6 +9,7 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
+import sheets
 from gonio.bridge import engine
 from gonio.instruments.capture import rehearsal
 from gonio.pictures import images
@@ -60,6 +61,24 @@ def maria(size: int) -> np.ndarray:
     """Albedo of a moon: dark plains in bright highlands, with 1 % of red more than of blue per level."""
     level = np.rint((0.2 + 0.35 * cloudy(size, 11, range(2, 7))) * 96) / 96  # few levels, which compress well
     return level[..., None] * np.array([1.0, 0.97, 0.92])
+
+
+def shore_sky(height: int) -> np.ndarray:
+    """A summer sky over a lake, its horizon bright, woods on a third of the shore. Row t, column p as in `sky`."""
+    theta, phi = np.meshgrid(
+        (np.arange(height) + 0.5) / height * math.pi, (np.arange(2 * height) + 0.5) / height * math.pi, indexing="ij"
+    )
+    up = np.clip(np.cos(theta), 0.0, 1.0)[..., None]
+    blue = np.array([0.95, 0.95, 0.9]) * (1.0 - up) ** 3 + np.array([0.1, 0.3, 0.72]) * (1.0 - (1.0 - up) ** 3)
+    # Clouds as on a map seen from below, so that they have no seam at the zenith.
+    radius = height / 2.0 * np.tan(np.minimum(theta, 1.45) / 2.0)
+    x, y = (np.clip(height / 2.0 + radius * f(phi), 0, height - 1).astype(int) for f in (np.cos, np.sin))
+    cover = cloudy(height, 23, range(2, 6))[x, y][..., None]
+    picture = blue + np.clip(1.6 * cover - 0.75, 0.0, 1.0) * (np.array([1.0, 0.98, 0.95]) - blue)
+    waves = sum(np.sin(k * phi + k * k) / k**0.7 for k in (3, 7, 13, 29, 53, 83))
+    woods = np.radians(9.0 + 3.0 * waves) * np.clip(2.5 * np.cos(phi - 0.9) - 1.0, 0.0, 1.0)
+    picture = np.where((math.pi / 2.0 - theta < woods)[..., None], [0.035, 0.06, 0.03], picture)
+    return 0.72 * np.where((theta > math.pi / 2.0)[..., None], [0.1, 0.15, 0.16], np.clip(picture, 0.0, 1.0))
 
 
 def sky(height: int) -> np.ndarray:
@@ -319,7 +338,11 @@ def photographs() -> None:
     }
     coat = go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick")
     paint = go.Sum(go.Lambert((0.3, 0.2, 0.1)), coat)
-    rehearsal.take(calibration, paint, HERE / "photographs", noise=0.01, bits=8)
+    folder = HERE / "photographs"
+    rehearsal.take(calibration, paint, folder, noise=0.01, bits=8)
+    sheets.draw(
+        folder / "photographs.jpg", [(f"lamp: {name}", images.read(folder / f"{name}.png").pixels) for name in lamps], 4
+    )
 
 
 def main() -> None:
@@ -330,7 +353,9 @@ def main() -> None:
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
     png("full-moon/maria.png", maria(256))
-    png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
+    png("pool-caustic/tiles.png", checker(16, (0.2, 0.54, 0.64), (0.36, 0.66, 0.72)))
+    png("snells-window/sky.png", shore_sky(256))
+    png("snells-window/tiles.png", checker(16, (0.03, 0.16, 0.2), (0.08, 0.3, 0.34)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
     obj("diamond/brilliant.obj", *brilliant())

@@ -42,10 +42,10 @@ def target(path: Path) -> str | None:
         return "reference/models/index.md"
     if parts[:2] == ["docs", "models"]:
         return f"reference/models/{parts[2]}"
+    if inside in ("examples", "examples/README.md"):
+        return "gallery/index.md"
     if parts[0] == "examples" and len(parts) > 1 and (len(parts) == 2 or parts[2] == "README.md"):
         return f"gallery/{parts[1]}.md" if (ROOT / "examples" / parts[1]).is_dir() else None
-    if inside == "examples":
-        return "gallery/index.md"
     if inside.startswith("docs/") and path.is_dir() and (path / "README.md").exists():
         return inside.removeprefix("docs/") + "/README.md"
     return None

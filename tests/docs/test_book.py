@@ -57,6 +57,7 @@ def test_the_bibliography_is_plain_text() -> None:
     ("path", "page"),
     [
         ("docs/models/conductor.md", "reference/models/conductor.md"),
+        ("examples/README.md", "gallery/index.md"),
         ("examples/prism", "gallery/prism.md"),
         ("examples/prism/README.md", "gallery/prism.md"),
         ("CONTRIBUTING.md", "project/contributing.md"),

@@ -16,6 +16,7 @@ from gonio.viewer import variations
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOLDERS = sorted(path for path in EXAMPLES.iterdir() if path.is_dir() and not path.name.startswith((".", "_")))
+INDEX = (EXAMPLES / "README.md").read_text(encoding="utf-8")
 COMMAND = re.compile(r"^    (gonio .*)$", re.MULTILINE)
 
 
@@ -40,6 +41,25 @@ def test_an_example_is_a_page(folder: Path) -> None:
         assert mark in text, f"{folder.name}: {mark}"
     models = re.findall(r"\]\((\.\./\.\./docs/models/[\w-]+\.md)\)", text)
     assert models and all((folder / model).exists() for model in models)
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_its_picture_is_large_and_quick_to_load(folder: Path) -> None:
+    """At least 1,280 pixels wide, so that it is sharp on a page of the book, and below 250 kB."""
+    from PIL import Image
+
+    text = (folder / "README.md").read_text(encoding="utf-8")
+    picture = folder / re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)[0]
+    with Image.open(picture) as image:
+        assert image.width >= 1280
+    assert picture.stat().st_size < 250_000
+
+
+def test_the_index_has_a_row_for_each_folder() -> None:
+    """Picture and link of every example, in examples/README.md, which `docs/make_pages.py --check` keeps up to date."""
+    rows = re.findall(r'^\| <a href="([\w-]+)"><img src="([^"]+)".*\]\(([\w-]+)/README\.md\) \| \S', INDEX, re.MULTILINE)
+    assert [row[0] for row in rows] == [folder.name for folder in FOLDERS]
+    assert all(row[0] == row[2] and (EXAMPLES / row[1]).exists() for row in rows)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
