@@ -353,7 +353,7 @@ def main() -> None:
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
     png("full-moon/maria.png", maria(256))
-    png("pool-caustic/tiles.png", checker(16, (0.2, 0.54, 0.64), (0.36, 0.66, 0.72)))
+    png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
     png("snells-window/sky.png", shore_sky(256))
     png("snells-window/tiles.png", checker(16, (0.03, 0.16, 0.2), (0.08, 0.3, 0.34)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
