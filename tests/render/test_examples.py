@@ -16,7 +16,7 @@ SCENES = sorted(
     path.relative_to(EXAMPLES).as_posix() for path in EXAMPLES.glob("*/*.json") if path.name != "calibration.json"
 )
 # Their small lamps are seen through glass, and light little else by it: `path` suits them (docs/transport.md).
-BY_PATH_ALL_THE_SAME = {"diamond/scene.json", "rainbow/scene.json"}
+BY_PATH_ALL_THE_SAME = {"diamond/scene.json", "fibre/scene.json", "rainbow/scene.json"}
 EIGHT_KERNELS = "openpbr-layers/scene.json"  # one for each combination of layers
 
 
