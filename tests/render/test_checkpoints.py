@@ -113,6 +113,17 @@ def test_a_newest_file_that_is_cut_short_falls_back_to_the_one_before(scene: Pat
         assert np.array_equal(go.resume(tmp_path / "c"), whole)
 
 
+def test_a_damaged_file_does_not_take_the_place_of_the_one_before(scene: Path, tmp_path: Path) -> None:
+    def cut() -> None:
+        (tmp_path / "c").write_bytes((tmp_path / "c").read_bytes()[:-1])
+
+    stopped_after(scene, 4, tmp_path / "c", spp=6)
+    cut()
+    stopped_after(scene, 1, tmp_path / "c", spp=6)  # another process writes once, is killed, and its file damaged
+    cut()
+    assert kept.read(tmp_path / "c").facts["done"] == 3
+
+
 def test_both_files_damaged_is_one_clear_error(scene: Path, tmp_path: Path) -> None:
     stopped_after(scene, 2, tmp_path / "c", spp=6)
     (tmp_path / "c").write_bytes((tmp_path / "c").read_bytes()[:-1])

@@ -163,6 +163,7 @@ class Keeper:
         try:
             if not self._identity:  # in this thread, so that hashing large files does not delay the render
                 self._identity = self._prepared.sources.identity()
+                kept.remove_damaged(self.path)
             kept.write(self.path, {**about, "identity": self._identity}, arrays, previous=True)
             self.written, self.error = True, None
         except GonioError as error:

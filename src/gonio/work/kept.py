@@ -12,6 +12,7 @@ remains beside it as NAME.previous, in case the newest one is damaged. Nothing t
 
 from __future__ import annotations
 
+import contextlib
 import glob
 import json
 import math
@@ -101,6 +102,16 @@ def remove(path: Path) -> None:
 def exists(path: Path) -> bool:
     """Whether the file or NAME.previous exists."""
     return os.path.isfile(path) or os.path.isfile(_previous(path))
+
+
+def remove_damaged(path: Path) -> None:
+    """Remove the file if it is damaged and NAME.previous exists, whose place it would take with the next `write`."""
+    with contextlib.suppress(OSError):
+        try:
+            _read(path)
+        except InputError:
+            if _previous(path).exists():
+                path.unlink(missing_ok=True)
 
 
 def read(path: Path) -> Kept:

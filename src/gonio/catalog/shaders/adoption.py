@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ class Adopted(NamedTuple):
 
 def adopt(file: str | Path) -> Adopted:
     """The adapter of a shader without one. Raises InputError for files that cannot be read."""
-    path = Path(file).expanduser()
+    path = Path(os.path.expanduser(file))
     if not names_shader(str(path)) or not path.is_file():
         raise InputError(f"'{file}' is no shader", "FILE", "a .glsl, .frag, .hlsl, .wgsl, .spv or .brdf")
     program = read(path, None)

@@ -49,7 +49,7 @@ def engines() -> dict[str, Engine]:
 
 def package_in(folder: str | os.PathLike[str]) -> Package:
     """The package in a folder. Raises InputError if none of an engine is there."""
-    path = Path(folder).expanduser() / "package.json"
+    path = Path(os.path.expanduser(folder)) / "package.json"
     hint = f"the folder of {', '.join(engines())}, such as node_modules/three"
     try:
         if path.stat().st_size > MAX_DESCRIPTION:
