@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..files import check_file, write_whole
 from ..material import BSDF
 from ..owner import public
-from . import classes, pictures, samples, sheet, tables
+from . import classes, pictures, samples, sheet, stated, tables
 from .finding import Finding
 from .report import Mark, Report, Submission, junit
 
@@ -43,12 +43,13 @@ class Work:
         return isinstance(self.target, BSDF) or outside.names_code(notation.split(str(self.target))[0])
 
     def model(self) -> BSDF:
-        """The material to judge by. Raises InputError if none was given."""
+        """The material to judge another by. Raises InputError if none was given."""
         if isinstance(self.against, BSDF):
             return self.against
         if not self.against:
-            hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3"
-            raise InputError("no model to judge by", "MODEL", hint)
+            raise InputError(
+                "no model to judge by", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
+            )
         operands.kind_of(self.against, operands.MATERIALS, "MODEL")
         return notation.named(self.against)[0]
 
@@ -60,7 +61,7 @@ def _class(work: Work) -> Finding:
 
 
 def _rows(work: Work) -> Finding:
-    return samples.check(work.path, work.model(), work.up, work.tolerance)
+    return samples.check(work.path, stated.for_command(work.path, work.against), work.up, work.tolerance)
 
 
 def _picture(work: Work) -> Finding:

@@ -10,6 +10,7 @@ first line of names may head the table. Five columns are theta_o, phi_o, theta_i
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,10 +20,11 @@ from ..errors import InputError
 from ..material import BSDF
 from ..measure.formats import text
 from ..verify import directions
-from . import causes
+from . import causes, search
 from .finding import RIGHT, WRONG, Finding
 from .mistakes import Values, f_of
 from .mistakes.empirical import with_cosine
+from .stated import Asked, degenerate
 
 ACCURACY = 2e-3  # relative: float32, printed with six digits, with angles by arc functions
 GRAZING = 1e-3  # cosine below which a quotient by it loses its digits
@@ -40,10 +42,39 @@ class Rows(NamedTuple):
     line: list[int]
 
 
-def check(path: Path, material: BSDF, up: str = "z", accuracy: float | None = None) -> Finding:
-    """Judge a file of values. Raises InputError for one that cannot be read."""
+def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
+    """Judge a file of values. Raises InputError for one that cannot be read.
+
+    If nobody gave parameters, those that explain the values are right, unless a known mistake explains them by the
+    defaults.
+    """
     rows = read(path, up)
-    return judge(path.name, rows, material, ACCURACY if accuracy is None else accuracy)
+    accuracy = ACCURACY if accuracy is None else accuracy
+    finding = judge(path.name, rows, asked.material, accuracy)
+    if finding.passed and asked.defaults:
+        return finding
+    other = _explaining(path.name, rows, asked.material, accuracy) if asked.defaults else None
+    if other is None:
+        return replace(finding, remark=asked.remark)
+    numbers = search.described(other)
+    if finding.mistake is not None and finding.mistake.topic != causes.REGION:
+        return replace(finding, remark=f"{numbers} explains the values as well: name it in a line '# model:', or by -p")
+    remark = f"{numbers}, found from the values: the file does not name its parameters"
+    return replace(judge(path.name, rows, other, accuracy), remark=remark)
+
+
+def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF | None:
+    """The material with parameters that explain the values; None if there are none, or if they make it a simpler
+    one."""
+    fine = np.minimum(rows.wo[:, 2], rows.wi[:, 2]) > GRAZING
+    wo, wi, f = rows.wo[fine], rows.wi[fine], rows.f[fine]
+    if not len(f) or np.any(f < 0.0) or not np.any(f):
+        return None
+    for given in (f, f / wi[:, 2:]) if with_cosine(material) else (f,):
+        for other in search.candidates(material, wo, wi, given):
+            if judge(name, rows, other, accuracy).passed and not degenerate(other, wo, wi, accuracy):
+                return other
+    return None
 
 
 def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:

@@ -1,7 +1,7 @@
 """The sheets of the courses, as tasks with points, and the judgment of what was handed in.
 
-A file belongs to the first task whose pattern its name fits. A file of values may name its own material and frame in
-comments: `# model: oren-nayar(sigma=0.5)` and `# up: y`; the sheet's are used otherwise. Code in a folder is not run.
+A file belongs to the first task whose pattern its name fits. A file of values may name its parameters and its frame in
+comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the model and its terms are the task's. Code is not run.
 """
 
 from __future__ import annotations
@@ -11,15 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..catalog import notation
 from ..errors import GonioError, InputError, did_you_mean
-from . import pictures, samples, tables
-from .finding import BY_HAND, MISSING, Finding, unreadable
+from . import pictures, samples, stated, tables
+from .finding import ANOTHER, BY_HAND, MISSING, WRONG, Finding, unreadable
 from .report import Mark, Report, Submission
 
 PICTURES = (".png", ".exr", ".hdr", ".npz")
 ROWS = (".csv", ".txt", ".tsv", ".dat")
-_COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,8 @@ class Task:
     """One task of a sheet.
 
     files  a pattern of names without suffix, in lower case
-    model  the material of files of values; "" if there are none
+    model  the material of files of values, with the task's terms; "" if there are none
+    forms  other models of Gonio's that can express the same material
     table  "E", "E_avg", or "E, sampled by importance"; "" for a task without a table
     """
 
@@ -36,6 +35,7 @@ class Task:
     files: str
     model: str = ""
     table: str = ""
+    forms: tuple[str, ...] = ()
 
 
 _METAL = "preset=Ag,alpha=0.25,fresnel=schlick"
@@ -44,7 +44,13 @@ HW4 = (
     Task("bonus 1: importance sampling", 10, r"ggx_e_lut|.*e.*(_is|importance).*", table="E, sampled by importance"),
     Task("E(mu)", 5, r"(.*_)?e(_?mu)?(_mc)?(_lut)?(_\d+)?|.*(^|_)emu.*", table="E"),
     Task("Kulla-Conty", 5, r".*kulla.*", f"kulla-conty(base=conductor({_METAL},masking=schlick-direct),color=sheet)"),
-    Task("PBR material", 10, r".*(pbr|conductor|ggx).*", f"conductor({_METAL},masking=schlick-direct)"),
+    Task(
+        "PBR material",
+        10,
+        r".*(pbr|conductor|ggx).*",
+        f"conductor({_METAL},masking=schlick-direct)",
+        forms=("metal(edge=1,masking=schlick-direct)",),
+    ),
     Task("bonus 2: split sum", 5, r".*(split|dfg).*"),
 )
 LAB2 = (
@@ -136,17 +142,25 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
     if task.table:
         raise InputError(f"a '{suffix}' given, a picture of the table expected", path.name, "give the .png")
     if task.model and suffix in ROWS:
-        given = dict(_COMMENT.findall(path.read_text(encoding="utf-8", errors="replace")))
-        named = given.get("model", task.model)
-        if ".py" in named.lower():  # a file that somebody handed in must not choose what runs
-            raise InputError(f"'{named}' is code, which is not run from a folder", path.name, "name a model of Gonio's")
-        material, _ = notation.named(named)
-        return samples.check(path, material, given.get("up", up))
+        return _values(task, path, up)
     scene = _scene_of(path, scenes)
     if suffix in PICTURES and scene is not None:
         return pictures.check(path, scene)
     note = "code is not run from a folder: gonio check FILE.py:CLASS MODEL judges it" if suffix == ".py" else ""
     return Finding(path.name, "", BY_HAND, (note,) if note else ())
+
+
+def _values(task: Task, path: Path, up: str) -> Finding:
+    """The judgment of values of f by the task's model, with the parameters that the file names."""
+    up = stated.comments(path).get("up", up)
+    try:
+        asked = stated.for_task(path, (task.model, *task.forms))
+    except stated.AnotherModelError as error:
+        return Finding(path.name, ANOTHER, WRONG, remark=error.what)
+    rows = samples.read(path, up)
+    if why := stated.degenerate(asked.material, rows.wo, rows.wi, samples.ACCURACY):
+        raise InputError(why, path.name, "hand in values for other parameters")
+    return samples.check(path, asked, up)
 
 
 def _table(task: Task, path: Path, own: tables.Table | None) -> Finding:
