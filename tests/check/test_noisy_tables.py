@@ -1,4 +1,4 @@
-"""Tables of E with the noise of random directions: right ones pass, and a mistake is named where its form alone fits."""
+"""Tables of E with the noise of random directions: right ones pass, mistakes are named where their form alone fits."""
 
 from __future__ import annotations
 

@@ -153,3 +153,20 @@ def test_code_and_nonsense_in_a_line_are_refused(tmp_path: Path, capsys: pytest.
         assert cli.run(["check", str(path)]) == 2
         assert said in capsys.readouterr().err
         assert cli.run(["check", str(path), "lambert"]) == 0
+
+
+# --------------------------------------------------------------------------- Phong with its cosine, and the horizon
+
+
+def test_wrong_values_with_their_cosine_are_compared_with_it(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "f.csv", np.column_stack([of.WO, of.WI, Phong(p=17)(of.WO, of.WI)]), delimiter=",")
+    finding = go.check(tmp_path / "f.csv", "phong(kd=0.5,ks=0.3,p=16)")
+    assert finding.cause == "the exponent is p + 1, not p", finding.lines()
+    assert any("f cos theta_i" in fact for fact in finding.facts)
+    assert finding.figures["largest"] < 0.6  # against f alone: 0.9 and more at grazing light
+
+
+def test_rows_at_the_horizon_are_counted(tmp_path: Path) -> None:
+    text = _written("lambert", "lambert").rstrip() + "\n0,0,1,1,0,0.0001,0,0,0\n"
+    (tmp_path / "f.csv").write_text(text)
+    assert "1 row at the horizon left out" in go.check(tmp_path / "f.csv").facts[0]

@@ -21,7 +21,7 @@ from ..material import BSDF
 from ..measure.formats import text
 from ..verify import directions
 from . import causes, search
-from .finding import RIGHT, WRONG, Finding
+from .finding import RIGHT, WRONG, Finding, Mistake
 from .mistakes import Values, f_of
 from .mistakes.empirical import with_cosine
 from .stated import Asked, degenerate
@@ -29,6 +29,7 @@ from .stated import Asked, degenerate
 ACCURACY = 2e-3  # relative: float32, printed with six digits, with angles by arc functions
 GRAZING = 1e-3  # cosine below which a quotient by it loses its digits
 UNIT = 1e-3  # largest deviation of a direction's length from 1
+_COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
 COVER = 0.99  # share of the rows that must agree; the others by ten times the accuracy
 _UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z: rotations
 
@@ -95,21 +96,52 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
         pass
     elif with_cosine(material) and _agree(rows.f, expected * np.abs(rows.wi[:, 2:]), fine, accuracy):
         expected = expected * np.abs(rows.wi[:, 2:])
-        facts.append("the values are f cos theta_i, as in the sheet's equation 1")
+        facts.append(_COSINE)
     else:
+        mistake = _mistake(rows, expected, material, fine, accuracy)
+        if with_cosine(material) and _has_cosine(rows, expected, fine, accuracy):
+            divided = rows._replace(f=_over(rows.f, rows.wi[:, 2:]))
+            mistake = _mistake(divided, expected, material, fine, accuracy) or mistake
+            expected = expected * np.abs(rows.wi[:, 2:])
+            facts.append(_COSINE)
         error, worst = _error(rows.f, expected, fine, accuracy)
         good = causes.close(rows.f, expected, accuracy)[fine]
         figures |= {"agree": float(good.mean()), "largest": float(error[worst]), "line": float(rows.line[worst])}
-        facts += [
-            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative",
+        facts[:0] = [
+            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative{_left_out(fine)}",
             f"furthest off: line {rows.line[worst]}, f {_numbers(rows.f[worst])}, expected {_numbers(expected[worst])}",
         ]
-        both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
-        return Finding(name, kind, WRONG, tuple(facts), causes.named(both), figures)
+        return Finding(name, kind, WRONG, tuple(facts), mistake, figures)
     error, worst = _error(rows.f, expected, fine, accuracy)
     figures |= {"agree": 1.0, "largest": float(error[worst])}
-    facts.insert(0, f"{int(fine.sum())} rows agree; the largest relative difference is {error[worst]:.2g}")
+    text = f"{int(fine.sum())} rows agree; the largest relative difference is {error[worst]:.2g}{_left_out(fine)}"
+    facts.insert(0, text)
     return Finding(name, kind, RIGHT, tuple(facts), None, figures)
+
+
+def _mistake(rows: Rows, expected: Values, material: BSDF, fine: np.ndarray, accuracy: float) -> Mistake | None:
+    both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
+    return causes.named(both)
+
+
+def _has_cosine(rows: Rows, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
+    """Whether wrong values are nearer to f cos theta_i than to f: in more rows, or by the median."""
+
+    def distance(right: Values) -> tuple[float, float]:
+        error, _ = _error(rows.f, right, fine, accuracy)
+        return -float(np.mean(causes.close(rows.f, right, accuracy)[fine])), float(np.median(error[fine]))
+
+    return distance(expected * np.abs(rows.wi[:, 2:])) < distance(expected)
+
+
+def _over(f: Values, cosine: Values) -> Values:
+    return f / np.maximum(np.abs(cosine), GRAZING)
+
+
+def _left_out(fine: np.ndarray) -> str:
+    """The rows that do not count, in words; "" if there are none."""
+    count = int(np.sum(~fine))
+    return f"; {count} row{'s' if count > 1 else ''} at the horizon left out" if count else ""
 
 
 def _agree(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
