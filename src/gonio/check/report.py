@@ -96,7 +96,7 @@ class Report:
                 rows.append((one.name, mark.task, finding.name, finding.status, points, why))
             total = sum(mark.points for mark in one.best().values())
             rows.append((one.name, "suggested", "", "", f"{one.points:g} / {total:g}", ""))
-            rows += [(one.name, "", name, "not judged", "", "its name fits no task") for name in one.others]
+            rows += [(one.name, "", name, "not judged", "", "not a file of a task") for name in one.others]
         return rows
 
     def as_dict(self) -> dict[str, Any]:

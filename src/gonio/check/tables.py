@@ -128,12 +128,17 @@ class _Match(NamedTuple):
         return self.form.mistake or self.stored.mistake or self.layout.mistake
 
 
-def read(path: Path) -> Table:
-    """The table in a picture, or in an array of an .npz. Raises InputError for anything else."""
+def read(path: Path, channels: int = 1) -> Table:
+    """The table in a picture, or in an array of an .npz. Raises InputError for anything else.
+
+    channels  2 for a split sum: A in red and B in green, whose sum is the table; a gray picture holds the sum
+    """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
         raise InputError("a picture of 16 bits", path.name, "write 8 bits per channel, E * 255, as the homework does")
     pixels = np.asarray(images.read(path, "linear").pixels, float)
     if np.all(np.isfinite(pixels)) and np.any(np.ptp(pixels, axis=2) > 1.5 / LEVELS):
+        if channels == 2:
+            return Table(path.name, pixels[..., 0] + pixels[..., 1])
         raise InputError("a colored picture", path.name, "E with F = 1 has three equal channels")
     return Table(path.name, pixels[..., 0])
 
