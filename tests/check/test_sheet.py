@@ -16,6 +16,7 @@ from .solutions import Table
 PAGE = Path(__file__).parents[2] / "docs/check.md"
 LISTED = re.compile(r"^\| (hw4|lab2) \| (.+?) \| (\d+) \| (.+) \|$", re.MULTILINE)
 NAME = re.compile(r"`([\w-]+\.\w+)`")
+MATTE = {"type": "matte", "albedo": [0.8, 0.3, 0.2]}
 SCENE = {
     "output": {"filename": "rows.png"},
     "sampler": {"type": "independent", "samples": 4},
@@ -27,7 +28,7 @@ SCENE = {
     },
     "integrator": {"type": "directSampleLight"},
     "scene": {
-        "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": {"type": "matte", "albedo": [0.8, 0.3, 0.2]}}],
+        "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": MATTE}],
         "lights": [{"type": "directionalLight", "direction": [-1, -1, -4], "energy": 3}],
     },
 }  # fmt: skip
