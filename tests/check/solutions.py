@@ -179,6 +179,7 @@ class Table:
     cosine: bool = False
     samples: int = 1024
     flip: bool = True
+    rng: np.random.Generator | None = None  # random directions, others for each texel
     extra: dict[str, Any] = field(default_factory=dict)
 
     def k_of(self, roughness: np.ndarray) -> np.ndarray:
@@ -199,13 +200,15 @@ class Table:
         alpha = roughness if self.change == "alpha = roughness" else roughness**2
         k = self.k_of(np.asarray(roughness))
         v = np.stack([np.sqrt(1.0 - mu**2), 0.0 * mu, mu], axis=1)[:, None]
-        x = hammersley(self.samples)
-        phi = 2.0 * math.pi * x[:, 1]
+        x = hammersley(self.samples)[None]
+        if self.rng is not None:
+            x = self.rng.random((len(mu), self.samples, 2))
+        phi = 2.0 * math.pi * x[..., 1]
         if self.cosine:
-            theta = 0.5 * np.arccos(1.0 - 2.0 * (x[:, 0] + 0.5 / self.samples))
+            theta = 0.5 * np.arccos(1.0 - 2.0 * (x[..., 0] + (0.5 / self.samples if self.rng is None else 0.0)))
         else:
-            theta = np.arctan(alpha * np.sqrt(x[:, 0]) / np.sqrt(1.0 - x[:, 0]))
-        w = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)[None]
+            theta = np.arctan(alpha * np.sqrt(x[..., 0]) / np.sqrt(1.0 - x[..., 0]))
+        w = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
         if self.cosine:
             light, m = w, (v + w) / np.linalg.norm(v + w, axis=2, keepdims=True)
         else:
@@ -228,6 +231,8 @@ class Table:
             weight = weight * nl
         if self.change == "no cosine":
             weight = weight / nl
+        if self.change == "no n.m":
+            weight = weight * nm
         if self.change == "no jacobian":
             weight = weight / (4.0 * vm)
         return np.mean(np.where(lit, weight, 0.0), axis=1)

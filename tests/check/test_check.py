@@ -193,7 +193,7 @@ def test_rows_in_a_folder_name_their_own_material(tmp_path: Path) -> None:
     report = go.check(tmp_path, sheet="lab2")
     status = {mark.task: mark.finding.status for one in report.submissions for mark in one.marks}
     assert status["Oren-Nayar"] == "right" and status["conductor, GGX"] == "wrong"
-    assert status["Phong"] == "not handed in" and status["report"] == "by hand"
+    assert status["Phong"] == "not handed in" and status["report"] == "not handed in"
 
 
 def test_rows_in_a_folder_run_no_code(tmp_path: Path) -> None:
@@ -206,7 +206,7 @@ def test_rows_in_a_folder_run_no_code(tmp_path: Path) -> None:
 
 def test_work_that_cannot_be_read_leaves_the_others_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _picture(tmp_path / "E.png", Table().picture())
-    (tmp_path / "E_avg.pdf").write_bytes(b"%PDF-1.4")
+    (tmp_path / "E_avg.jpg").write_bytes(b"no table")
     (tmp_path / "GGX_E_LUT.png").write_bytes(b"no picture")
     assert cli.run(["check", str(tmp_path), "--sheet", "hw4"]) == 2
     lines = capsys.readouterr().out.splitlines()

@@ -17,6 +17,7 @@ from .finding import Mistake
 from .mistakes import FAMILIES, Values, Variant, f_of
 
 TOP, BOTTOM = "your f", "the model's"
+REGION = "the region where the values differ"  # the topic where no formula explains them
 
 
 def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expected: Values, accuracy: float) -> Ratio:
@@ -52,7 +53,7 @@ def named(both: Ratio) -> Mistake | None:
             words = f"{variant.mistake.words}; besides, a factor of {fit.formula}"
             return Mistake(words, variant.mistake.topic)
     cause = referee.named(both)
-    return Mistake(cause.words, "the region where the values differ") if cause is not None else None
+    return Mistake(cause.words, REGION) if cause is not None else None
 
 
 def _either(mistakes: list[Mistake]) -> Mistake:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 RIGHT, WRONG, ERROR, MISSING, BY_HAND = "right", "wrong", "input error", "not handed in", "by hand"
+ANOTHER = "another model"  # the kind of values whose file names another model than the task's
 EXIT_CODES = {RIGHT: 0, BY_HAND: 0, WRONG: 1, MISSING: 1, ERROR: 2}
 
 
@@ -32,6 +33,7 @@ class Finding:
     mistake  the probable mistake, None if no formula fits
     figures  the numbers in `facts`
     hidden   whether formulas and values of the solution are left out
+    remark   by what it was judged, where the command does not say it all; "" otherwise
     """
 
     name: str
@@ -41,6 +43,7 @@ class Finding:
     mistake: Mistake | None = None
     figures: dict[str, float] = field(default_factory=dict)
     hidden: bool = False
+    remark: str = ""
 
     @property
     def passed(self) -> bool:
@@ -66,10 +69,10 @@ class Finding:
     def lines(self) -> list[str]:
         """The judgment as text, one line per fact."""
         lines = [f"{self.name}: {self.status}" + (f" ({self.kind})" if self.kind else "")]
-        lines += [f"  {fact}" for fact in self.facts]
+        lines += [f"  {fact}" for fact in (*self.facts, self.remark) if fact]
         if self.cause:
             lines.append(f"  probable mistake: {self.cause}")
-        elif self.status == WRONG:
+        elif self.status == WRONG and self.kind != ANOTHER:
             lines.append("  no known mistake explains the difference")
         return lines
 
@@ -80,6 +83,7 @@ class Finding:
             "status": self.status,
             "passed": self.passed,
             "facts": list(self.facts),
+            "remark": self.remark,
             "cause": self.cause,
             "topic": self.mistake.topic if self.mistake else "",
             "figures": self.figures,

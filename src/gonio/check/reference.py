@@ -25,6 +25,7 @@ PAIRS = 200
 SIZE = 32  # of the tables
 _SILVER = "preset=Ag,alpha=0.25,fresnel=schlick,masking=smith-separable"
 _GLASS = "eta=1.5,alpha=0.25,fresnel=schlick,masking=smith-separable"
+_HOMEWORK = "conductor(preset=Ag,alpha=0.25,fresnel=schlick,masking=schlick-direct)"
 MODELS = {
     "lambert": "lambert",
     "phong": "phong",
@@ -34,8 +35,8 @@ MODELS = {
     "conductor-ggx": f"conductor({_SILVER},ndf=ggx)",
     "dielectric-beckmann": f"dielectric({_GLASS},ndf=beckmann)",
     "dielectric-ggx": f"dielectric({_GLASS},ndf=ggx)",
-    "pbr-material": "conductor(preset=Ag,alpha=0.25,fresnel=schlick,masking=schlick-direct)",
-    "kulla-conty": f"kulla-conty(base=conductor({_SILVER},ndf=ggx),color=sheet)",
+    "pbr-material": _HOMEWORK,
+    "kulla-conty": f"kulla-conty(base={_HOMEWORK},color=sheet)",
 }
 TABLES = {"text": "schlick-direct", "figure": "schlick-ibl"}
 

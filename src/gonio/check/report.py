@@ -90,14 +90,13 @@ class Report:
             for mark in one.marks:
                 finding = mark.finding
                 given = "-" if mark.suggested is None else f"{mark.suggested:g}"
-                why = finding.cause or (
-                    finding.facts[0] if finding.status in (ERROR, BY_HAND) and finding.facts else ""
-                )
+                unjudged = finding.facts[0] if finding.status in (ERROR, BY_HAND) and finding.facts else ""
+                why = "; ".join(filter(None, [finding.cause or unjudged, finding.remark]))
                 points = f"{given} / {mark.points:g}" if mark.points else ""
                 rows.append((one.name, mark.task, finding.name, finding.status, points, why))
             total = sum(mark.points for mark in one.best().values())
             rows.append((one.name, "suggested", "", "", f"{one.points:g} / {total:g}", ""))
-            rows += [(one.name, "", name, "not judged", "", "its name fits no task") for name in one.others]
+            rows += [(one.name, "", name, "not judged", "", "not a file of a task") for name in one.others]
         return rows
 
     def as_dict(self) -> dict[str, Any]:

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..catalog import notation, operands, outside
+from ..catalog import notation, operands, outside, shaders
 from ..errors import InputError
 from ..files import check_file, write_whole
 from ..material import BSDF
 from ..owner import public
-from . import classes, pictures, samples, sheet, tables
+from . import classes, pictures, samples, sheet, stated, tables
 from .finding import Finding
 from .report import Mark, Report, Submission, junit
 
@@ -39,28 +39,39 @@ class Work:
 
     @property
     def is_material(self) -> bool:
-        """Whether it is a material, or a class in a Python file."""
-        return isinstance(self.target, BSDF) or outside.names_code(notation.split(str(self.target))[0])
+        """Whether it is a material, a class in a Python file, or a shader."""
+        if isinstance(self.target, BSDF):
+            return True
+        name = notation.split(self.text)[0]
+        return outside.names_code(name) or shaders.names_shader(name)
+
+    @property
+    def text(self) -> str:
+        """The target as text; for an adapter beside a shader, the shader."""
+        text = str(self.target)
+        shader = text.removesuffix(".toml")
+        return shader if shader != text and shaders.names_shader(shader) else text
 
     def model(self) -> BSDF:
-        """The material to judge by. Raises InputError if none was given."""
+        """The material to judge another by. Raises InputError if none was given."""
         if isinstance(self.against, BSDF):
             return self.against
         if not self.against:
-            hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3"
-            raise InputError("no model to judge by", "MODEL", hint)
+            raise InputError(
+                "no model to judge by", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
+            )
         operands.kind_of(self.against, operands.MATERIALS, "MODEL")
         return notation.named(self.against)[0]
 
 
 def _class(work: Work) -> Finding:
-    given = work.target if isinstance(work.target, BSDF) else notation.named(str(work.target))[0]
-    name = type(given).name if isinstance(work.target, BSDF) else notation.split(str(work.target))[0]
+    given = work.target if isinstance(work.target, BSDF) else notation.named(work.text)[0]
+    name = type(given).name if isinstance(work.target, BSDF) else notation.split(work.text)[0]
     return classes.check(name, given, work.model(), work.tolerance)
 
 
 def _rows(work: Work) -> Finding:
-    return samples.check(work.path, work.model(), work.up, work.tolerance)
+    return samples.check(work.path, stated.for_command(work.path, work.against), work.up, work.tolerance)
 
 
 def _picture(work: Work) -> Finding:
@@ -107,7 +118,7 @@ def check(
         go.check("submissions", sheet="hw4").rows()
 
     target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
-               picture, with `scene`; a folder of these or of such folders, with `sheet`
+               shader (.glsl, .wgsl, ...); a picture, with `scene`; a folder of these or of such folders, with `sheet`
     against    the material to judge by, also as text; for a table, the masking term that it must have
     scene      the scene that a picture shows; with `sheet`, a folder of scenes by the names of pictures
     sheet      "hw4" or "lab2": the tasks and their points
@@ -142,7 +153,7 @@ def _judge(work: Work, tasks: str | None) -> Finding | Report:
     if judge is None:
         what = f"'{work.target}' is {'a PDF' if work.suffix == '.pdf' else 'nothing that can be judged'}"
         raise InputError(
-            what, "TARGET", "give a table (.png), rows of f (.csv), FILE.py:CLASS, or a folder with --sheet"
+            what, "TARGET", "give a table (.png), rows of f (.csv), FILE.py:CLASS, a shader, or a folder with --sheet"
         )
     if not work.is_material and not work.path.exists():
         raise InputError(f"no file '{work.target}'", "TARGET", "check the path")

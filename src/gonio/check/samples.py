@@ -10,6 +10,7 @@ first line of names may head the table. Five columns are theta_o, phi_o, theta_i
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,14 +20,16 @@ from ..errors import InputError
 from ..material import BSDF
 from ..measure.formats import text
 from ..verify import directions
-from . import causes
-from .finding import RIGHT, WRONG, Finding
+from . import causes, search
+from .finding import RIGHT, WRONG, Finding, Mistake
 from .mistakes import Values, f_of
 from .mistakes.empirical import with_cosine
+from .stated import Asked, degenerate
 
 ACCURACY = 2e-3  # relative: float32, printed with six digits, with angles by arc functions
 GRAZING = 1e-3  # cosine below which a quotient by it loses its digits
 UNIT = 1e-3  # largest deviation of a direction's length from 1
+_COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
 COVER = 0.99  # share of the rows that must agree; the others by ten times the accuracy
 _UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z: rotations
 
@@ -40,10 +43,39 @@ class Rows(NamedTuple):
     line: list[int]
 
 
-def check(path: Path, material: BSDF, up: str = "z", accuracy: float | None = None) -> Finding:
-    """Judge a file of values. Raises InputError for one that cannot be read."""
+def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
+    """Judge a file of values. Raises InputError for one that cannot be read.
+
+    If nobody gave parameters, those that explain the values are right, unless a known mistake explains them by the
+    defaults.
+    """
     rows = read(path, up)
-    return judge(path.name, rows, material, ACCURACY if accuracy is None else accuracy)
+    accuracy = ACCURACY if accuracy is None else accuracy
+    finding = judge(path.name, rows, asked.material, accuracy)
+    if finding.passed and asked.defaults:
+        return finding
+    other = _explaining(path.name, rows, asked.material, accuracy) if asked.defaults else None
+    if other is None:
+        return replace(finding, remark=asked.remark)
+    numbers = search.described(other)
+    if finding.mistake is not None and finding.mistake.topic != causes.REGION:
+        return replace(finding, remark=f"{numbers} explains the values as well: name it in a line '# model:', or by -p")
+    remark = f"{numbers}, found from the values: the file does not name its parameters"
+    return replace(judge(path.name, rows, other, accuracy), remark=remark)
+
+
+def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF | None:
+    """The material with parameters that explain the values; None if there are none, or if they make it a simpler
+    one."""
+    fine = np.minimum(rows.wo[:, 2], rows.wi[:, 2]) > GRAZING
+    wo, wi, f = rows.wo[fine], rows.wi[fine], rows.f[fine]
+    if not len(f) or np.any(f < 0.0) or not np.any(f):
+        return None
+    for given in (f, f / wi[:, 2:]) if with_cosine(material) else (f,):
+        for other in search.candidates(material, wo, wi, given):
+            if judge(name, rows, other, accuracy).passed and not degenerate(other, wo, wi, accuracy):
+                return other
+    return None
 
 
 def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
@@ -64,21 +96,52 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
         pass
     elif with_cosine(material) and _agree(rows.f, expected * np.abs(rows.wi[:, 2:]), fine, accuracy):
         expected = expected * np.abs(rows.wi[:, 2:])
-        facts.append("the values are f cos theta_i, as in the sheet's equation 1")
+        facts.append(_COSINE)
     else:
+        mistake = _mistake(rows, expected, material, fine, accuracy)
+        if with_cosine(material) and _has_cosine(rows, expected, fine, accuracy):
+            divided = rows._replace(f=_over(rows.f, rows.wi[:, 2:]))
+            mistake = _mistake(divided, expected, material, fine, accuracy) or mistake
+            expected = expected * np.abs(rows.wi[:, 2:])
+            facts.append(_COSINE)
         error, worst = _error(rows.f, expected, fine, accuracy)
         good = causes.close(rows.f, expected, accuracy)[fine]
         figures |= {"agree": float(good.mean()), "largest": float(error[worst]), "line": float(rows.line[worst])}
-        facts += [
-            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative",
+        facts[:0] = [
+            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative{_left_out(fine)}",
             f"furthest off: line {rows.line[worst]}, f {_numbers(rows.f[worst])}, expected {_numbers(expected[worst])}",
         ]
-        both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
-        return Finding(name, kind, WRONG, tuple(facts), causes.named(both), figures)
+        return Finding(name, kind, WRONG, tuple(facts), mistake, figures)
     error, worst = _error(rows.f, expected, fine, accuracy)
     figures |= {"agree": 1.0, "largest": float(error[worst])}
-    facts.insert(0, f"{int(fine.sum())} rows agree; the largest relative difference is {error[worst]:.2g}")
+    text = f"{int(fine.sum())} rows agree; the largest relative difference is {error[worst]:.2g}{_left_out(fine)}"
+    facts.insert(0, text)
     return Finding(name, kind, RIGHT, tuple(facts), None, figures)
+
+
+def _mistake(rows: Rows, expected: Values, material: BSDF, fine: np.ndarray, accuracy: float) -> Mistake | None:
+    both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
+    return causes.named(both)
+
+
+def _has_cosine(rows: Rows, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
+    """Whether wrong values are nearer to f cos theta_i than to f: in more rows, or by the median."""
+
+    def distance(right: Values) -> tuple[float, float]:
+        error, _ = _error(rows.f, right, fine, accuracy)
+        return -float(np.mean(causes.close(rows.f, right, accuracy)[fine])), float(np.median(error[fine]))
+
+    return distance(expected * np.abs(rows.wi[:, 2:])) < distance(expected)
+
+
+def _over(f: Values, cosine: Values) -> Values:
+    return f / np.maximum(np.abs(cosine), GRAZING)
+
+
+def _left_out(fine: np.ndarray) -> str:
+    """The rows that do not count, in words; "" if there are none."""
+    count = int(np.sum(~fine))
+    return f"; {count} row{'s' if count > 1 else ''} at the horizon left out" if count else ""
 
 
 def _agree(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> bool:

@@ -1,7 +1,7 @@
 """The sheets of the courses, as tasks with points, and the judgment of what was handed in.
 
-A file belongs to the first task whose pattern its name fits. A file of values may name its own material and frame in
-comments: `# model: oren-nayar(sigma=0.5)` and `# up: y`; the sheet's are used otherwise. Code in a folder is not run.
+A file belongs to the first task whose pattern its name fits. A file of values may name its parameters and its frame in
+comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the model and its terms are the task's. Code is not run.
 """
 
 from __future__ import annotations
@@ -11,15 +11,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..catalog import notation
 from ..errors import GonioError, InputError, did_you_mean
-from . import pictures, samples, tables
-from .finding import BY_HAND, MISSING, Finding, unreadable
+from . import pictures, samples, stated, tables
+from .finding import ANOTHER, BY_HAND, MISSING, WRONG, Finding, unreadable
 from .report import Mark, Report, Submission
 
 PICTURES = (".png", ".exr", ".hdr", ".npz")
 ROWS = (".csv", ".txt", ".tsv", ".dat")
-_COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
+LEFT_ALONE = (
+    ".c", ".cc", ".cpp", ".cxx", ".cu", ".h", ".hpp", ".inl", ".py", ".ipynb", ".js", ".ts", ".java", ".rs", ".m",
+    ".glsl", ".frag", ".vert", ".hlsl", ".wgsl", ".o", ".obj", ".exe", ".cmake", ".sln", ".vcxproj", ".json", ".toml",
+    ".pdf", ".doc", ".docx", ".md", ".tex", ".html",
+)  # fmt: skip
+SPLIT = "A + B"  # of the split sum, which is E: one channel, or A in red and B in green
 
 
 @dataclass(frozen=True)
@@ -27,8 +31,9 @@ class Task:
     """One task of a sheet.
 
     files  a pattern of names without suffix, in lower case
-    model  the material of files of values; "" if there are none
-    table  "E", "E_avg", or "E, sampled by importance"; "" for a task without a table
+    model  the material of files of values, with the task's terms; "" if there are none
+    forms  other models of Gonio's that can express the same material
+    table  "E", "E_avg", "E, sampled by importance", or SPLIT; "" for a task without a table
     """
 
     name: str
@@ -36,6 +41,7 @@ class Task:
     files: str
     model: str = ""
     table: str = ""
+    forms: tuple[str, ...] = ()
 
 
 _METAL = "preset=Ag,alpha=0.25,fresnel=schlick"
@@ -44,8 +50,14 @@ HW4 = (
     Task("bonus 1: importance sampling", 10, r"ggx_e_lut|.*e.*(_is|importance).*", table="E, sampled by importance"),
     Task("E(mu)", 5, r"(.*_)?e(_?mu)?(_mc)?(_lut)?(_\d+)?|.*(^|_)emu.*", table="E"),
     Task("Kulla-Conty", 5, r".*kulla.*", f"kulla-conty(base=conductor({_METAL},masking=schlick-direct),color=sheet)"),
-    Task("PBR material", 10, r".*(pbr|conductor|ggx).*", f"conductor({_METAL},masking=schlick-direct)"),
-    Task("bonus 2: split sum", 5, r".*(split|dfg).*"),
+    Task(
+        "PBR material",
+        10,
+        r".*(pbr|conductor|ggx).*",
+        f"conductor({_METAL},masking=schlick-direct)",
+        forms=("metal(edge=1,masking=schlick-direct)",),
+    ),
+    Task("bonus 2: split sum", 5, r".*(split|dfg).*", table=SPLIT),
 )
 LAB2 = (
     Task("Phong", 5, r"(?!.*blinn).*phong.*", "phong"),
@@ -64,6 +76,7 @@ LAB2 = (
     ),
     Task("report", 4, r".*(report|readme|lab2|\u62a5\u544a).*"),
 )
+PICTURE = Task("picture", 0, "")  # of a scene, by whose name it is judged
 SHEETS = {"hw4": HW4, "lab2": LAB2}
 
 
@@ -94,7 +107,7 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
     files_of: dict[str, list[Path]] = {task.name: [] for task in tasks}
     others: list[Path] = []
     for path in files:
-        task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
+        task = task_of(tasks, path)
         (others if task is None else files_of[task.name]).append(path)
     tables_of = {task.table: files_of[task.name] for task in tasks if task.table}
     if not tables_of.get("E", [0]) and tables_of.get("E, sampled by importance"):
@@ -105,7 +118,16 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
         for task in tasks
         for one in _judged(task, files_of[task.name], own, scenes, up)
     ]
-    return Submission(folder.name, marks, tuple(str(path.relative_to(folder)) for path in others))
+    shown = [path for path in others if path.suffix.lower() in PICTURES and _scene_of(path, scenes) is not None]
+    marks += [Mark(PICTURE.name, 0.0, one) for path in shown for one in _judged(PICTURE, [path], own, scenes, up)]
+    left = [path for path in others if path not in shown]
+    return Submission(folder.name, marks, tuple(str(path.relative_to(folder)) for path in left))
+
+
+def task_of(tasks: tuple[Task, ...], path: Path) -> Task | None:
+    """The first task whose pattern a file's name fits; None for sources and documents among the tables."""
+    task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
+    return None if task is not None and task.table and path.suffix.lower() in LEFT_ALONE else task
 
 
 def _own_table(files: list[Path]) -> tables.Table | None:
@@ -120,7 +142,7 @@ def _own_table(files: list[Path]) -> tables.Table | None:
 def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Path | None, up: str) -> Iterator[Finding]:
     """A finding for each file of a task; for a task without files, one that says so."""
     if not files:
-        yield Finding("", "", MISSING if task.table or task.model else BY_HAND)
+        yield Finding("", "", MISSING)
     for path in files:
         try:
             yield _one(task, path, own, scenes, up)
@@ -131,29 +153,39 @@ def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Pat
 def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, up: str) -> Finding:
     """The judgment of one file of a task. Raises InputError for one that cannot be read."""
     suffix = path.suffix.lower()
+    scene = _scene_of(path, scenes)
+    if task.table == SPLIT and scene is not None and suffix in PICTURES:
+        return pictures.check(path, scene)  # what was rendered by it
     if task.table and suffix in PICTURES:
         return _table(task, path, own)
     if task.table:
         raise InputError(f"a '{suffix}' given, a picture of the table expected", path.name, "give the .png")
     if task.model and suffix in ROWS:
-        given = dict(_COMMENT.findall(path.read_text(encoding="utf-8", errors="replace")))
-        named = given.get("model", task.model)
-        if ".py" in named.lower():  # a file that somebody handed in must not choose what runs
-            raise InputError(f"'{named}' is code, which is not run from a folder", path.name, "name a model of Gonio's")
-        material, _ = notation.named(named)
-        return samples.check(path, material, given.get("up", up))
-    scene = _scene_of(path, scenes)
+        return _values(task, path, up)
     if suffix in PICTURES and scene is not None:
         return pictures.check(path, scene)
     note = "code is not run from a folder: gonio check FILE.py:CLASS MODEL judges it" if suffix == ".py" else ""
     return Finding(path.name, "", BY_HAND, (note,) if note else ())
 
 
+def _values(task: Task, path: Path, up: str) -> Finding:
+    """The judgment of values of f by the task's model, with the parameters that the file names."""
+    up = stated.comments(path).get("up", up)
+    try:
+        asked = stated.for_task(path, (task.model, *task.forms))
+    except stated.AnotherModelError as error:
+        return Finding(path.name, ANOTHER, WRONG, remark=error.what)
+    rows = samples.read(path, up)
+    if why := stated.degenerate(asked.material, rows.wo, rows.wi, samples.ACCURACY):
+        raise InputError(why, path.name, "hand in values for other parameters")
+    return samples.check(path, asked, up)
+
+
 def _table(task: Task, path: Path, own: tables.Table | None) -> Finding:
-    table = tables.read(path)
+    table = tables.read(path, channels=2 if task.table == SPLIT else 1)
     if task.table == "E_avg":
         return tables.check_average(table, own)
-    return tables.check(table, sampled=task.table != "E")
+    return tables.check(table, sampled=task.table == "E, sampled by importance")
 
 
 def _scene_of(path: Path, scenes: Path | None) -> Path | None:

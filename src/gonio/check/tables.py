@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +25,8 @@ LEVELS = 255.0
 FITS = 3.0  # gray levels within which a form explains a table
 NOISY = 8.0  # the same for a table by random cosine-weighted directions
 CONVERGED = 0.55  # roughness from which cosine sampling with 1,024 directions has converged
+ROWS = 10.0  # gray levels within which a way to sample explains the means of rows of low roughness
+SURE = 1.1  # times as far off must the right forms be at least as a mistake in a noisy table, or it is only probable
 GRAIN = 0.3  # correlation of neighboring texels' errors below which they are noise
 NOISY_WEIGHT = 0.05  # of the distance over all rows
 WHITE = 0.95  # share of white texels beyond which no factor can be told
@@ -126,12 +128,17 @@ class _Match(NamedTuple):
         return self.form.mistake or self.stored.mistake or self.layout.mistake
 
 
-def read(path: Path) -> Table:
-    """The table in a picture, or in an array of an .npz. Raises InputError for anything else."""
+def read(path: Path, channels: int = 1) -> Table:
+    """The table in a picture, or in an array of an .npz. Raises InputError for anything else.
+
+    channels  2 for a split sum: A in red and B in green, whose sum is the table; a gray picture holds the sum
+    """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
         raise InputError("a picture of 16 bits", path.name, "write 8 bits per channel, E * 255, as the homework does")
     pixels = np.asarray(images.read(path, "linear").pixels, float)
     if np.all(np.isfinite(pixels)) and np.any(np.ptp(pixels, axis=2) > 1.5 / LEVELS):
+        if channels == 2:
+            return Table(path.name, pixels[..., 0] + pixels[..., 1])
         raise InputError("a colored picture", path.name, "E with F = 1 has three equal channels")
     return Table(path.name, pixels[..., 0])
 
@@ -195,7 +202,10 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     all_rows = _rms(residual)
     figures = {"converged": best.distance, "all": all_rows}
     right = best.mistake is None
-    noise = right and all_rows <= best.distance and _is_noise(residual)  # as much at low roughness as at high
+    limit = max(FITS, 1.3 * _noise(best.layout.values))
+    random = _is_noise(residual) and (right or best.distance <= limit)
+    noise = random and all_rows <= (1.0 if right else 1.2) * best.distance  # as much at low roughness as at high
+    fits = max(NOISY, limit) if right and noise else limit
     converged = all_rows <= FITS or noise or not low.any()
     facts = [
         f"nearest: {best.form.words}; {best.layout.words}" + (f"; {best.stored.words}" if best.stored.words else "")
@@ -203,22 +213,40 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     facts.append(
         f"{best.distance:.2g} gray levels of 255 off at roughness >= {CONVERGED}, {all_rows:.2g} over all (rms)"
     )
-    if best.distance <= (NOISY if right else FITS) and not converged:
+    if best.distance <= (NOISY if right else limit) and not converged:
         facts += _sampling(best, at, size, low, figures)
     if noise and best.distance > FITS:
         facts.append("the rest is noise of random directions: more of them would show how near the mean is")
-    if best.distance > (NOISY if right and (noise or not converged) else FITS):
+    if best.distance > (NOISY if right and not converged else fits):
         facts.append("no form fits: the table is wrong in a way that is not known here")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     if np.mean(inside[~low] >= LEVELS - 1.0) > WHITE:
         facts.append("nearly all is white: the values exceed 1, by a factor that cannot be told from white texels")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     _check_encoding(table, best.stored)
-    mistake = best.mistake or _unexpected(best.form, expected)
+    mistake = _certain(best, matches) or _unexpected(best.form, expected)
     if sampled and not converged:
         words = "low roughness is noisy and too dark: the directions are not sampled by the normals of GGX"
         mistake = mistake or Mistake(words, "how directions are sampled, and their pdf")
     return Finding(table.name, "table of E", WRONG if mistake else RIGHT, tuple(facts), mistake, figures)
+
+
+def _noise(values: Values) -> float:
+    """The noise of a table, gray levels (rms), by second differences over roughness from `CONVERGED` on, where E is
+    smooth at every mu."""
+    rows = values[int(CONVERGED * len(values)) :] * LEVELS
+    second = rows[2:] - 2.0 * rows[1:-1] + rows[:-2]
+    return float(np.sqrt(np.mean(second**2) / 6.0))  # 1 + 4 + 1 variances
+
+
+def _certain(best: _Match, matches: list[_Match]) -> Mistake | None:
+    """The mistake of the nearest match; only a probable one if a right form is about as near."""
+    if best.mistake is None:
+        return None
+    right = min((one.distance for one in matches if one.mistake is None), default=np.inf)
+    if best.distance <= FITS or right > SURE * best.distance:
+        return best.mistake
+    return replace(best.mistake, words=f"probably {best.mistake.words}")
 
 
 def _is_noise(residual: np.ndarray) -> bool:
@@ -292,7 +320,9 @@ def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures:
     bytes_ = "bytes wrap at 256" if wrapped else "no byte wraps at 256"
     return [
         "below, as by cosine-weighted directions: noisy and too dark, which importance sampling (bonus 1) avoids",
-        f"nearest: 32 x 32 stratified directions; {denominator}, {bytes_}; rows are {distance:.2g} gray levels off",
+        f"nearest: 32 x 32 stratified directions; {denominator}, {bytes_}; rows are {distance:.2g} gray levels off"
+        if distance <= ROWS
+        else f"how the directions are drawn cannot be told: the nearest known way is {distance:.0f} gray levels off",
     ]
 
 

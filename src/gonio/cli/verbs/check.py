@@ -41,7 +41,9 @@ class Judging(Options):
 def check(
     target: Annotated[
         str | None,
-        Argument(metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a picture, or a folder."),
+        Argument(
+            metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a shader, a picture, or a folder."
+        ),
     ] = None,
     model: Annotated[
         str | None,
@@ -54,6 +56,7 @@ def check(
     *,
     how: Judging,
     made: Material,
+    against: Annotated[str | None, Option(metavar="MODEL", help="The same as MODEL.")] = None,
     reference: Annotated[
         Path | None,
         Option(
@@ -78,6 +81,7 @@ def check(
       gonio check E.png schlick-ibl
       gonio check f.csv oren-nayar -p sigma=0.3 --up y
       gonio check mine.py:MyConductor conductor --preset Au -p alpha=0.3
+      gonio check mine.glsl --against "conductor(preset=Au,alpha=0.3)"
       gonio check picture.png --scene examples/phong
       gonio check submission --sheet hw4 --junit out.xml
       gonio check --reference values
@@ -90,8 +94,10 @@ def check(
         return
     if target is None:
         raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
-    work, against = _with_parameters(target, model, made)
-    result = judge(work, against, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
+    if model is not None and against is not None:
+        raise InputError(f"'{model}' and --against given", "--against", "name the model once")
+    work, right = _with_parameters(target, against if model is None else model, made)
+    result = judge(work, right, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
     _print(result, as_json)
     if result.exit_code:
         raise Exit(result.exit_code)
@@ -121,13 +127,14 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
 def _with_parameters(target: str, model: str | None, made: Material) -> tuple[str, str | None]:
     """The work, and the material to judge it by, both with the parameters that they have; or the name of a masking
     term."""
-    from ...catalog import outside
+    from ...catalog import outside, shaders
     from ...optics.masking import Masking
 
     if model is None or model in Masking.family.all():
         made.refuse(target if model is None else model)
         return target, model
-    if outside.names_code(target.partition("(")[0]):
+    name = target.partition("(")[0]
+    if outside.names_code(name) or shaders.names_shader(name):
         work, model = made.texts([target, model])
         return work, model
     return target, made.text(model)

@@ -1,0 +1,179 @@
+"""The model that values of f are judged by: what is asked for, with the parameters that the file itself names.
+
+    # model: oren-nayar(sigma=0.5)      a comment in the file
+    # up: y
+
+On the command line the user's settings prevail over the line's. In a folder the model and its terms (distribution,
+masking, Fresnel's kind) are the sheet's, and the line gives numbers only: a file must not choose what it is judged by.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..catalog import notation, operands
+from ..errors import GonioError, InputError
+from ..material import BSDF, tree
+from ..material.parameters import ChoiceParameter
+from .mistakes import f_of
+
+_COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
+_SAMPLING = "sampling"  # a choice that does not change f
+_EDGE = "edge"  # of `metal`: a number that replaces Schlick's F by another
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The material to judge by.
+
+    remark    what it was made of, in words; "" if the user named it completely
+    defaults  whether nobody named parameters, so that the file may have others
+    """
+
+    material: BSDF
+    remark: str = ""
+    defaults: bool = False
+
+
+class Line(NamedTuple):
+    """A model as the file's line names it: its class, and the settings by parameter."""
+
+    cls: type[BSDF]
+    settings: dict[str, object]
+
+
+class AnotherModelError(InputError):
+    """A file names another model, or other terms, than the sheet asks for."""
+
+
+def comments(path: Path) -> dict[str, str]:
+    """The file's "model" and "up", as far as it names them; nothing for a file that cannot be read."""
+    try:
+        return dict(_COMMENT.findall(path.read_text(encoding="utf-8-sig", errors="replace")))
+    except OSError:
+        return {}
+
+
+def for_command(path: Path, against: str | BSDF | None) -> Asked:
+    """The material of a command: the one that it names, with the line's settings where the command gives none; without
+    one, the line's. Raises InputError if neither names one."""
+    if isinstance(against, BSDF):
+        return Asked(against)
+    text = comments(path).get("model", "")
+    if not against:
+        if not text:
+            hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3, or a line '# model: oren-nayar(sigma=0.3)'"
+            raise InputError("no model to judge by", "MODEL", hint)
+        return Asked(notation.made(*_line(text, path.name))[0], f"judged by the file's line: {text}")
+    operands.kind_of(against, operands.MATERIALS, "MODEL")
+    cls, own = notation.taken_apart(against)
+    line: Line | None = None
+    with contextlib.suppress(InputError):
+        line = _line(text, path.name) if text else None
+    if line is not None and line.cls is cls and line.settings:
+        material = notation.build((cls, {**_without_preset(line, own), **own}))
+        return Asked(material, f"with the parameters of the file's line: {text}")
+    material = notation.build((cls, own))
+    if text and (line is None or line.cls is not cls):
+        return Asked(material, f"the file's line names {text}, and {cls.name} was asked for", not own)
+    return _with_defaults(material, own)
+
+
+def for_task(path: Path, models: tuple[str, ...]) -> Asked:
+    """The material of a sheet's task: its model and terms, with the parameters of the file's line.
+
+    models  forms of the same material, the usual one first
+    Raises AnotherModelError if the line names another model or other terms, and InputError if it cannot be read.
+    """
+    text = comments(path).get("model", "")
+    if not text:
+        cls, own = notation.taken_apart(models[0])
+        return _with_defaults(notation.build((cls, own)), {})
+    line = _line(text, path.name)
+    asked = next((one for one in map(notation.taken_apart, models) if one[0] is line.cls), None)
+    if asked is None:
+        name = notation.taken_apart(models[0])[0].name
+        raise AnotherModelError(f"the file names {line.cls.name}, and the task is {name}", path.name)
+    cls, own = asked
+    wanted = notation.build((cls, own))
+    given = notation.build((cls, {**_without_preset(Line(cls, own), line.settings), **line.settings}))
+    material = tree.replace(given, _terms(wanted, given, path.name))
+    return Asked(material, f"with the parameters of the file's line: {text}")
+
+
+def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) -> str:
+    """Why values of a material show nothing of its model: its parameters make it a simpler one; "" if they do not."""
+    f = f_of(material, wo, wi)
+    lit = f[f[:, 0] > 0.0]
+    if type(material).name != "lambert" and len(lit) and np.all(np.ptp(lit, axis=0) <= accuracy * lit.max(axis=0)):
+        return "with these parameters f is constant, as Lambert's"
+    simpler = {f"{path} alone": inner for path, inner in tree.walk(material) if path}
+    for path, inner in tree.walk(material):
+        fresnel = type(inner).parameters().get("fresnel")
+        if isinstance(fresnel, ChoiceParameter) and "one" in fresnel.choices:
+            simpler["F = 1"] = tree.replace(material, {tree.join(path, "fresnel"): "one"})
+    for words, other in simpler.items():
+        if np.allclose(f_of(other, wo, wi), f, rtol=accuracy, atol=0.0):
+            return f"with these parameters the values are those of {words}"
+    return ""
+
+
+def _line(text: str, where: str) -> Line:
+    """The model of a line. Raises InputError for code, which a file must not run, and for what is no material."""
+    if ".py" in text.lower():
+        raise InputError(f"'{text}' is code, which is not run from a file", where, "name a model of Gonio's")
+    try:
+        return Line(*notation.taken_apart(text, where))
+    except GonioError as error:
+        raise InputError(f"its line '# model:' cannot be used: {error.what}", where, error.hint) from None
+
+
+def _without_preset(line: Line, own: Mapping[str, object]) -> dict[str, object]:
+    """The settings of a line without those that a preset among the others gives, and without its preset if they give a
+    value of it."""
+    preset = line.cls.presets().get(str(own.get("preset", "")))
+    hidden = set(preset.values) if preset is not None else set()
+    return {name: value for name, value in line.settings.items() if name not in hidden}
+
+
+def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
+    """The choices of the material that is asked for, by path. Raises AnotherModelError if the given one has others, or
+    another material inside; inside, a default is not taken for a choice."""
+    inside = dict(tree.walk(given))
+    terms: dict[str, object] = {}
+    for path, inner in tree.walk(wanted):
+        other = inside.get(path)
+        if other is None or type(other) is not type(inner):
+            has = "missing" if other is None else other.name
+            what = f"{path} is {has}, and the task has {inner.name}"
+            raise AnotherModelError(f"the file names another model: {what}", where)
+        for name, parameter in type(inner).parameters().items():
+            if not (isinstance(parameter, ChoiceParameter) or name == _EDGE) or name == _SAMPLING:
+                continue
+            asked, given_one = getattr(inner, name), getattr(other, name)
+            if given_one != asked and (not path or given_one != parameter.default):
+                raise AnotherModelError(f"the file names {name}={given_one}, and the task has {name}={asked}", where)
+            terms[tree.join(path, name)] = asked
+    return terms
+
+
+def _with_defaults(material: BSDF, own: Mapping[str, object]) -> Asked:
+    """A material without the file's help; the remark lists its numbers if nobody gave any."""
+    numbers = {
+        name: getattr(material, name)
+        for name, parameter in type(material).parameters().items()
+        if parameter.kind in ("float", "spectrum", "alpha")
+    }
+    if own or not numbers:
+        return Asked(material)
+    name = type(material).name
+    values = ", ".join(f"{key}={notation.written(value)}" for key, value in numbers.items())
+    line = f"# model: {name}({next(iter(numbers))}=...)"
+    return Asked(material, f"judged with {values}; a line '{line}' in the file, or -p, names others", True)
