@@ -105,7 +105,7 @@ def for_task(path: Path, models: tuple[str, ...]) -> Asked:
     wanted = notation.build((cls, own))
     given = notation.build((cls, {**_without_preset(Line(cls, own), line.settings), **line.settings}))
     material = tree.replace(given, _terms(wanted, given, path.name))
-    return Asked(material, f"with the parameters of the file's line: {text}")
+    return Asked(material, "with the parameters of its line '# model:'")
 
 
 def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) -> str:
