@@ -27,3 +27,15 @@ def test_a_shader_is_judged_by_itself_or_by_its_adapter(tmp_path: Path, capsys: 
     assert "pi" in capsys.readouterr().out
     assert cli.run(["check", str(file), "lambert", "--against", "lambert"]) == 2
     assert "name the model once" in capsys.readouterr().err
+
+
+def test_the_function_of_a_shader_may_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.glsl"
+    other = BRDF.replace("BRDF(", "paint(").replace("FACTOR", "3.14159265").replace("uniform float albedo;", "")
+    file.write_text(BRDF.replace("FACTOR", "1.0") + other)
+    against = ["--against", "lambert(albedo=0.4)"]
+    assert cli.run(["check", str(file), *against, "-p", "albedo=0.4"]) == 1
+    assert cli.run(["check", f"{file}(albedo=0.4)", *against, "--function", "paint"]) == 0, capsys.readouterr()
+    assert cli.run(["check", str(file), *against, "--function", "none"]) == 2
+    assert "no function 'none'" in capsys.readouterr().err
+    assert cli.run(["check", "lambert", "lambert", "--function", "paint"]) == 2

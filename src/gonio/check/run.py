@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..catalog import notation, operands, outside, shaders
+from ..catalog import notation, operands, outside, shaders, texts
 from ..errors import InputError
 from ..files import check_file, write_whole
 from ..material import BSDF
@@ -28,6 +28,7 @@ class Work:
     tolerance: float | None = None
     allow_outside: bool = False
     allow_code: bool = False
+    function: str = ""
 
     @property
     def path(self) -> Path:
@@ -65,9 +66,18 @@ class Work:
 
 
 def _class(work: Work) -> Finding:
-    given = work.target if isinstance(work.target, BSDF) else notation.named(work.text)[0]
+    given = work.target if isinstance(work.target, BSDF) else _named(work)
     name = type(given).name if isinstance(work.target, BSDF) else notation.split(work.text)[0]
     return classes.check(name, given, work.model(), work.tolerance)
+
+
+def _named(work: Work) -> BSDF:
+    if not work.function:
+        return notation.named(work.text)[0]
+    head, own = notation.split(work.text)
+    if not shaders.names_shader(head):
+        raise InputError(f"--function given, and '{head}' is no shader", "--function", "leave it out")
+    return notation.made(shaders.class_of(head, function=work.function), texts.assignments(own))[0]
 
 
 def _rows(work: Work) -> Finding:
@@ -107,6 +117,7 @@ def check(
     tolerance: float | None = None,
     hide_solution: bool = False,
     junit: str | Path | None = None,
+    function: str = "",
     allow_outside: bool = False,
     allow_code: bool = False,
 ) -> Finding | Report:
@@ -126,13 +137,14 @@ def check(
     tolerance  relative difference of f that counts as equal; None is 2e-3 for rows, 1e-4 for a material
     hide_solution  leave out formulas and values of the solution
     junit      a file for the verdicts as JUnit XML
+    function   the function of a shader that is judged, in place of the one that its adapter names
     Returns a Finding, or for a folder a Report; both have `passed`, `exit_code` and `as_dict`.
     Raises InputError for work that cannot be read; in a folder that is a finding, and the others are judged.
     """
     if junit is not None:
         check_file(junit)
     place = None if scene is None else Path(scene)
-    result = _judge(Work(target, against, place, up, tolerance, allow_outside, allow_code), sheet)
+    result = _judge(Work(target, against, place, up, tolerance, allow_outside, allow_code, function), sheet)
     if hide_solution:
         result = result.without_solution()
     if junit is not None:

@@ -11,6 +11,7 @@ import keyword
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,13 +55,14 @@ def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:
     return material
 
 
-_classes: dict[tuple[str, str], tuple[object, type[BSDF]]] = {}
+_classes: dict[tuple[str, str, str], tuple[object, type[BSDF]]] = {}
 
 
-def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
+def class_of(text: str, inside: Path | None = None, function: str = "") -> type[BSDF]:
     """The class of a shader file.
 
-    inside  the folder in which the files that the adapter names must lie, None for any folder
+    inside    the folder in which the files that the adapter names must lie, None for any folder
+    function  the BRDF, in place of the one that the adapter names or that is guessed
     """
     path = Path(os.path.expanduser(text.strip())).absolute()
     adapter_file = next((one for one in (Path(f"{path}.toml"), path.with_suffix(".toml")) if one.is_file()), None)
@@ -68,10 +70,10 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
         stamp = tuple((one.stat().st_mtime_ns, one.stat().st_size) for one in (path, adapter_file) if one is not None)
     except (OSError, ValueError) as error:
         raise InputError(f"no file '{text}'", text, str(getattr(error, "strerror", "") or "")) from None
-    key = str(path), str(inside)
+    key = str(path), str(inside), function
     known = _classes.pop(key, None)
     if known is None or known[0] != stamp:
-        program = read(path, adapter_file, inside)
+        program = read(path, adapter_file, inside, function)
         known = stamp, _made(path, program, inside)
     _classes[key] = known
     while len(_classes) > MAX_CLASSES:
@@ -79,8 +81,8 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
     return known[1]
 
 
-def read(path: Path, adapter_file: Path | None, inside: Path | None = None) -> Program:
-    """The program of a file, with the adapter beside it or guesses."""
+def read(path: Path, adapter_file: Path | None, inside: Path | None = None, function: str = "") -> Program:
+    """The program of a file, with the adapter beside it or guesses; `function` as in `class_of`."""
     where = path.name
     if not path.is_file():
         raise InputError(f"'{path}' is no file", where)
@@ -100,6 +102,8 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None) -> P
         language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
         module = _compiled(text, where, language, adapter.defines, [path.parent, *folders])
+    if function and function != adapter.function:
+        adapter = replace(adapter, function=function, arguments=())
     textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
     return Program(module, adapter, textures, where)
 

@@ -34,6 +34,7 @@ class Judging(Options):
     hide_solution: Annotated[
         bool, Option("--hide-solution", help="Print where a mistake is, without formulas and values of the solution.")
     ] = False
+    function: Annotated[str, Option(metavar="NAME", help="The function of a shader that is judged.")] = ""
     junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
 
 
@@ -81,7 +82,7 @@ def check(
       gonio check E.png schlick-ibl
       gonio check f.csv oren-nayar -p sigma=0.3 --up y
       gonio check mine.py:MyConductor conductor --preset Au -p alpha=0.3
-      gonio check mine.glsl --against "conductor(preset=Au,alpha=0.3)"
+      gonio check mine.glsl --function BRDF --against "conductor(preset=Au,alpha=0.3)"
       gonio check picture.png --scene examples/phong
       gonio check submission --sheet hw4 --junit out.xml
       gonio check --reference values
