@@ -200,7 +200,7 @@ def test_naming_a_material_finds_no_tables(tmp_path: Path) -> None:
 def test_a_sum_stands_wherever_a_material_can(text: str, given: list[str], expected: str) -> None:
     assert same(notation.named(text, given)[0], notation.named(expected)[0])
     if given:  # the command line appends its options to the text
-        assert same(notation.named(options.Material(given).text(text))[0], notation.named(expected)[0])
+        assert same(notation.named(options.Material(param=given).text(text))[0], notation.named(expected)[0])
 
 
 def test_a_name_in_several_parts_of_a_sum_is_ambiguous() -> None:
