@@ -53,11 +53,11 @@ browser: .venv/installed
 # three processes on two cores, each with files of its own: a browser, a server or a child is often waited for
 PARALLEL := -n 3 --dist loadfile
 
-# formulas, tables, shader text, files and scenes, two cases of each test: what one runs while editing
+# formulas, tables, shader text, files and scenes, one case of each test, no long one: what one runs while editing
 UNIT := tests/bridge tests/catalog tests/energy tests/materials tests/measure tests/ops tests/optics tests/shaders \
 	tests/render/test_scene_build.py tests/render/test_scene_read.py tests/test_errors.py tests/test_imports.py
 check: .venv/installed
-	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow and not browser' --cases 2 $(UNIT)
+	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow and not browser and not long' --cases 1 $(UNIT)
 
 # lint and types run beside the tests
 test: .venv/installed browser

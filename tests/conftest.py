@@ -56,7 +56,7 @@ BROWSERS = {"chrome", "chromium", "page", "live", "homework_page"}  # fixtures t
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--cases N`: at most N cases of each test, evenly spaced; `make check` takes 2."""
+    """`--cases N`: at most N cases of each test, evenly spaced; `make check` takes 1."""
     parser.addoption("--cases", type=int, default=0, metavar="N", help="run at most N cases of each test")
 
 

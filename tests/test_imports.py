@@ -35,6 +35,7 @@ def imported(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     return (targets & known.keys()) - {name, "gonio"}  # the public list imports everything, for type checkers
 
 
+@pytest.mark.long
 def test_no_two_files_import_each_other() -> None:
     known = modules()
     graph = {name: imported(name, path, known) for name, path in known.items() if name != "gonio"}

@@ -39,6 +39,7 @@ def damage(path, how):
 DAMAGES = ["cut", "empty", "foreign", "flipped", "another's"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", DAMAGES)
 def test_a_damaged_array_is_rebuilt_with_a_warning(folder, how):
     first = cache.remember(("trial", 1), lambda: np.arange(300.0))
@@ -122,6 +123,7 @@ def test_every_package_that_a_table_depends_on_is_hashed():
     assert all(list((package / name).rglob("*.py")) for name in cache.PACKAGES)
 
 
+@pytest.mark.long
 def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):
     cache.formulas.cache_clear()
     first = cache.formulas()

@@ -14,6 +14,7 @@ WO, WI = random_directions(400, 311, upper=True), random_directions(400, 312, up
 COLOUR = (0.8, 0.5, 0.2)
 
 
+@pytest.mark.long
 def test_metal_is_ggx_with_schlicks_curve_of_the_base_colour() -> None:
     model = Disney2015(COLOUR, metallic=1.0, roughness=0.6, anisotropic=0.7, rotation=0.4)
     aspect = np.sqrt(1.0 - 0.9 * 0.7)  # Burley2012, and as it is in 2015

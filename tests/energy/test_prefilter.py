@@ -55,6 +55,7 @@ def by_brute_force(light, n, alpha, ndf="ggx", parts=8):
     return (between(light, parts) * weight[..., None]).sum((0, 1)) / weight.sum()
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("ndf", DENSITIES)
 def test_every_level_agrees_with_brute_force(ndf):
@@ -159,6 +160,7 @@ def sky(tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_baked_levels_are_written_read_back_and_drawn(sky, tmp_path, capsys):
     folder = tmp_path / "levels"
     words = ["bake", str(sky), "--lut", "prefiltered", "--levels", "3", "--ndf", "beckmann", "-o", str(folder)]

@@ -8,6 +8,7 @@ import pytest
 from gonio import cli
 
 
+@pytest.mark.long
 def test_bake_info_and_plot_work_together(tmp_path, capsys):
     folder = tmp_path / "t"
     assert cli.run(["bake", "ggx", "--resolution", "8", "-o", str(folder), "--json"]) == 0
@@ -18,6 +19,7 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
+@pytest.mark.long
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "words",

@@ -105,12 +105,14 @@ def test_a_guided_material_passes_every_law_of_sampling(material: go.BSDF) -> No
         assert report.passed, str(report)
 
 
+@pytest.mark.long
 def test_lobes_off_the_mirror_direction_are_found() -> None:
     for width in (0.02, 0.3):
         assert _relative_variance(Retro(width=width), _at(50.0))[1] < 0.02
     assert _relative_variance(Through(), _at(50.0))[1] < 0.02
 
 
+@pytest.mark.long
 def test_parameters_that_vary_over_the_surface_have_slices_of_their_own() -> None:
     rays = 3 * 4096
     alpha = np.tile([0.08, 0.3, 0.6], rays // 3)

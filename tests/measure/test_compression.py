@@ -19,6 +19,8 @@ from gonio.measure.tables.network import Network
 from gonio.shaders import bundle
 from gonio.verify import verify
 
+pytestmark = pytest.mark.long  # the files that it reads are made first
+
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_pictures() -> Iterator[None]:

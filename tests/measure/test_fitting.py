@@ -45,6 +45,7 @@ def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
     return np.array(found, float)
 
 
+@pytest.mark.long
 def test_a_metal_is_found_again_with_its_indices() -> None:
     found = fit(table(METAL), "conductor")
     known = truth(METAL, found.names)
@@ -63,6 +64,7 @@ def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> N
     assert np.all(ends[:, 0] >= 0.0) and np.all(ends[:3, 1] <= 1.0)
 
 
+@pytest.mark.long
 def test_a_sum_of_lobes_is_found_again() -> None:
     found = fit(table(PLASTIC), "lambert+ggx")
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.01)
@@ -104,6 +106,7 @@ def test_a_model_of_0_is_no_solution() -> None:
     assert dark > 100.0 * right
 
 
+@pytest.mark.long
 def test_negative_values_in_a_channel_are_counted_and_do_not_carry_the_others_away() -> None:
     cells = data.data_of(table(PLASTIC))
     value = cells.value.copy()
@@ -186,6 +189,7 @@ def test_parameters_that_are_held_stay() -> None:
     assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")
 
 
+@pytest.mark.long
 def test_a_parameter_more_must_earn_its_place() -> None:
     cells = data.data_of(table(go.Lambert((0.3, 0.2, 0.1))))
     plain, more = fit(cells, "lambert"), fit(cells, "lambert+ggx")
@@ -204,6 +208,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(material: go.BSDF, model:
     assert np.all((share >= 0.88) & (share <= 0.995)), share
 
 
+@pytest.mark.long
 def test_several_files_are_rows_and_a_bad_one_costs_only_its_own(tmp_path: Path) -> None:
     merl = format_of(tmp_path / "x.gonio")
     for name, material in (("a", PLASTIC), ("b", METAL)):

@@ -15,6 +15,8 @@ from gonio.measure.warp import Warp
 from gonio.ops import backend
 from gonio.verify import verify
 
+pytestmark = pytest.mark.long  # the files that it reads are made first
+
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:

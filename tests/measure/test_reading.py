@@ -23,6 +23,8 @@ from gonio.measure.tables import angles, half_difference, samples
 from gonio.measure.tables.base import Measurement
 from gonio.ops import Direction, Spectrum
 
+pytestmark = pytest.mark.long  # the files that it reads are made first
+
 
 class Stand(Measurement):
     """A material in the place of a measurement, to be tabulated."""

@@ -111,6 +111,7 @@ def test_samples_and_sampler_types(tmp_path):
     assert (description.spp, description.seed, description.sampler.preference) == (17, None, "sobol")
 
 
+@pytest.mark.long
 def test_every_model_is_a_type_and_the_lab_s_names_keep_their_meaning(tmp_path):
     from gonio.material import models
 
@@ -427,6 +428,7 @@ def test_override_path_that_leads_nowhere(tmp_path, path, what, hint):
 # ---------------------------------------------------------------------- the schema
 
 
+@pytest.mark.long
 def test_exported_schema_accepts_what_the_reader_accepts():
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(json.dumps(scene.json_schema()))
@@ -473,6 +475,7 @@ def places(data: Any, steps: tuple = ()) -> list[tuple]:
     return found
 
 
+@pytest.mark.long
 @settings(
     max_examples=400, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -537,6 +540,7 @@ def test_the_course_s_scenes_read_and_build_unmodified(shared):
         assert len(scene.build(description, engine.load()).shapes()) >= len(description.shapes)
 
 
+@pytest.mark.long
 def test_the_project_s_own_examples_read_and_are_small():
     files = sorted((REPOSITORY / "examples").glob("*/scene.json"))
     for file in files:

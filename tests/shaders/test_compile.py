@@ -124,6 +124,7 @@ def test_the_hlsl_compiler_refuses_what_is_wrong(tmp_path: Path) -> None:
     assert "unknown variable" in _glslang("float f() { return missing; }", tmp_path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
 def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
     for name in FEW:

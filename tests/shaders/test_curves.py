@@ -61,6 +61,7 @@ def test_fits_and_split_sums_compile(tmp_path: Path) -> None:
     assert [_glslang(text, tmp_path) for text in texts] == ["", ""]
 
 
+@pytest.mark.long
 def test_a_budget_chooses_the_most_exact_form() -> None:
     made, found = tiers.split_sum(GOLD, "glsl", budget=30)
     assert found[0].name == "a fit of order 2/0" and found[0].cost <= 30 and not made.tables

@@ -41,6 +41,7 @@ def test_inner_materials_have_switches_too() -> None:
     assert "b_varnish" in go.emit(mixed, functions=["eval"], lean=True)
 
 
+@pytest.mark.long
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("material", "share"),
@@ -62,6 +63,7 @@ def _whole(cls: type[go.BSDF]) -> str:
     return go.emit(cls())
 
 
+@pytest.mark.long
 def test_a_lean_mirrorless_surface_is_isotropic_and_opaque() -> None:
     manifest = bundle(go.OpenPBR(), lean=True).manifest
     assert manifest["isotropic"] and not manifest["transmits"]

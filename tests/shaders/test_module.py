@@ -36,6 +36,7 @@ def test_bundles_with_prefixes_share_no_name(lang: str) -> None:
     assert not a & b and all(name.startswith("a_") for name in a)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "wgsl"])
 def test_a_module_declares_each_name_once(lang: str) -> None:
     made = bundle(SEVERAL, lang, constants=True)

@@ -43,6 +43,7 @@ def test_code_whose_values_may_tell_x_from_y_is_not_isotropic(name: str) -> None
     assert not bundle(name, "glsl").manifest["isotropic"]
 
 
+@pytest.mark.long
 def test_the_manifest_tells_what_tables_were_found_from() -> None:
     fixed = {p["path"] for p in bundle("coat", "glsl").manifest["parameters"] if p["fixed"]}
     assert "base.alpha" in fixed and "depth" not in fixed
