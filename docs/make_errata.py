@@ -12,6 +12,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 from gonio import ops
+from book.generated import written
 
 PAGE = Path(__file__).parent / "errata.md"
 HEAD = """# Errata of the field
@@ -279,13 +280,7 @@ def section(title: str) -> str:
 def main() -> int:
     """Write or check the page; returns the exit code."""
     text = "\n".join([HEAD, *map(section, THREADS)])
-    if "--check" in sys.argv[1:]:
-        stale = PAGE.read_text(encoding="utf-8") != text
-        print(f"out of date: {PAGE}" if stale else f"{PAGE} is up to date")
-        return int(stale)
-    PAGE.write_text(text, encoding="utf-8")
-    print(PAGE)
-    return 0
+    return written(PAGE, text, "run this script")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import typer
+from book.generated import written
 from gonio.cli.app import app
 
 PAGE = Path(__file__).parent / "options.md"
@@ -35,14 +36,7 @@ class Row(NamedTuple):
 
 def main() -> int:
     """Write or check the page; returns the exit code."""
-    text = page()
-    if "--check" in sys.argv[1:]:
-        stale = not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text
-        print(f"out of date: {PAGE}; run `make docs`" if stale else f"{PAGE} is up to date")
-        return int(stale)
-    PAGE.write_text(text, encoding="utf-8")
-    print(PAGE)
-    return 0
+    return written(PAGE, page())
 
 
 def page() -> str:

@@ -6,11 +6,11 @@ python docs/make_scenes.py [--check]      --check writes nothing and fails where
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from gonio import scene
+from book.generated import written
 
 PAGE = Path(__file__).parent / "scenes.md"
 EXAMPLE = """\
@@ -79,14 +79,7 @@ UNIONS = {
 
 def main() -> int:
     """Write or check the page; returns the exit code."""
-    text = page(scene.json_schema())
-    if "--check" in sys.argv[1:]:
-        stale = not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text
-        print(f"out of date: {PAGE}; run `make docs`" if stale else f"{PAGE} is up to date")
-        return int(stale)
-    PAGE.write_text(text, encoding="utf-8")
-    print(PAGE)
-    return 0
+    return written(PAGE, page(scene.json_schema()))
 
 
 def page(schema: dict[str, Any]) -> str:

@@ -12,8 +12,8 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
+from gonio import garbage
 from gonio.transport import passes
-from gonio.work import garbage
 
 W = np.array([[0.0, 0.6, 0.8], [0.3, 0.0, 0.9539392]])
 

@@ -39,3 +39,11 @@ def test_the_function_of_a_shader_may_be_named(tmp_path: Path, capsys: pytest.Ca
     assert cli.run(["check", str(file), *against, "--function", "none"]) == 2
     assert "no function 'none'" in capsys.readouterr().err
     assert cli.run(["check", "lambert", "lambert", "--function", "paint"]) == 2
+
+
+def test_what_the_adapter_says_of_another_function_does_not_hold(tmp_path: Path) -> None:
+    file = tmp_path / "mine.glsl"
+    other = BRDF.replace("BRDF(", "paint(").replace("FACTOR", "3.14159265").replace("uniform float albedo;", "")
+    file.write_text(BRDF.replace("FACTOR", "1.0") + other)
+    (tmp_path / "mine.glsl.toml").write_text("cosine = true\n" + ADAPTER)
+    assert cli.run(["check", str(file), "--against", "lambert(albedo=0.5)", "--function", "paint"]) == 0

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import gonio as go
 import pytest
+from book import api, bibliography, errors, families, gallery, links, models, strips, text
 from gonio.viewer import page, stage
 
 import browser
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "docs"))
-from book import api, bibliography, errors, families, gallery, links, models, strips, text  # noqa: E402
 
 
 def test_every_page_is_a_chapter() -> None:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import gonio as go
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 from book import formulas
 
 # settings in which a model is its formula: Schlick's Fresnel, isotropic or not, without parts that the page leaves out

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +15,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def script() -> ModuleType:
-    sys.path.insert(0, str(DOCS))  # `book`
     spec = importlib.util.spec_from_file_location("make_record", DOCS / "make_record.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

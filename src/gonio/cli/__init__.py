@@ -21,16 +21,14 @@ __all__ = ["Verb", "main", "run", "verb"]
 
 def main(arguments: list[str] | None = None) -> None:
     """The `gonio` command."""
-    import gc
     import sys
 
+    from .. import garbage
     from . import signals, streams
 
     streams.prepare()
-    gc.disable()  # imports leave no garbage
-    with signals.at_once():
+    with signals.at_once(), garbage.paused():  # imports leave no garbage
         from . import app
-    gc.enable()
     with signals.as_exceptions() as ended:
         sys.exit(app.run(arguments, ended))
 

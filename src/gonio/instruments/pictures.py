@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files
+from .. import files, garbage
 from .. import scene as scenes
 from ..arguments import renamed
 from ..bridge import engine
@@ -36,7 +36,6 @@ from ..scene.derivatives import material_at, place_of
 from ..scene.schema import SceneDescription
 from ..transport.gradients import Along, Gradients
 from ..transport.integrators import Render, Settings
-from ..work import garbage
 
 Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20

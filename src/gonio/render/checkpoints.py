@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from .. import files
+from .. import files, garbage
 from ..errors import GonioError, InputError
 from ..transport.passes import Progress, Renders
-from ..work import garbage, kept
+from ..work import kept
 from ..work.kept import Arrays, Facts
 from .identity import check
 from .prepare import Prepared
@@ -153,7 +153,7 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
-        garbage.pause()  # until the thread has ended, see `work.garbage`
+        garbage.pause()  # until the thread has ended, see `gonio.garbage`
         self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 

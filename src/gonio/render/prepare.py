@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from .. import garbage
 from .._version import __version__
 from ..bridge import engine
 from ..errors import InputError, did_you_mean
@@ -18,7 +19,7 @@ from ..scene import mitsuba_scene
 from ..scene.film_size import check_film
 from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Renders
-from ..work import facts, garbage
+from ..work import facts
 from .identity import Sources
 from .request import MAX_SPP_UNTIL, Request
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import garbage
 from ..bridge.faults.denormal_numbers import denormals_rounded
 from ..bridge.types import Plugin, Scene
 from ..errors import InputError
-from ..work import garbage
 from .passes import power_of_two
 
 # Samples in flight of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.

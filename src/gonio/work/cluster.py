@@ -27,8 +27,9 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import garbage
 from ..errors import GonioError, GonioWarning, InputError, MachineError
-from . import executor, garbage, reachable
+from . import executor, reachable
 from .kept import Arrays
 
 if TYPE_CHECKING:

@@ -102,8 +102,8 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None, func
         language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
         module = _compiled(text, where, language, adapter.defines, [path.parent, *folders])
-    if function and function != adapter.function:
-        adapter = replace(adapter, function=function, arguments=())
+    if function and function != adapter.function:  # what the adapter says of another function does not hold
+        adapter = replace(adapter, function=function, arguments=(), cosine=None, pdf="", sample="")
     textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
     return Program(module, adapter, textures, where)
 

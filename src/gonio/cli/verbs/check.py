@@ -93,11 +93,7 @@ def check(
     if reference is not None:
         _write_reference(reference, target, made, as_json)
         return
-    if target is None:
-        raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
-    if model is not None and against is not None:
-        raise InputError(f"'{model}' and --against given", "--against", "name the model once")
-    work, right = _with_parameters(target, against if model is None else model, made)
+    work, right = _with_parameters(target, model, against, made)
     result = judge(work, right, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
     _print(result, as_json)
     if result.exit_code:
@@ -125,12 +121,19 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
     print(json.dumps({"files": written}) if as_json else "\n".join(written))
 
 
-def _with_parameters(target: str, model: str | None, made: Material) -> tuple[str, str | None]:
+def _with_parameters(
+    target: str | None, model: str | None, against: str | None, made: Material
+) -> tuple[str, str | None]:
     """The work, and the material to judge it by, both with the parameters that they have; or the name of a masking
     term."""
     from ...catalog import outside, shaders
     from ...optics.masking import Masking
 
+    if target is None:
+        raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
+    if model is not None and against is not None:
+        raise InputError(f"'{model}' and --against given", "--against", "name the model once")
+    model = against if model is None else model
     if model is None or model in Masking.family.all():
         made.refuse(target if model is None else model)
         return target, model

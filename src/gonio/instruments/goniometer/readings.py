@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import garbage
 from ...bridge import engine
 from ...catalog.notation import written
 from ...errors import InputError
 from ...material import BSDF
-from ...work import garbage
 from ..surfaces.base import Surface
 from . import rays
 from .specimen import GROUPS, Floats, Specimen, half_angle

@@ -17,6 +17,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import garbage
 from ...bridge import engine
 from ...bridge.faults.borrowed_memory import own
 from ...bridge.faults.denormal_numbers import denormals_rounded
@@ -24,7 +25,6 @@ from ...bridge.faults.interrupted_recording import interruptible
 from ...bridge.faults.merged_mesh_bbox import with_valid_bbox
 from ...bridge.types import Float, Scene, Sensor, UInt
 from ...errors import InputError
-from ...work import garbage
 from .. import sampler
 from ..scene_data import SceneData
 from ..sums import Sums
