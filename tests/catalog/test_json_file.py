@@ -221,3 +221,12 @@ def test_a_material_given_as_text_is_written_as_json(tmp_path: Path) -> None:
     with pytest.raises(go.InputError, match=r"'\.gltf' is not a format of materials"):
         go.convert(text, tmp_path / "gold.gltf")
     assert not (tmp_path / "gold.gltf").exists()
+
+
+def test_a_class_in_a_file_is_written_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "matte.py").write_text("import gonio as go\nclass Matte(go.Lambert):\n    pass\n")
+    go.convert(f"{tmp_path}/matte.py:Matte(albedo=0.25)", tmp_path / "matte.json")
+    assert json.loads((tmp_path / "matte.json").read_text()) == {
+        "type": f"{tmp_path}/matte.py:Matte",
+        "albedo": 0.25,
+    }

@@ -77,7 +77,7 @@ def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str
     what, hint = f"'{shown}' is {kinds[0].value}, {_expected(accepted)} expected", _TAKEN.get(kinds[0], "")
     if Kind.SCENE in kinds and (reason := _broken(Path(text))):
         what, where, hint = reason, text, "correct the file"
-    elif not _exists(Path(text)) and kinds[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
+    elif not _exists(Path(text)) and kinds[0] not in (Kind.NAME, Kind.CODE, Kind.PLUGIN, Kind.DISTRIBUTION):
         what, hint = f"no file or folder '{shown}'; {_expected(accepted)} expected", "check the path"
     raise InputError(what, where, hint)
 

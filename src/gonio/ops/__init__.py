@@ -13,9 +13,9 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Protocol, TypeVar, overload
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from . import graph
 from .backend import drjit, get_precision, in_formula, is_drjit, set_precision, types_like
 from .graph import ForbiddenOperator, Graph, Node, RecordingError, record
@@ -303,3 +303,14 @@ def max_component(spectrum: Spectrum) -> Scalar:
     if isinstance(spectrum, Node):
         return graph.emit("max_component", "float", spectrum)
     return drjit().max(spectrum, axis=0)
+
+
+if not TYPE_CHECKING:  # a type checker would accept every misspelt name
+    # in shaders and NumPy
+    _ELSEWHERE = {"max": "maximum", "min": "minimum", "select": "where", "length": "norm", "clip": "clamp"}
+
+    def __getattr__(name: str) -> object:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        hint = f"it is '{_ELSEWHERE[name]}' here" if name in _ELSEWHERE else did_you_mean(name, __all__)
+        raise AttributeError(f"gonio.ops has no '{name}'; {hint}")

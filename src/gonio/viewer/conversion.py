@@ -49,7 +49,7 @@ def convert(
         go.convert("gold.binary", "gold.bsdf").facts["error"]
 
     source    a picture, a file of measured values, one that describes a material (.gltf, .mtlx, .json), or a material
-              as a text, such as "openpbr(base_metalness=1)"
+              as a text, such as "openpbr(base_metalness=1)" or FILE.py:CLASS
     output    the file to write
     exposure  of a .png: stops, or "auto"
     phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
@@ -70,13 +70,13 @@ def converted(
     location: str = "source",
 ) -> Conversion:
     """As `convert`, without its warnings; `location` is the place of an error about the source."""
-    kind = operands.kind_of(source, {Kind.PICTURE, Kind.NAME, Kind.TABLE, Kind.DOCUMENT}, location)
+    kind = operands.kind_of(source, {Kind.PICTURE, Kind.NAME, Kind.CODE, Kind.TABLE, Kind.DOCUMENT}, location)
     if phi is not None and kind is not Kind.TABLE:
         raise InputError(f"{phi} given for {source}, which is not a table of measured values", "phi", "omit it")
     if kind is Kind.DOCUMENT:
         notices = documents.convert(source, output)
         return Conversion(output, str(output), notices, {"notices": notices})
-    if kind is Kind.NAME:
+    if kind in (Kind.NAME, Kind.CODE):
         documents.write(notation.as_json(as_material(source)), output)
         return Conversion(output, str(output))
     if kind is Kind.TABLE:
