@@ -57,6 +57,11 @@ def test_version_is_read_from_the_symbol_versions(library: Callable[..., Path], 
     assert llvm.read_version(library(version, "some.so")) == version
 
 
+def test_a_symbol_that_only_begins_like_a_version_is_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "some.so").write_bytes(b"\0LLVM_C_API\0" + bytes(50) + b"\0LLVM_19.1\0")
+    assert llvm.read_version(tmp_path / "some.so") == "19.1"
+
+
 @pytest.mark.parametrize("name, version", [
     ("libLLVM-18.so", "18"), ("libLLVM.so.19.1", "19.1"), ("libLLVM.dylib", ""), ("LLVM-C.dll", "")
 ])  # fmt: skip

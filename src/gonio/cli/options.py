@@ -3,7 +3,6 @@ takes as one parameter."""
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
@@ -74,8 +73,7 @@ class Options:
     """
 
     def __init__(self, **values: object) -> None:
-        fields = (name for one in reversed(type(self).__mro__) for name in inspect.get_annotations(one))
-        vars(self).update({name: getattr(self, name) for name in fields}, **values)
+        vars(self).update(values)
 
 
 class Material(Options):
