@@ -53,7 +53,7 @@ class Tuple(Matte):
 
 
 @pytest.mark.parametrize(
-    ("material", "text"), [(Function, "delta is a function"), (Vector, "delta is a vector"), (Tuple, "tuple returned")]
+    ("material", "text"), [(Function, "delta is a function"), (Vector, "delta is a vector"), (Tuple, "returned tuple")]
 )
 def test_another_result_is_an_error_that_says_what_to_return(material: type[go.BSDF], text: str) -> None:
     with pytest.raises(go.InputError, match=text) as caught:

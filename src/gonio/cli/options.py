@@ -68,8 +68,8 @@ Checkpoint = Annotated[
 class Options:
     """Base of a group of options: its annotated fields, each with a default.
 
-    It is used like a dataclass, without the methods that `dataclass` would generate and compile for each group: with
-    twelve groups, a tenth of the time of `gonio --help`.
+    It works like a dataclass, but no methods are generated and compiled for each group: for twelve groups this took a
+    tenth of the time of `gonio --help`.
     """
 
     def __init__(self, **values: object) -> None:

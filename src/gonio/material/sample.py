@@ -58,16 +58,19 @@ SampleArrays: TypeAlias = "Sample[Floats, Floats, Floats, NDArray[np.bool_]]"  #
 
 
 def checked(result: object, where: str) -> Sample:
-    """What `sample` of a material returned, with plain numbers and truth values in `pdf`, `delta` and `eta` as values
-    of each ray. Raises InputError for another type, and for `delta` that is no mask.
+    """Validate the result of a material's `sample`, and expand plain numbers and booleans in `pdf`, `delta` and `eta`
+    to one value per ray.
+
+    where  the method, for errors
+    Raises InputError if the result is not a Sample, or `delta` is not a mask.
     """
     if not isinstance(result, Sample):
-        what = f"{type(result).__name__} returned, go.Sample expected"
+        what = f"returned {type(result).__name__}, expected go.Sample"
         raise InputError(what, where, "return go.Sample(wi, weight, pdf, delta, eta)")
     delta = result.delta
     if callable(delta) or len(getattr(delta, "shape", ())) > 1:
-        what = f"delta is {'a function' if callable(delta) else 'a vector'}, one truth value per ray expected"
-        raise InputError(what, where, "where no sample comes from a delta lobe, give go.never(pdf)")
+        what = f"delta is {'a function' if callable(delta) else 'a vector'}, expected a mask with one value per ray"
+        raise InputError(what, where, "give go.never(pdf) if no sample comes from a delta lobe")
     like = result.wi.x
     if isinstance(delta, bool):
         result = result._replace(delta=like == like if delta else never(like))

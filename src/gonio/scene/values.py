@@ -91,7 +91,7 @@ def _docstrings(cls: type[Part]) -> dict[str, str]:
 
 @functools.cache
 def _documented(module: ModuleType) -> dict[str, dict[str, str]]:
-    """The docstrings of fields of each class of a module."""
+    """The docstrings of the fields in a module, by class and field."""
     classes: dict[str, dict[str, str]] = {}
     for node in ast.parse(inspect.getsource(module)).body:
         if not isinstance(node, ast.ClassDef):

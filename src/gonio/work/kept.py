@@ -105,7 +105,7 @@ def exists(path: Path) -> bool:
 
 
 def remove_damaged(path: Path) -> None:
-    """Remove the file if it is damaged and NAME.previous exists, whose place it would take with the next `write`."""
+    """Remove a damaged file if NAME.previous exists; the next `write` would replace that intact copy by it."""
     with contextlib.suppress(OSError):
         try:
             _read(path)
