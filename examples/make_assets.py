@@ -39,6 +39,44 @@ def bumps(size: int, across: int, height: float) -> np.ndarray:
     return (normal + 1) / 2
 
 
+def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.ndarray:
+    """Normal map of round dents over a sphere, (height, 2 height, 3), as a hammer leaves them; conventions of `bumps`.
+
+    A place lies in the dent whose center is nearest: its floor is a bowl, and bowls meet in ridges.
+    """
+    rng = np.random.default_rng(seed)
+    centers = rng.standard_normal((dents, 3))
+    centers /= np.linalg.norm(centers, axis=1, keepdims=True)
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
+    theta, phi = math.pi * v, 2.0 * math.pi * u
+    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    nearest = centers[np.argmax(place @ centers.T, axis=-1)]
+    away = place - nearest  # the slope of a bowl grows in proportion
+    east = np.stack([-np.sin(phi), np.cos(phi), np.zeros_like(phi)], -1)
+    steep = depth * dents**0.5
+    slope_u = steep * np.sum(away * east, -1)
+    slope_v = steep * np.sum(away * np.cross(place, east), -1)
+    normal = np.stack([-slope_u, -slope_v, np.ones_like(slope_u)], -1)
+    return (normal / np.linalg.norm(normal, axis=-1, keepdims=True) + 1) / 2
+
+
+def terrazzo(height: int, chips: int, seed: int) -> np.ndarray:
+    """Albedo of a floor of colored stone chips in cream cement, (height, 2 height, 3), for a sphere or a tile."""
+    rng = np.random.default_rng(seed)
+    centers = rng.standard_normal((chips, 3))
+    centers /= np.linalg.norm(centers, axis=1, keepdims=True)
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
+    theta, phi = math.pi * v, 2.0 * math.pi * u
+    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    near = np.sort(place @ centers.T, axis=-1)[..., -2:]
+    margin = np.arccos(np.clip(near[..., 0], -1, 1)) - np.arccos(np.clip(near[..., 1], -1, 1))
+    which = np.argmax(place @ centers.T, axis=-1)
+    stones = np.array([[0.62, 0.12, 0.06], [0.04, 0.16, 0.3], [0.75, 0.42, 0.1], [0.06, 0.28, 0.22], [0.12, 0.1, 0.1]])
+    color = stones[rng.integers(len(stones), size=chips)[which]]
+    gap = rng.uniform(0.25, 0.9, chips)[which] / chips**0.5
+    return np.where((margin > gap)[..., None], color, np.array([0.8, 0.74, 0.62]))
+
+
 def cloudy(size: int, seed: int, octaves: range) -> np.ndarray:
     """Smooth noise of a few octaves that tiles, contrast raised, 0 to 1."""
     rng = np.random.default_rng(seed)
@@ -57,9 +95,36 @@ def worn(size: int) -> np.ndarray:
     return np.repeat((0.1 + 0.5 * cloudy(size, 8, range(2, 6)))[..., None], 3, axis=2)
 
 
-def maria(size: int) -> np.ndarray:
-    """Albedo of a moon: dark plains in bright highlands, with 1 % of red more than of blue per level."""
-    level = np.rint((0.2 + 0.35 * cloudy(size, 11, range(2, 7))) * 96) / 96  # few levels, which compress well
+def maria(height: int) -> np.ndarray:
+    """Albedo of a moon, (height, 2 height, 3): dark plains in bright highlands, craters, rays about the youngest."""
+    rng = np.random.default_rng(11)
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
+    theta, phi = math.pi * v, 2.0 * math.pi * u
+    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+    def noise(rate: float, waves: int = 24) -> np.ndarray:
+        ways = rng.standard_normal((waves, 3)) * rate
+        return np.cos(place @ ways.T + rng.uniform(0, 2 * math.pi, waves)).sum(-1) / waves**0.5
+
+    detail = 0.25 * noise(9) + 0.2 * noise(19) + 0.12 * noise(40)
+    plains = 1 / (1 + np.exp(-9 * (noise(2.2) + detail - 0.15)))
+    level = 0.5 - 0.26 * plains + 0.05 * noise(30) * (1 - 0.6 * plains)
+    for k in range(340):
+        center = rng.standard_normal(3)
+        center /= np.linalg.norm(center)
+        radius = 0.012 * rng.uniform() ** -0.45
+        if k % 60 == 0:
+            radius = 0.045
+        near = place @ center > math.cos(min(9 * radius, 1.2))
+        away = np.arccos(np.clip(place[near] @ center, -1, 1)) / radius
+        level[near] *= 1 - 0.22 * (away < 0.85) + 0.3 * np.exp(-(((away - 1) / 0.16) ** 2))
+        if k % 60 == 0:  # rays of bright dust
+            axis = np.cross(center, [0.3, 0.5, 0.81])
+            axis /= np.linalg.norm(axis)
+            turn = np.arctan2(place[near] @ np.cross(center, axis), place[near] @ axis)
+            star = np.maximum(np.cos(7 * turn + 2 * np.sin(3 * turn)), 0) ** 6
+            level[near] += (0.1 + 0.28 * star) * np.exp(-away / 3.2) * (away > 0.9)
+    level = np.rint(np.clip(level, 0.1, 0.75) * 128) / 128  # few levels, which compress well
     return level[..., None] * np.array([1.0, 0.97, 0.92])
 
 
@@ -352,11 +417,13 @@ def main() -> None:
         png(f"{folder}/checker.png", checker(20, grey, white))
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
-    png("full-moon/maria.png", maria(256))
-    png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
+    png("textured/terrazzo.png", terrazzo(400, 260, 3))
+    png("full-moon/maria.png", maria(512))
+    png("pool-caustic/tiles.png", checker(24, (0.08, 0.4, 0.5), (0.32, 0.62, 0.68)))
     png("snells-window/sky.png", shore_sky(256))
     png("snells-window/tiles.png", checker(16, (0.03, 0.16, 0.2), (0.08, 0.3, 0.34)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
+    png("normal-map/hammered.png", hammered(384, 900, 5))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
     obj("diamond/brilliant.obj", *brilliant())
     way = np.linspace(0.0, 1.0, 121)

@@ -107,11 +107,32 @@ def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (1280, 640)
     down = np.radians(sun)
     away = np.degrees(np.arccos(way @ [0.0, -np.sin(down), np.cos(down)]))
     bow = np.stack([np.interp(away, angles, colours[:, channel]) for channel in range(3)], axis=2)
-    sky = np.array([0.035, 0.045, 0.075]) * (1.0 - 0.7 * way[..., 1:2]) + 2.3 * np.maximum(bow, 0.0)
-    # a field in the low sun, which fades into the haze of the horizon
-    haze = np.exp(20.0 * np.minimum(way[..., 1:2], 0.0))
-    ground = np.array([0.06, 0.055, 0.016]) * (1.0 - haze) + np.array([0.03, 0.034, 0.035]) * haze
-    return np.where(way[..., 1:2] > 0.0, sky, ground)
+    haze = np.exp(-7.0 * np.maximum(way[..., 1:2], 0.0))  # the air near the horizon, warm in the low sun
+    sky = np.array([0.04, 0.055, 0.1]) * (1.0 - 0.6 * way[..., 1:2]) + np.array([0.1, 0.075, 0.055]) * haze
+    sky += 4.0 * np.maximum(bow, 0.0)
+    ground = landscape(way)
+    return np.where(way[..., 1:2] > ridge(way[..., 0:1] / way[..., 2:3]), sky, ground)
+
+
+def ridge(across: Floats, seed: int = 4, height: float = 0.012) -> Floats:
+    """Height of the hills above the horizon, in the tangent of the angle, at tangents of the azimuth."""
+    rng = np.random.default_rng(seed)
+    waves = [(2.0**k, rng.uniform(0.0, 2.0 * np.pi), 1.7**-k) for k in range(1, 8)]
+    return np.asarray(height * (1.0 + sum(size * np.sin(rate * 1.3 * across + turn) for rate, turn, size in waves)))
+
+
+def landscape(way: Floats) -> Floats:
+    """Radiance of hills and fields lit by the low sun behind the viewer, for directions (..., 3)."""
+    down = np.maximum(-way[..., 1:2], 0.004)
+    across = way[..., 0:1] / way[..., 2:3]
+    depth = way[..., 2:3] / down  # how far away the plain is, in heights of the eye
+    stripes = np.floor(1.8 * np.log(depth) + 0.35 * np.sin(2.0 * across)) % 3.0
+    fields = np.array([[0.16, 0.13, 0.025], [0.075, 0.105, 0.02], [0.21, 0.16, 0.045]])[stripes[..., 0].astype(int)]
+    furrows = 1.0 + 0.12 * np.exp(-depth / 12.0) * np.sin(14.0 * across * depth)
+    air = np.exp(-0.012 * depth)
+    plain = fields * furrows * air + np.array([0.1, 0.095, 0.085]) * (1.0 - air)
+    woods = np.array([0.05, 0.062, 0.034]) + 0.4 * np.maximum(way[..., 1:2], 0.0)
+    return np.where(way[..., 1:2] < -0.004, plain, woods)
 
 
 def angles(rays: int = 400_000) -> list[float]:
