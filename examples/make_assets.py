@@ -29,20 +29,11 @@ def checker(cells: int, dark: tuple[float, ...], bright: tuple[float, ...]) -> n
     return np.where(odd[..., None] == 1, dark, bright)
 
 
-def bumps(size: int, across: int, height: float) -> np.ndarray:
-    """Normal map of round bumps. Tangent along u; bitangent = normal x tangent, which on a sphere points up (-v)."""
-    x, y = np.meshgrid(*[(np.arange(size) + 0.5) / size * across * 2 * math.pi] * 2)
-    slope_u = height * np.cos(x) * np.sin(y)
-    slope_v = height * np.sin(x) * np.cos(y)
-    normal = np.stack([-slope_u, slope_v, np.ones_like(x)], axis=-1)
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return (normal + 1) / 2
-
-
 def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.ndarray:
-    """Normal map of round dents over a sphere, (height, 2 height, 3), as a hammer leaves them; conventions of `bumps`.
+    """Normal map of round dents over a sphere, (height, 2 height, 3), as a hammer leaves them.
 
-    A place lies in the dent whose center is nearest: its floor is a bowl, and bowls meet in ridges.
+    A place lies in the dent whose center is nearest: its floor is a bowl, and bowls meet in ridges. Tangent along u;
+    bitangent = normal x tangent, which on a sphere points up (-v).
     """
     rng = np.random.default_rng(seed)
     centers = rng.standard_normal((dents, 3))
@@ -415,14 +406,12 @@ def main() -> None:
     grey, white = (0.25, 0.25, 0.25), (0.75, 0.75, 0.75)
     for folder in ("mirror-glass", "rough-dielectric", "shader-ball"):
         png(f"{folder}/checker.png", checker(20, grey, white))
-    png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
     png("textured/terrazzo.png", terrazzo(400, 260, 3))
     png("full-moon/maria.png", maria(512))
     png("pool-caustic/tiles.png", checker(24, (0.08, 0.4, 0.5), (0.32, 0.62, 0.68)))
     png("snells-window/sky.png", shore_sky(256))
     png("snells-window/tiles.png", checker(16, (0.03, 0.16, 0.2), (0.08, 0.3, 0.34)))
-    png("normal-map/bumps.png", bumps(256, 12, 0.7))
     png("normal-map/hammered.png", hammered(384, 900, 5))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
     obj("diamond/brilliant.obj", *brilliant())

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import gonio as go
+import numpy as np
+from gonio.measure.formats.own import Own
+from gonio.measure.tables import angles
 from gonio.viewer import manual, page, stage
 
 from . import formulas, strips
@@ -28,6 +31,10 @@ GROUPS = {
     "combined": "Composed of materials",
     "measured": "Measured",
 }
+# Layers that are off are left out of the first shader, so that the figure appears within a second in software WebGL.
+OPENINGS = {"openpbr": "openpbr(base_color=0.02,0.1,0.35,specular_roughness=0.3)"}
+BELOW = "The shader is the code below, run by your browser."
+WALKS = 256  # estimates in each cell of the table of a random model
 SYMBOLS = (
     "$n$ is the normal, $o$ the direction to the viewer (`wo`), $i$ the direction to the light (`wi`), "
     "$h$ the half vector, $r$ the light mirrored at $n$, $v = o$. $f$ is in 1/sr, without the cosine of `eval`."
@@ -42,19 +49,40 @@ def pages() -> dict[str, str | bytes]:
 
 
 def live() -> dict[str, str | bytes]:
-    """The page of `gonio view`, as one file without network, for each model that has shader code, in the studio."""
+    """The page of `gonio view`, as one file without network, for each model, in the studio."""
     made: dict[str, str | bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in go.models():
-            if has_shader(name):
-                path = page.export(opening(name), Path(folder) / f"{name}.html")
-                made[f"reference/live/live/{name}.html"] = path.read_bytes()
+            path = page.export(opening(name, Path(folder)), Path(folder) / f"{name}.html")
+            made[f"reference/live/live/{name}.html"] = path.read_bytes()
     return made
 
 
-def opening(name: str) -> stage.Stage:
-    """What the live page of a model shows first: the material of the sheet of all models, in the studio."""
-    return dataclasses.replace(stage.of_models([strips.all_models.material(name)]), lights=(stage.STUDIO,))
+def opening(name: str, folder: Path) -> stage.Stage:
+    """What the live page of a model shows first: the material of the sheet of all models, in the studio.
+
+    A random model, which has no shader code, is shown by its mean, beside Kulla-Conty and single scattering.
+    """
+    shown = go.material(OPENINGS[name]) if name in OPENINGS else strips.all_models.material(name)
+    rows = [shown]
+    if shown.stochastic:
+        rows = [averaged(shown, folder), go.KullaConty(base=shown.base), shown.base]
+    return dataclasses.replace(stage.of_models(rows), lights=(stage.STUDIO,))
+
+
+def averaged(model: go.BSDF, folder: Path, estimates: int = WALKS) -> go.Measured:
+    """The mean of many estimates of a random model's values, as a table; the file is written to the folder."""
+
+    def mean(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        many = dataclasses.replace(model, seed=np.repeat(np.arange(float(estimates)), len(wo)))
+        values = many.eval(np.tile(wo, (estimates, 1)), np.tile(wi, (estimates, 1)))
+        return np.asarray(values).reshape(estimates, len(wo), 3).mean(0)
+
+    table = angles.sampled(mean, 24, 37)
+    both = 0.5 * (table.values + table.values.swapaxes(0, 1))  # the model is reciprocal: half the variance
+    file = folder / f"{model.name}.gonio"
+    file.write_bytes(Own().write(angles.Angles((table.theta_i, table.theta_r, table.phi), both, title=model.name)))
+    return go.Measured(str(file))
 
 
 def operand(name: str) -> str:
@@ -63,11 +91,6 @@ def operand(name: str) -> str:
     inner = ["conductor"] if len(required) == 1 else ["lambert", "conductor"]
     given = ",".join(f"{key}={one}" for key, one in zip(required, inner, strict=False))
     return f"{name}({given})" if required else name
-
-
-def has_shader(name: str) -> bool:
-    """Whether a model can be emitted at its defaults."""
-    return _shader(name) is not None
 
 
 def first_line(model: type[go.BSDF]) -> str:
@@ -98,13 +121,14 @@ def _page(model: type[go.BSDF]) -> str:
         parts.append("The formula is set from an expression that a test evaluates against the model.")
     parts += ["## Parameters", _parameters(found)]
     shader = _shader(name)
-    if shader is not None:
-        frame = f'<iframe class="live" src="../../live/{name}.html" loading="lazy" title="{name}, live"></iframe>'
-        parts += [
-            "## Live",
-            "Turn the balls, open the lobe, move the sliders. The shader is the code below, run by your browser.",
-            f":::{{dropdown}} {name} in this page\n```{{raw}} html\n{frame}\n```\n:::",
-        ]
+    frame = f'<iframe class="live" src="../../live/{name}.html" loading="lazy" title="{name}, live"></iframe>'
+    table_shown = f"The shader reads a table of the model's mean, {WALKS} estimates in each cell"
+    parts += [
+        "## Live",
+        "Turn the balls, open the lobe, move the sliders. "
+        + (f"{table_shown}; below it are Kulla-Conty and the base." if model.stochastic else BELOW),
+        f":::{{dropdown}} {name} in this page\n```{{raw}} html\n{frame}\n```\n:::",
+    ]
     parts += ["## Use", _use(found), "## Laws", _laws(found)]
     if shader is not None:
         title = f'GLSL, `gonio emit "{operand(name)}" --lean`'

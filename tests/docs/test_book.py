@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import gonio as go
+import numpy as np
 import pytest
 from book import api, bibliography, errors, families, gallery, links, models, strips, text
 from gonio.shaders import bundle
@@ -93,18 +94,32 @@ def test_a_strip_shows_its_parameter() -> None:
     assert means == sorted(means) and means[-1] > 4.0 * means[0]
 
 
-def test_a_live_page_opens_with_color_in_the_studio() -> None:
-    opened = models.opening("conductor")
+def test_a_live_page_opens_with_color_in_the_studio(tmp_path: Path) -> None:
+    opened = models.opening("conductor", tmp_path)
     assert opened.lights == (stage.STUDIO,)
     assert opened.materials["m0"].bsdf.k == go.Conductor.preset("Au").k  # type: ignore[attr-defined]
     assert len(opened.rows[0].balls) == 5
 
 
 def test_a_material_of_a_file_has_a_live_page(tmp_path: Path) -> None:
-    opened = models.opening("measured")
+    opened = models.opening("measured", tmp_path)
     assert page.export(opened, tmp_path / "measured.html").stat().st_size > 1e5
     (parameter,) = bundle(opened.materials["m0"].bsdf, "glsl").manifest["parameters"]
     assert parameter["value"].endswith("examples/three-forms/rough-copper.gonio")
+
+
+def test_a_random_model_is_shown_by_its_mean(tmp_path: Path) -> None:
+    """Its table has the value of many other walks, and the albedo that Kulla-Conty restores to a white metal."""
+    white = go.material("conductor(alpha=0.6,fresnel=one)")
+    table = models.averaged(go.RandomWalk(base=white), tmp_path, estimates=64)
+    a = np.radians([[20.0], [50.0]])
+    wo, wi = [np.hstack([sign * np.sin(a), 0.0 * a, np.cos(a)]) for sign in (1.0, -0.4)]
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    count = 20_000
+    others = go.RandomWalk(base=white, seed=1000.0 + np.arange(2.0 * count))
+    expected = np.asarray(others.eval(np.tile(wo, (count, 1)), np.tile(wi, (count, 1)))).reshape(count, 2, 3).mean(0)
+    assert np.allclose(table.eval(wo, wi), expected, rtol=0.1)
+    assert abs(float(go.albedo(table, 0.7).value.mean()) - 1.0) < 0.03
 
 
 def test_docstrings_become_markdown() -> None:
