@@ -407,6 +407,8 @@ def main() -> None:
     for folder in ("mirror-glass", "rough-dielectric", "shader-ball"):
         png(f"{folder}/checker.png", checker(20, grey, white))
     png("textured/worn.png", worn(256))
+    png("all-models/dents.png", hammered(128, 160, 5))
+    png("all-models/heights.png", np.repeat(cloudy(128, 3, range(3, 5))[..., None], 3, axis=2))
     png("textured/terrazzo.png", terrazzo(400, 260, 3))
     png("full-moon/maria.png", maria(512))
     png("pool-caustic/tiles.png", checker(24, (0.08, 0.4, 0.5), (0.32, 0.62, 0.68)))
