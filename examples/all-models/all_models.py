@@ -74,7 +74,11 @@ def material(name: str) -> go.BSDF:
 def ball(name: str, size: int = 240, spp: int = 64) -> np.ndarray:
     """Its picture, linear."""
     return go.render(
-        HERE, overrides={"shapes.0.material": IMAGES.get(name) or material(name)}, size=(size, size), spp=spp, denoise=spp > 16
+        HERE,
+        overrides={"shapes.0.material": IMAGES.get(name) or material(name)},
+        size=(size, size),
+        spp=spp,
+        denoise=spp > 16,
     )
 
 
