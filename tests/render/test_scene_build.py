@@ -456,3 +456,19 @@ def test_shapes_and_lights_come_in_the_same_order_every_time() -> None:
         shapes = prepared.render.scene.shapes()  # type: ignore[attr-defined]
         orders.add(tuple((shape.id(), str(shape.bbox())) for shape in shapes))
     assert len(orders) == 1
+
+
+def test_a_fault_of_the_machine_within_a_material_keeps_its_kind(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mitsuba builds the material, whose table needs what is not there, and hands on text alone."""
+
+    def no_table(self: go.KullaConty) -> None:
+        raise go.MachineError("no LLVM 17 or newer found", "LLVM", "pip install karellen-llvm-core")
+
+    described = json.loads((scene / "scene.json").read_text())
+    metal = {"type": "conductor", "preset": "Au", "roughness": 0.5}
+    described["scene"]["shapes"][0]["material"] = {"type": "kulla-conty", "base": metal}
+    (scene / "scene.json").write_text(json.dumps(described))
+    monkeypatch.setattr(go.KullaConty, "derive", no_table)
+    with pytest.raises(go.MachineError, match="no LLVM 17") as raised:
+        go.render(scene)
+    assert (raised.value.where, raised.value.hint) == ("LLVM", "pip install karellen-llvm-core")

@@ -16,7 +16,7 @@ from ..bridge.faults.merged_mesh_bbox import compute_boxes
 from ..bridge.faults.shape_order import shape_key
 from ..bridge.types import BSDFPlugin, Plugin, PluginDict, Scene
 from ..catalog import documents
-from ..errors import GonioWarning, InputError
+from ..errors import GonioWarning, InputError, MachineError
 from ..material import Parameter
 from ..materials.combined.normal_map import slopes
 from ..pictures.images import RGB
@@ -29,8 +29,8 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-# The InputError of a material's plugin, whose text ends the traceback that Mitsuba hands on: its what and its hint.
-_RAISED = re.compile(r"\nInputError: [^\n]*?: ([^\n]+)\n  hint: ([^\n]+)\Z")
+# Gonio's error of a material's plugin, whose text ends the traceback that Mitsuba hands on: kind, where, what and hint.
+_RAISED = re.compile(r"\n(InputError|MachineError): ([^\n]*?): ([^\n]+)\n  hint: ([^\n]+)\Z")
 
 MERGE_FROM = 64  # number of materials of equal structure from which on they are merged into one BSDF
 
@@ -117,7 +117,10 @@ class _Builder:
         except RuntimeError as error:
             text = str(error).strip()
             if raised := _RAISED.search(text):
-                raise InputError(raised[1], self.description.where(where), raised[2]) from None
+                kind, at, what, hint = raised.groups()
+                if kind == "MachineError":  # whatever the scene says
+                    raise MachineError(what, at, hint) from None
+                raise InputError(what, self.description.where(where), hint) from None
             raise InputError(
                 f"Mitsuba refuses it: {text.splitlines()[-1][:200]}",
                 self.description.where(where),
