@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import sys
 from pathlib import Path
@@ -16,8 +17,10 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 PROGRAMS = {  # folder -> arguments of main that make it quick
     "broken-laws": {"size": 12, "spp": 1},
     "facets": {"size": 24},
+    "homework-rows": {"size": 24},
     "noisy-energy": {"resolution": 8},
     "phong-failures": {"size": 24},
+    "photographs": {},
 }
 
 
@@ -61,8 +64,9 @@ def test_every_law_with_a_broken_material_is_shown(monkeypatch: pytest.MonkeyPat
 def test_phong_s_failures_show(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each wrong ball differs from the one below it where the page says."""
     module = program("phong-failures", monkeypatch)
+    shaded = functools.partial(module.sheets.shaded, size=48, backdrop=0.0, oversampling=1)
     wrong, right = zip(
-        *[[module.sheets.shaded(ball, case[0], 48) for ball in (case[2], case[4])] for case in module.cases()],
+        *[[shaded(ball, case[0]) for ball in (case[2], case[4])] for case in module.cases()],
         strict=True,
     )
     lit = [(picture > 0.0).any(-1) for picture in right]
