@@ -24,7 +24,7 @@ SIZE = {"width": 1280, "height": 560}  # so wide that the bar of terms is whole
 TURNS, STILLS = 32, 10  # frames of the turning studio, and of the furnace
 MILLISECONDS = 110
 SAMPLES = 16  # per pixel, for smooth silhouettes; the split sum itself has no noise
-QUALITY = 90  # lower ones show blocks on the rough balls
+QUALITY = 95  # lower ones show blocks on the rough balls
 MAX_BYTES = 2_000_000
 
 
