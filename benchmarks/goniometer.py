@@ -134,16 +134,16 @@ def gaussian(folder: Path | None) -> None:
             lines(above, x, mine, points[k, :, 0], spread[k, :, 0], "measured, first bounce")
             above.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=11)
             above.set_xlabel("")
-            peak = max(y.max() for y in mine.values()) / 100.0
-            for (name, y), color, shape in zip(mine.items(), figures.PALETTE, "os", strict=False):
-                off, bars = (points[k, :, 0] - y) / peak, 2.0 * spread[k, :, 0] / peak
-                below.errorbar(x, off, bars, fmt=shape, ms=2.6, lw=0.8, color=color, label=name)
+            model = mine["Beckmann, smith-correlated"]
+            off, bars = points[k, :, 0] - model, 2.0 * spread[k, :, 0]
+            share = 100.0 / model.max()
+            below.errorbar(x, share * off, share * bars, fmt="o", ms=2.6, lw=0.8, color=figures.INK)
             below.axhline(0.0, color=figures.INK, lw=0.8)
             below.set_xlabel("angle of view [degrees]")
             below.set_ylim(-3.0, 3.0)
             below.grid(True)
         axes[0, 0].set_ylabel("f cos theta_r [1/sr]")
-        axes[1, 0].set_ylabel("measured - theory [% of the peak]")
+        axes[1, 0].set_ylabel("measured - correlated\n[% of the peak]")
         names = ["Beckmann, correlated", "Beckmann, separable", "measured, first bounce (bars: 2 standard errors)"]
         handles = axes[0, 0].get_legend_handles_labels()[0]
         figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize=10)
@@ -266,20 +266,21 @@ def later(folder: Path | None) -> None:
             axis.grid(True)
         last = axes.flat[3]
         for row, values in enumerate((ratio[0], own["bounce"][0], own["sheet"][0])):
-            shade, hatch = (1.0, 0.6, 0.25)[row], ("", "", "//")[row]
+            style = {"alpha": (1.0, 0.6, 0.25)[row], "hatch": ("", "", "//")[row], "edgecolor": figures.INK, "lw": 0.8}
             place = np.arange(3) + 0.27 * (row - 1)
-            last.bar(
-                place, values, 0.25, color=figures.CHANNELS, alpha=shade, hatch=hatch, edgecolor=figures.INK, lw=0.8
-            )
+            last.bar(place, values, 0.25, color=figures.CHANNELS, **style)
             words = ("measured", "bounce", "sheet")[row]
             for x_, value in zip(place, values, strict=True):
                 last.text(x_, value + 0.015, words, rotation=90, ha="center", va="bottom", fontsize=9)
         last.set_xticks(range(3), names)
-        last.set_ylim(0.0, 1.2)
+        last.set_ylim(0.0, 1.3)
         last.set_ylabel("light of gold over that of mirrors")
         last.set_title("color of later bounces, light at 0", fontsize=11)
         handles, words_ = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, words_, loc="outside lower center", ncols=3, fontsize=10)
+        order = (0, 3, 1, 4, 2, 5)  # a column for each color
+        figure.legend(
+            [handles[i] for i in order], [words_[i] for i in order], loc="outside lower center", ncols=3, fontsize=10
+        )
         figure.suptitle(f"Second and later bounces on a Gaussian surface of gold, alpha = {alpha:g}", fontsize=12)
         save(figure, folder, "goniometer-later.png")
 
