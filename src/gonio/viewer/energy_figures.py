@@ -174,7 +174,7 @@ def _compare(comparison: dict[str, Any], axes: Any) -> None:
             line = {
                 "color": colors[method],
                 "linestyle": ("-", (0, (6, 3)), (0, (3, 3)), (0, (1, 2)))[max(order - 1, 0) % 4],
-                "linewidth": (1.8, 4.5, 3.4, 2.4, 1.8)[min(order, 4)],
+                "linewidth": (1.8, 4.5, 3.4, 2.4, 2.6)[min(order, 4)],
             }
             style = walk if method == "random walk" else line
             axes[0, column].plot(roughness, value[:, middle].mean(-1), label=method, **style)

@@ -20,7 +20,7 @@ def draw(fit: PictureFit) -> Drawing:
 
     height, width = fit.wanted.shape[:2]
     with matplotlib.rc_context(figures.STYLE):
-        tall = 4.0 * min(max(height / width, 0.5), 1.5)
+        tall = 3.7 * min(max(height / width, 0.5), 1.5)
         figure = Figure(figsize=(8.6, 2.0 * tall + 1.6), layout="constrained")
         axes = figure.subplots(2, 2).ravel()
         stops = exposures.stops("auto", fit.wanted)
@@ -38,6 +38,7 @@ def draw(fit: PictureFit) -> Drawing:
         axes[3].semilogy(range(len(fit.losses)), fit.losses, color=figures.PALETTE[0], marker="o", markersize=3)
         axes[3].set_title("loss", fontsize=12)
         axes[3].set_xlabel("step")
+        axes[3].xaxis.get_major_locator().set_params(integer=True)
         axes[3].grid(True)
         axes[3].set_box_aspect(height / width)
         values = zip(fit.names, fit.values, fit.errors, strict=True)
