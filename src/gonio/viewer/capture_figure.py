@@ -68,8 +68,8 @@ def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
     picture[row, column] = predicted
     white = max(float(np.nanpercentile(shot.radiance, 99.5)), 1e-12)
     used = np.where(np.isfinite(picture), shot.radiance, np.nan)
-    _picture(axes[0], used, white, f"photograph {shot.name.rpartition('/')[2]}, pixels used")
-    _picture(axes[1], picture, white, "the fit to them")
+    _picture(axes[0], used, white, f"photograph: {shot.name.rpartition('/')[2]}")
+    _picture(axes[1], picture, white, "the fit to it")
     off = np.full(shot.radiance.shape[:2], np.nan)
     level = np.maximum(chosen.value.mean(axis=1), 1e-3 * white)
     off[row, column] = 100.0 * (predicted - chosen.value).mean(axis=1) / level

@@ -150,10 +150,10 @@ def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
         figure = Figure(figsize=(10.7, 7.2), layout="constrained")
         axes = figure.subplots(2, len(comparison["albedo"]), sharey="row", squeeze=False)
         _compare(comparison, axes)
-        found: dict[str, Any] = {}
+        entries: dict[str, Any] = {}
         for one in axes[0]:  # methods may apply to some materials only
-            found |= dict(zip(*reversed(one.get_legend_handles_labels()), strict=True))
-        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=4, fontsize=12)
+            entries |= dict(zip(*reversed(one.get_legend_handles_labels()), strict=True))
+        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=4, fontsize=12)
         picture = io.BytesIO()
         figure.savefig(picture, dpi=120, format="png", facecolor="white")
     numbers = json.dumps(comparison).encode()
