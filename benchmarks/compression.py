@@ -101,16 +101,22 @@ def curve() -> None:
 def draw(found: dict[str, list[tuple[float, float]]], path: Path) -> None:
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8.5, 5.3), layout="constrained")
     for title, points in found.items():
         x, y = zip(*sorted(points), strict=True)
         axes.loglog(x, [100.0 * value for value in y], "o-" if len(points) > 1 else "s", label=title, markersize=5)
     axes.axvline(GIVEN[0], color="0.7", linewidth=1, zorder=0)
     axes.axhline(100.0 * GIVEN[1], color="0.7", linewidth=1, zorder=0)
-    axes.text(GIVEN[0] * 1.06, 0.5, "16 KiB", color="0.4", transform=axes.get_xaxis_transform())
-    axes.set(xlabel="bytes a material", ylabel="relative error on a sphere, median [%]")
-    axes.set_title("Compressed 13 MERL tables and 9 RGL files", fontsize=10)
-    axes.legend(frameon=False)
+    axes.text(GIVEN[0] * 1.06, 0.5, "16 KiB", color="0.4", fontsize=12, transform=axes.get_xaxis_transform())
+    axes.text(0.99, 110.0 * GIVEN[1], "1 %", color="0.4", fontsize=12, ha="right", transform=axes.get_yaxis_transform())
+    ticks = [4096, 8192, 16384, 32768, 65536, 131072]
+    axes.set_xticks(ticks, [f"{tick // 1024} KiB" for tick in ticks], fontsize=11)
+    axes.minorticks_off()
+    axes.tick_params(labelsize=11)
+    axes.set_xlabel("size of a material", fontsize=12)
+    axes.set_ylabel("relative error on a sphere, median [%]", fontsize=12)
+    axes.set_title("Compressed 13 MERL tables and 9 RGL files", fontsize=13)
+    axes.legend(frameon=False, fontsize=12)
     figure.savefig(path, dpi=150)
 
 

@@ -83,6 +83,14 @@ def sheet(columns: int, height: float = 3.6) -> tuple[Figure, list]:
     return figure, list(figure.subplots(1, columns))
 
 
+def page(rows: int, columns: int, height: float) -> tuple[Figure, NDArray]:
+    """A figure as wide as a page of the documentation, 1,280 pixels."""
+    from matplotlib.figure import Figure as Sheet
+
+    figure = Sheet(figsize=(1280 / 150, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, sharex="col" if rows > 1 and columns == 3 else False)
+
+
 def lines(axis: object, x: Floats, theory: dict[str, Floats], points: Floats, error: Floats, label: str) -> None:
     for (name, y), dashes, colour in zip(theory.items(), ("-", figures.DASHES, ":"), figures.PALETTE, strict=False):
         axis.plot(x, y, linestyle=dashes, color=colour, lw=1.5, label=name)  # type: ignore[attr-defined]
@@ -117,17 +125,29 @@ def gaussian(folder: Path | None) -> None:
     for light, one, later, lost in zip(LIGHTS, found.first, found.later, found.lost, strict=True):
         print(f"    light {light:2.0f}: energy of all bounces {one + later:.6f}, first {one:.5f}, lost {lost:.1e}")
     with matplotlib.rc_context(figures.STYLE):
-        figure, axes = sheet(3)
+        figure, axes = page(2, 3, 5.6)
         x, points = slices(first)
         _, spread = slices(error)
         of_theory = {f"Beckmann, {name}": slices(values)[1] for name, values in theory.items()}
-        for k, axis in enumerate(axes):
+        for k, (above, below) in enumerate(axes.T):
             mine = {name: values[k, :, 0] for name, values in of_theory.items()}
-            lines(axis, x, mine, points[k, :, 0], spread[k, :, 0], "measured, first bounce")
-            axis.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=10)
-        axes[0].set_ylabel("f cos theta_r [1/sr]")
-        axes[2].legend(fontsize=7, loc="upper left")
-        figure.suptitle("A Gaussian surface of mirrors, alpha = .3, in the plane of incidence", fontsize=11)
+            lines(above, x, mine, points[k, :, 0], spread[k, :, 0], "measured, first bounce")
+            above.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=11)
+            above.set_xlabel("")
+            model = mine["Beckmann, smith-correlated"]
+            off, bars = points[k, :, 0] - model, 2.0 * spread[k, :, 0]
+            share = 100.0 / model.max()
+            below.errorbar(x, share * off, share * bars, fmt="o", ms=2.6, lw=0.8, color=figures.INK)
+            below.axhline(0.0, color=figures.INK, lw=0.8)
+            below.set_xlabel("angle of view [degrees]")
+            below.set_ylim(-3.0, 3.0)
+            below.grid(True)
+        axes[0, 0].set_ylabel("f cos theta_r [1/sr]")
+        axes[1, 0].set_ylabel("measured - correlated\n[% of the peak]")
+        names = ["Beckmann, correlated", "Beckmann, separable", "measured, first bounce (bars: 2 standard errors)"]
+        handles = axes[0, 0].get_legend_handles_labels()[0]
+        figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize=10)
+        figure.suptitle("A Gaussian surface of mirrors, alpha = 0.3, in the plane of incidence", fontsize=12)
         save(figure, folder, "goniometer-gaussian.png")
 
 
@@ -228,35 +248,40 @@ def later(folder: Path | None) -> None:
             f"{b[across, 0]:.3f} on both"
         )
     with matplotlib.rc_context(figures.STYLE):
-        figure, axes = sheet(4)
+        figure, axes = page(2, 2, 7.0)
         x, points = slices(intensity(rest["gold"]))
         _, spread = slices(intensity(found["gold"].table.beside["error"]))
-        spread = 2.0 * spread
         _, theory = slices(intensity(added["bounce"]))
-        for k, axis in enumerate(axes[:3]):
-            for channel, colour in enumerate(figures.CHANNELS):
-                label = {"label": "Kulla-Conty, bounce"} if channel == 0 else {}
-                axis.plot(x, theory[k, :, channel], color=colour, lw=1.5, **label)
-                label = {"label": "measured"} if channel == 0 else {}
-                points_, bars = points[k, :, channel], spread[k, :, channel]
-                axis.errorbar(x, points_, bars, fmt="o", ms=2.4, lw=0.7, color=colour, **label)
-            axis.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=10)
+        names = ("red", "green", "blue")
+        for k, axis in enumerate(axes.flat[:3]):
+            for channel, (colour, name) in enumerate(zip(figures.CHANNELS, names, strict=True)):
+                axis.plot(x, theory[k, :, channel], color=colour, lw=1.5, label=f"Kulla-Conty, {name}")
+                points_, bars = points[k, :, channel], 2.0 * spread[k, :, channel]
+                axis.errorbar(x, points_, bars, fmt="o", ms=2.8, lw=0.8, color=colour, label=f"measured, {name}")
+            axis.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=11)
             axis.set_xlabel("angle of view [degrees]")
+            axis.set_ylabel("f cos theta_r [1/sr]")
             axis.set_xlim(-90.0, 90.0)
             axis.set_ylim(bottom=0.0)
             axis.grid(True)
-        axes[0].set_ylabel("f cos theta_r of later bounces [1/sr]")
-        axes[0].legend(fontsize=7)
-        names = ("measured", "Kulla-Conty, bounce", "Kulla-Conty, sheet")
+        last = axes.flat[3]
         for row, values in enumerate((ratio[0], own["bounce"][0], own["sheet"][0])):
-            x_ = np.arange(3) + 0.27 * (row - 1)
-            shade = (1.0, 0.65, 0.35)[row]
-            axes[3].bar(x_, values, 0.24, color=figures.CHANNELS, alpha=shade, edgecolor=figures.INK, lw=0.6)
-            axes[3].text(x_[2], values[2] + 0.02, names[row], rotation=90, ha="center", va="bottom", fontsize=7)
-        axes[3].set_xticks(range(3), ["red", "green", "blue"])
-        axes[3].set_ylim(0.0, 1.0)
-        axes[3].set_title("gold over mirrors, light at 0", fontsize=10)
-        figure.suptitle(f"Second and later bounces on a Gaussian surface of gold, alpha = {alpha:g}", fontsize=11)
+            style = {"alpha": (1.0, 0.6, 0.25)[row], "hatch": ("", "", "//")[row], "edgecolor": figures.INK, "lw": 0.8}
+            place = np.arange(3) + 0.27 * (row - 1)
+            last.bar(place, values, 0.25, color=figures.CHANNELS, **style)
+            words = ("measured", "bounce", "sheet")[row]
+            for x_, value in zip(place, values, strict=True):
+                last.text(x_, value + 0.015, words, rotation=90, ha="center", va="bottom", fontsize=9)
+        last.set_xticks(range(3), names)
+        last.set_ylim(0.0, 1.3)
+        last.set_ylabel("light of gold over that of mirrors")
+        last.set_title("color of later bounces, light at 0", fontsize=11)
+        handles, words_ = axes[0, 0].get_legend_handles_labels()
+        order = (0, 3, 1, 4, 2, 5)  # a column for each color
+        figure.legend(
+            [handles[i] for i in order], [words_[i] for i in order], loc="outside lower center", ncols=3, fontsize=10
+        )
+        figure.suptitle(f"Second and later bounces on a Gaussian surface of gold, alpha = {alpha:g}", fontsize=12)
         save(figure, folder, "goniometer-later.png")
 
 

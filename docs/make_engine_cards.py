@@ -2,6 +2,7 @@
 
     python docs/make_engine_cards.py PACKAGES [--only three,...]     measure, store cards.json, write pages and pictures
     python docs/make_engine_cards.py [--check]                       the pages again from cards.json; --check: compare
+    python docs/make_engine_cards.py --pictures                      the pictures too
 
 PACKAGES is a folder with one folder per release, each with its package.json, such as three-0.185.1 and three-0.187.0:
 
@@ -28,6 +29,7 @@ from engine_cases.base import COSINES, ROUGHNESSES, Engine, furnace, material
 from gonio.catalog import shaders
 from gonio.verify.severity import percent
 from gonio.verify.verdict import Verdict
+from PIL import Image
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
@@ -248,7 +250,7 @@ def overview(stored: dict[str, Any]) -> str:
 def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
     """All furnaces of an engine: a row per furnace, a column per release; blue loses light, red gains it."""
     columns, rows = len(results), len(engine.furnaces)
-    figure, axes = plt.subplots(rows, columns, figsize=(5.2 * columns + 0.8, 2.75 * rows + 0.4), squeeze=False,
+    figure, axes = plt.subplots(rows, columns, figsize=(5.2 * columns + 0.8, 3.2 * rows + 0.4), squeeze=False,
                                 constrained_layout=True)  # fmt: skip
     image = None
     for across, (version, result) in enumerate(results.items()):
@@ -258,19 +260,22 @@ def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
             for y, row in enumerate(values):
                 for x, value in enumerate(row):
                     dark = abs(value - 1.0) > 0.32
-                    axis.text(x, y, f"{value:.2f}", ha="center", va="center", fontsize=8.5, color="w" if dark else "k")
-            axis.set_xticks(range(len(COSINES)), [f"{cosine:g}" for cosine in COSINES])
-            axis.set_yticks(range(len(ROUGHNESSES)), [f"{roughness:g}" for roughness in ROUGHNESSES])
-            axis.set_title(f"{one.title}\n{engine.title} {version}", fontsize=9.5)
-            axis.set_xlabel("n.v" if down == rows - 1 else "")
-            axis.set_ylabel("roughness" if across == 0 else "")
+                    axis.text(x, y, f"{value:.2f}", ha="center", va="center", fontsize=14, color="w" if dark else "k")
+            axis.set_xticks(range(len(COSINES)), [f"{cosine:g}" for cosine in COSINES], fontsize=13)
+            axis.set_yticks(range(len(ROUGHNESSES)), [f"{roughness:g}" for roughness in ROUGHNESSES], fontsize=13)
+            axis.set_title(f"{one.title}\n{engine.title} {version}", fontsize=14)
+            axis.set_xlabel("n.v", fontsize=14)
+            axis.set_ylabel("roughness", fontsize=14)
             axis.tick_params(length=0)
             for side in axis.spines.values():
                 side.set_visible(False)
     bar = figure.colorbar(image, ax=axes, shrink=0.6, aspect=40, pad=0.015, extend="both")
-    bar.set_label("albedo; 1 is meant")
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    bar.set_label("albedo; 1 is meant", fontsize=14)
+    bar.ax.tick_params(labelsize=13)
+    figure.savefig(path, dpi=114, metadata={"Software": None})
     plt.close(figure)
+    with Image.open(path) as drawn:
+        drawn.convert("RGB").quantize(256).save(path, optimize=True)  # a third of the bytes
 
 
 def written(stored: dict[str, Any]) -> dict[Path, str]:
@@ -285,6 +290,7 @@ def main() -> int:
     parser.add_argument("packages", nargs="?", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--check", action="store_true")
+    parser.add_argument("--pictures", action="store_true", help="draw the stored figures again")
     options = parser.parse_args()
     stored: dict[str, Any] = json.loads(STORED.read_text(encoding="utf-8")) if STORED.is_file() else {}
     if options.packages is not None:
@@ -298,6 +304,9 @@ def main() -> int:
     if options.check:
         print("\n".join(f"out of date: {path}" for path in stale) or "all pages are up to date")
         return int(bool(stale))
+    if options.pictures:
+        for name, results in stored.items():
+            picture(engines()[name], results, FOLDER / f"{name.rpartition('/')[2]}.png")
     for path, text in written(stored).items():
         path.write_text(text, encoding="utf-8")
     return 0

@@ -31,7 +31,9 @@ BRDF = Callable[[Array, Array], Array]
 
 THETA = np.array([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 88.0, 89.5])  # of the view, degrees
 POINTS = 4096  # of a rank-1 lattice, for each view: albedos to about a thousandth
-SIZE = 96  # pixels of a sphere
+SIZE = 96  # pixels of a sphere whose differences are stated
+BALL, OVERSAMPLING = 136, 3  # pixels of a sphere on a sheet, and samples along each side of one
+SHEETS = 2  # of spheres, each with a share of the materials
 LIGHTS = np.array([[-0.45, 0.55, 0.7], [0.9, 0.35, 0.25], [0.3, -0.75, -0.15]])  # key, rim, and from behind
 
 
@@ -89,9 +91,9 @@ def rusinkiewicz() -> tuple[Array, Array]:
     return unit(wo[above]), unit(wi[above])
 
 
-def sphere() -> tuple[Array, Array, Array]:
+def sphere(size: int) -> tuple[Array, Array, Array]:
     """(mask of the ball's pixels, wo and wi of each and each light in the surface's frame)."""
-    at = (np.arange(SIZE) + 0.5) / SIZE * 2.1 - 1.05
+    at = (np.arange(size) + 0.5) / size * 2.1 - 1.05
     x, y = np.meshgrid(at, -at)
     inside = x**2 + y**2 < 1.0
     n = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], -1)[inside]
@@ -128,7 +130,7 @@ def of(material: go.BSDF) -> BRDF:
 
 
 GRID = rusinkiewicz()
-INSIDE, EYE, TO_LIGHTS = sphere()
+_, EYE, TO_LIGHTS = sphere(SIZE)
 
 
 def card(name: str, fit: str) -> Card:
@@ -170,10 +172,20 @@ def mapped(brdf: BRDF) -> Array:
 
 def picture(brdf: BRDF) -> Array:
     """The sphere under three lights of irradiance pi, as sRGB values 0 to 1, (pixels of the ball, 3)."""
-    total = np.zeros((len(EYE), 3))
-    for wi in TO_LIGHTS:
+    return encoded(radiance(brdf, EYE, TO_LIGHTS))
+
+
+def radiance(brdf: BRDF, eye: Array, to_lights: Array) -> Array:
+    """Of the points of a sphere, by directions in their frames."""
+    total = np.zeros((len(eye), 3))
+    for wi in to_lights:
         lit = wi[:, 2] > 0.0
-        total[lit] += np.pi * brdf(EYE[lit], wi[lit]) * wi[lit, 2:]
+        total[lit] += np.pi * brdf(eye[lit], wi[lit]) * wi[lit, 2:]
+    return total
+
+
+def encoded(total: Array) -> Array:
+    """Linear sRGB as a screen wants it, 0 to 1."""
     total = np.clip(total, 0.0, 1.0)
     return np.where(total <= 0.0031308, 12.92 * total, 1.055 * total ** (1 / 2.4) - 0.055)
 
@@ -265,10 +277,15 @@ class Material(NamedTuple):
         return float(np.median([self.distance(a, b) for i, a in enumerate(fits) for b in fits[:i]]))
 
 
-def side_by_side(name: str, weights: dict[str, Array]) -> Material:
+def brdfs_of(name: str, weights: dict[str, Array]) -> dict[str, BRDF]:
     brdfs = {fit: of(go.material(name, fit)) for fit in library.fits(name)}
     if f"{name}/kernel0" in weights:
         brdfs["network"] = network(weights, name)
+    return brdfs
+
+
+def side_by_side(name: str, weights: dict[str, Array]) -> Material:
+    brdfs = brdfs_of(name, weights)
     return Material(name, {fit: mapped(f) for fit, f in brdfs.items()}, {fit: picture(f) for fit, f in brdfs.items()})
 
 
@@ -293,24 +310,36 @@ def figure_energy(cards: list[Card]) -> None:
     figure.savefig(FOLDER / "energy.svg", metadata={"Date": None})
 
 
-def figure_spheres(materials: list[Material]) -> None:
-    fits = [*library.published(), "network"]
-    figure = Figure(figsize=(1.02 * len(fits), 1.06 * len(materials) + 0.3), layout="constrained")
-    axes = figure.subplots(len(materials), len(fits), squeeze=False)
-    for row, material in enumerate(materials):
-        for column, fit in enumerate(fits):
-            axis = axes[row][column]
-            image = np.ones((SIZE, SIZE, 3))
-            if fit in material.pictures:
-                image[INSIDE] = material.pictures[fit]
-                axis.imshow(image)
-            axis.set(xticks=[], yticks=[])
-            axis.spines[:].set_visible(False)
-            if row == 0:
-                axis.set_title(fit.replace("/", "\n"), fontsize=5.5)
-            if column == 0:
-                axis.set_ylabel(material.name, fontsize=6)
-    figure.savefig(FOLDER / "spheres.jpg", dpi=150)
+def smooth_sphere(brdf: BRDF) -> Array:
+    """The sphere as sRGB values on white, (BALL, BALL, 3), each pixel the mean of some samples."""
+    inside, eye, to_lights = sphere(BALL * OVERSAMPLING)
+    fine = np.ones((*inside.shape, 3))
+    fine[inside] = np.clip(radiance(brdf, eye, to_lights), 0.0, 1.0)
+    return encoded(fine.reshape(BALL, OVERSAMPLING, BALL, OVERSAMPLING, 3).mean((1, 3)))
+
+
+def figure_spheres(path: Path, names: list[str], weights: dict[str, Array]) -> None:
+    """A sheet: a column for each material, the network's row above those of the fits."""
+    fits = ["network", *library.published()]
+    dpi, width, label, head = 100, 1280, 320, 112  # pixels
+    height = head + len(fits) * BALL + 4
+    figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
+    for column, name in enumerate(names):
+        left = label + column * (width - label) / len(names)
+        brdfs = brdfs_of(name, weights)
+        text = {"fontsize": 17.5, "ha": "center", "va": "center", "linespacing": 1.0}
+        figure.text((left + BALL / 2) / width, 1.0 - head / 2 / height, name.replace("-", "-\n"), **text)
+        for row, fit in enumerate(fits):
+            if fit in brdfs:
+                bottom = height - head - (row + 1) * BALL
+                axes = figure.add_axes((left / width, bottom / height, BALL / width, BALL / height))
+                axes.imshow(smooth_sphere(brdfs[fit]), interpolation="nearest")
+                axes.set_axis_off()
+    for row, fit in enumerate(fits):
+        middle = height - head - (row + 0.5) * BALL
+        words = "network\n(reference)" if fit == "network" else fit.replace("/", "\n")
+        figure.text(12 / width, middle / height, words, fontsize=20.0, va="center", linespacing=1.1)
+    figure.savefig(path, pil_kwargs={"quality": 88, "optimize": True, "progressive": True})
 
 
 def scales() -> str:
@@ -419,7 +448,8 @@ def main() -> None:
     (FOLDER / "cards.json").write_text("[\n" + ",\n".join(json.dumps(one) for one in kept) + "\n]\n")
     figure_energy(cards)
     order = sorted((m for m in materials if "network" in m.values), key=lambda m: -m.spread)
-    figure_spheres(order)
+    for number, names in enumerate(np.array_split([m.name for m in order], SHEETS), 1):
+        figure_spheres(FOLDER / f"spheres-{number}.jpg", [str(name) for name in names], weights)
     text = (HERE / "published-fits" / "template.txt").read_text()
     parts = {
         "COUNT": str(len(cards)),

@@ -5,6 +5,7 @@ python docs/make_thin_film.py          takes a minute; needs `tmm` (in the extra
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +19,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 HERE = Path(__file__).parent
+EXAMPLES = HERE.parent / "examples"
+sys.path.insert(0, str(EXAMPLES))
+import sheets  # noqa: E402
+
 Floats = NDArray[np.float64]
 
 NM = np.arange(380.0, 781.0, 5.0)
@@ -134,21 +139,25 @@ def picture(truth: Floats, models: dict[str, Floats]) -> None:
     figure.savefig(HERE / "images" / "thin-film.png", dpi=130)
 
 
-def balls() -> None:
-    """Titanium under its oxide, and the skin of a bubble, over the thickness."""
-    shown = (0, 25, 50, 100, 160, 220, 300, 450)
-    figure = Figure(figsize=(9.6, 2.9), layout="constrained")
-    axes = figure.subplots(2, len(shown))
-    for column, nm in enumerate(shown):
-        oxide = go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))
-        skin = go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=2.0 * nm)
-        for row, (material, thickness) in enumerate(((oxide, nm), (skin, 2 * nm))):
-            # a bubble is seen through, which takes a path of several segments
-            shown_ball = go.render(material, size=(160, 160), spp=64, integrator="path", max_depth=8, denoise=True)
-            axes[row, column].imshow(encoded(shown_ball))
-            axes[row, column].set_title(f"{thickness} nm", fontsize=8)
-            axes[row, column].axis("off")
-    figure.savefig(HERE / "images" / "films.jpg", dpi=130)
+def balls(size: int = 300, spp: int = 64) -> None:
+    """Titanium under its oxide, and the skin of a bubble, over the thickness, in the dark studio of all models."""
+    cells = []
+    for nm in (0, 25, 50, 100, 160, 220, 300, 450):
+        cells.append((nm, go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))))
+    for nm in (30, 60, 100, 200, 320, 440, 600, 900):
+        cells.append((nm, go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=float(nm))))
+
+    def ball(material: go.BSDF) -> Floats:
+        # a bubble is seen through, which takes a path of several segments
+        values = {"shapes.0.material": material}
+        return go.render(
+            EXAMPLES / "all-models", overrides=values, size=(size, size), spp=spp, integrator="path", max_depth=8,
+            denoise=True,
+        )  # fmt: skip
+
+    shown = [(f"{nm} nm", ball(material)) for nm, material in cells]
+    rows = ("titanium", "titanium", "bubble", "bubble")
+    sheets.draw(HERE / "images" / "films.jpg", shown, len(shown) // len(rows), rows=rows)
 
 
 def encoded(linear: Floats) -> Floats:

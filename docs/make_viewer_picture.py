@@ -22,6 +22,7 @@ SETTINGS = """() => gonio.setState((state) => {
   state.compare.mode = "wipe";
   state.compare.wipe = 0.5;
   state.dock.open = "lobe";
+  state.dock.height = 250;
   state.selection = { slot: 0, ball: 3 };
 })"""
 
@@ -29,13 +30,13 @@ SETTINGS = """() => gonio.setState((state) => {
 def main() -> None:
     engine.load()  # first of all: with an LLVM that works
     access = server.AccessControl("127.0.0.1")
-    one = server.Server(server.Application(stage.homework("Au"), access), "127.0.0.1", 0, quiet=True)
+    one = server.Server(server.Application(stage.opening(), access), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
     while not one.started:
         time.sleep(0.01)
     with browser.chromium() as chromium:
-        tab = chromium.new_page(viewport={"width": 1280, "height": 800})
+        tab = chromium.new_page(viewport={"width": 1280, "height": 720})
         tab.goto(one.url)
         while not tab.evaluate("window.gonio?.frames > 0"):
             time.sleep(0.1)

@@ -12,6 +12,7 @@ from typing import Any
 
 import gonio as go
 import numpy as np
+from gonio.pictures import images
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE.parents[1] / "tests")]
@@ -48,17 +49,21 @@ def ball(material: go.BSDF, size: int = 208, spp: int = 256) -> np.ndarray:
     )
 
 
-def main(size: int = 208, spp: int = 256) -> None:
+def visible(sound: np.ndarray, broken: np.ndarray) -> bool:
+    """Whether two pictures differ on a screen by more than 4 levels of 255, in the mean."""
+    one, other = (images.to_screen(picture).astype(float) for picture in (sound, broken))
+    return bool(np.abs(one - other).mean() > 4.0)
+
+
+def main(size: int = 420, spp: int = 256) -> None:
     cells = []
     for broken, values in SHOWN.items():
-        sound = twin(broken)
+        pair = [ball(kind(**values), size, spp) for kind in (twin(broken), broken)]
         words = re.findall(r"[A-Z][a-z]*", broken.__name__)
         mistake = " ".join(word.lower() if len(word) > 1 else word for word in words)
-        cells += [
-            ("sound", ball(sound(**values), size, spp)),
-            (f"{broken.caught_by}: {mistake}", ball(broken(**values), size, spp)),
-        ]
-    print(sheets.draw(PICTURE, cells, 6))
+        seen = "" if visible(*pair) else " (not visible)"
+        cells.append((f"{broken.caught_by}{seen}:\n{mistake}", np.hstack(pair)))
+    print(sheets.draw(PICTURE, cells, 3, names=("sound", "broken")))
 
 
 if __name__ == "__main__":

@@ -17,21 +17,20 @@ import sheets
 
 PICTURE = "facets.jpg"  # in the current folder
 LIGHT, VIEWER = np.array([-1.2, 0.95, 1.5]), np.array([0.0, 0.0, 2.6])  # near the ball, so that angles vary over it
-GOLD, BLUE, RED, GRAY = "#ffc24d", "#3f6fb5", "#a33b4f", "#6a6f78"
+GOLD, BLUE, RED, GRAY = "#ffc24d", "#6ea4ff", "#ff6b7d", "#8a9099"
+UNLIT = 0.008  # radiance of the side that no light reaches
 
 
 def local(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """View and light in the frames of a ball's normals, (N, 3) each, and the mask of its pixels, (size, size)."""
-    y, x = np.meshgrid(*[np.linspace(-1.02, 1.02, size)] * 2, indexing="ij")
+    y, x = np.meshgrid(*[np.linspace(-1.06, 1.06, size)] * 2, indexing="ij")
     inside = x**2 + y**2 < 1.0
     # the part of the ball that the viewer sees ends where n.VIEWER = 1
     z = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
     rim = 1.0 / VIEWER[2]
     n = np.stack([x * np.sqrt(1.0 - rim**2), -y * np.sqrt(1.0 - rim**2), rim + (1.0 - rim) * z], -1)[inside]
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    t = np.cross([0.0, 1.0, 0.0], n)
-    t /= np.linalg.norm(t, axis=1, keepdims=True)
-    frame = np.stack([t, np.cross(n, t), n], 1)
+    frame = sheets.tangent_frames(n)
 
     def toward(place: np.ndarray) -> np.ndarray:
         way = place - n
@@ -40,25 +39,25 @@ def local(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return toward(VIEWER), toward(LIGHT), inside
 
 
-def balls(size: int, alpha: float = 0.35) -> list[tuple[str, np.ndarray]]:
+def balls(size: int, alpha: float = 0.35, oversampling: int = 3) -> list[tuple[str, np.ndarray]]:
     """D, G, F and their product on a ball of gold, as linear pictures; D relative to its peak."""
     gold = go.Conductor.preset("Au", alpha=alpha)
-    wo, wi, inside = local(size)
+    wo, wi, inside = local(size * oversampling)
     d, g, f = (np.asarray(term).reshape(len(wo), -1) for term in gold.terms(wo, wi))
     lit = (wi[:, 2] > 0.0)[:, None]
     whole = np.asarray(gold.eval(wo, wi))
 
     def picture(values: np.ndarray) -> np.ndarray:
-        pixels = np.zeros((size, size, 3))
-        pixels[inside] = np.where(lit, values, 0.0)
-        return pixels
+        pixels = np.full((*inside.shape, 3), sheets.BACKDROP)
+        pixels[inside] = np.where(lit, values, UNLIT)
+        return sheets.averaged(pixels, oversampling)
 
     d = d * np.pi * alpha**2
     return [
-        ("D: how many facets face the half vector", picture(d * [1.0, 1.0, 1.0])),
-        ("G: the share that light and viewer see", picture(g * [1.0, 1.0, 1.0])),
-        ("F: what each reflects, here almost alike", picture(f)),
-        ("D G F / (4 n.o): gold", picture(1.6 * whole)),
+        ("D: facets that\nface h", picture(d * [1.0, 1.0, 1.0])),
+        ("G: share that\nboth see", picture(g * [1.0, 1.0, 1.0])),
+        ("F: reflected by\neach facet", picture(f)),
+        ("gold:\nD G F / (4 n.o)", picture(1.6 * whole)),
     ]
 
 
@@ -88,35 +87,41 @@ def section(axes: matplotlib.axes.Axes) -> None:
     mirror = (np.abs(tilt - half) < np.radians(9.0)) & ~dark & ~masked
     colors = np.where(mirror, GOLD, np.where(dark, BLUE, np.where(masked, RED, GRAY)))
     lines = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
-    axes.fill_between(x, y, -1.2, color="#15171c")
-    axes.add_collection(LineCollection(list(lines), colors=list(colors), linewidths=3.0, capstyle="round"))
+    axes.fill_between(x, y, -2.0, color="#24272d")
+    axes.add_collection(LineCollection(list(lines), colors=list(colors), linewidths=4.5, capstyle="round"))
     first = np.flatnonzero(mirror & ~np.roll(mirror, 1))
-    for place in first[::2]:
+    for place in first[(middle[0][first] > 1.0) & (middle[0][first] < 11.5)][::3]:
         start = np.array([middle[0][place], middle[1][place]])
-        for angle, shade in ((-55.0, "#fff3c4"), (40.0, GOLD)):
-            end = start + 2.4 * np.array([np.sin(np.radians(angle)), np.cos(np.radians(angle))])
-            axes.plot(*zip(start, end, strict=True), color=shade, lw=0.7, alpha=0.55)
-    axes.set(xlim=(0.0, 12.8), ylim=(-0.7, 2.0))
-    words = (
-        ("toward the half vector (D)", GOLD),
-        ("in the light's shadow (G)", BLUE),
-        ("hidden from the viewer (G)", RED),
-    )
-    for number, (text, color) in enumerate(words):
-        axes.text(0.2 + 4.3 * number, -0.6, text, color=color, fontsize=10)
+        for angle, shade, arrow in ((-55.0, "#fff3c4", "<|-"), (40.0, GOLD, "-|>")):
+            end = start + 1.9 * np.array([np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+            style = {"arrowstyle": arrow, "color": shade, "lw": 1.6, "mutation_scale": 16, "shrinkA": 3, "shrinkB": 0}
+            axes.annotate("", end, start, arrowprops=style)
+    axes.set(xlim=(0.0, 12.8), ylim=(-1.35, 2.05))
+    words = ((0.2, "facing h (D)", GOLD), (3.6, "light is blocked (G)", BLUE), (8.2, "viewer is blocked (G)", RED))
+    for left, text, color in words:
+        axes.text(left, -1.15, text, color=color, fontsize=sheets.POINTS)
+    axes.text(0.2, 1.65, "from the light", color="#fff3c4", fontsize=sheets.POINTS)
+    axes.text(12.6, 1.65, "to the viewer", color=GOLD, fontsize=sheets.POINTS, ha="right")
     axes.set_axis_off()
 
 
-def main(size: int = 316) -> None:
-    figure = Figure(figsize=(sheets.WIDTH / sheets.DPI, 6.2), facecolor="#0b0c0f", dpi=sheets.DPI)
-    for number, (title, picture) in enumerate(balls(size)):
-        axes = figure.add_axes((number / 4 + 0.005, 0.46, 0.24, 0.5))
+def main(size: int = 305) -> None:
+    cells = balls(size)
+    side, low = 3.05, 3.4  # inches: of a ball's picture, of the section
+    height = low + side + 2.2 * sheets.LINE + 0.1
+    width = sheets.WIDTH / sheets.DPI
+    figure = Figure(figsize=(width, height), facecolor=sheets.BACKGROUND, dpi=sheets.DPI)
+    for number, (title, picture) in enumerate(cells):
+        left = (width - 4 * side) / 5 * (number + 1) + side * number
+        axes = figure.add_axes((left / width, (low + 0.1) / height, side / width, side / height))
         axes.imshow(images.to_screen(picture), interpolation="lanczos")
         axes.set_axis_off()
-        figure.text(number / 4 + 0.125, 0.965, title, color=sheets.TEXT, fontsize=9.5, ha="center", va="center")
-    section(figure.add_axes((0.0, 0.0, 1.0, 0.44)))
-    figure.savefig(PICTURE, pil_kwargs={"quality": 88, "optimize": True, "progressive": True})
-    print(PICTURE)
+        for above, line in enumerate(reversed(title.split("\n"))):
+            base = low + 0.1 + side + (above + 0.33) * sheets.LINE
+            place = (left + side / 2) / width, base / height
+            figure.text(*place, line, color=sheets.TEXT, fontsize=sheets.POINTS, ha="center")
+    section(figure.add_axes((0.0, 0.0, 1.0, low / height)))
+    print(sheets.save(figure, PICTURE))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from make_phong_limits import EvenPower, NoHorizon  # noqa: E402
 
 PICTURE = "failures.jpg"  # in the current folder
 BODY = (0.06, 0.13, 0.3)
-FRONT, SIDE, BEHIND = (-0.5, 0.45, 0.75), (-0.65, 0.3, -0.7), (0.35, 0.5, -0.75)  # toward the light
+FRONT, SIDE, BEHIND = (-0.5, 0.45, 0.75), (-0.75, 0.45, -0.45), (0.45, 0.55, -0.65)  # toward the light
 
 
 def normalized(ks: float, p: float) -> go.BSDF:
@@ -32,20 +32,20 @@ def cases() -> list[tuple[tuple[float, float, float], str, go.BSDF, str, go.BSDF
     phong = functools.partial(go.Phong, kd=BODY)
     even, through = EvenPower(kd=BODY, ks=0.6, p=4.0), NoHorizon(kd=BODY, ks=0.6, p=6.0)
     return [
-        (FRONT, "(v.r)^4 without max(0, ...)", even, "with max(0, v.r)", phong(ks=0.6, p=4.0)),
-        (BEHIND, "no test of n.l: light from behind", through, "0 where n.l < 0", phong(ks=0.6, p=6.0)),
-        (FRONT, "ks = 1, p = 1: 3 times the light", phong(ks=1.0, p=1.0), "normalized, ks = 0.5", normalized(0.5, 1.0)),
-        (SIDE, "no n.l: a hard terminator", phong(ks=0.6, p=3.0), "with n.l", normalized(0.5, 3.0)),
-        (FRONT, "p = 0.5: an edge at v.r = 0", phong(ks=0.4, p=0.5), "p = 4", phong(ks=0.4, p=4.0)),
+        (FRONT, "(v.r)^4 without\nmax(0, v.r)", even, "(max(0, v.r))^4", phong(ks=0.6, p=4.0)),
+        (BEHIND, "no test of n.l:\nshines through", through, "0 if n.l < 0", phong(ks=0.6, p=6.0)),
+        (FRONT, "ks = 1, p = 2:\ntwice the light", phong(ks=1.0, p=2.0), "normalized", normalized(0.5, 2.0)),
+        (SIDE, "no n.l: a hard\nterminator", phong(ks=0.7, p=2.0), "with n.l", normalized(0.7, 2.0)),
+        (FRONT, "p = 0.5: edge\nat v.r = 0", phong(ks=0.4, p=0.5), "p = 4", phong(ks=0.4, p=4.0)),
     ]
 
 
-def main(size: int = 250) -> None:
+def main(size: int = 240) -> None:
     wrong, right = [], []
     for light, title, failing, words, sound in cases():
         wrong.append((title, sheets.shaded(failing, light, size)))
         right.append((words, sheets.shaded(sound, light, size)))
-    print(sheets.draw(PICTURE, [*wrong, *right], len(wrong)))
+    print(sheets.draw(PICTURE, [*wrong, *right], len(wrong), rows=("wrong", "mended")))
 
 
 if __name__ == "__main__":

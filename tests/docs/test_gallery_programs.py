@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
+import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -16,8 +18,10 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 PROGRAMS = {  # folder -> arguments of main that make it quick
     "broken-laws": {"size": 12, "spp": 1},
     "facets": {"size": 24},
+    "homework-rows": {"size": 24},
     "noisy-energy": {"resolution": 8},
     "phong-failures": {"size": 24},
+    "photographs": {},
 }
 
 
@@ -61,8 +65,9 @@ def test_every_law_with_a_broken_material_is_shown(monkeypatch: pytest.MonkeyPat
 def test_phong_s_failures_show(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each wrong ball differs from the one below it where the page says."""
     module = program("phong-failures", monkeypatch)
+    shaded = functools.partial(module.sheets.shaded, size=48, backdrop=0.0, oversampling=1)
     wrong, right = zip(
-        *[[module.sheets.shaded(ball, case[0], 48) for ball in (case[2], case[4])] for case in module.cases()],
+        *[[shaded(ball, case[0]) for ball in (case[2], case[4])] for case in module.cases()],
         strict=True,
     )
     lit = [(picture > 0.0).any(-1) for picture in right]
@@ -89,3 +94,39 @@ def test_the_noise_of_the_tables_falls_as_their_titles_say(monkeypatch: pytest.M
         for n in (64, 1024)
     )
     assert 3.0 < few / many < 5.3  # sqrt(16) = 4
+
+
+def test_pairs_that_look_alike_are_named_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = program("broken-laws", monkeypatch)
+    gray = np.full((8, 8, 3), 0.2, np.float32)
+    assert not module.visible(gray, gray * 1.01)
+    assert module.visible(gray, gray * 1.2)
+
+
+def test_arrows_point_from_the_lamps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Angles and sides as examples/make_assets.py places the lamps; the ball is as large as its pixels say."""
+    module = program("photographs", monkeypatch)
+    calibration = json.loads((EXAMPLES / "photographs" / "calibration.json").read_text())
+    lamps = module.lamp_angles(calibration)
+    assert {name: round(angle) for name, (angle, _) in lamps.items()} == {
+        "right": 20,
+        "below": 50,
+        "left": 80,
+        "above": 35,
+    }
+    assert (
+        lamps["right"][1][0] > 0.9
+        and lamps["below"][1][1] > 0.9
+        and lamps["left"][1][0] < -0.5
+        and lamps["above"][1][1] < -0.5
+    )
+    middle, radius = module.outline(calibration, 96)
+    y, x = np.nonzero(matplotlib.image.imread(EXAMPLES / "photographs" / "right.png")[..., 0] > 0.2)
+    distance = np.hypot(x - middle[0], y - middle[1])
+    assert radius - 2.0 < distance.max() < radius + 1.5
+
+
+def test_titles_fit_their_cells_in_one_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sheets = program("phong-failures", monkeypatch).sheets
+    assert sheets.fitting(["short"], 4.0) == sheets.POINTS
+    assert 0.0 < sheets.fitting(["short", "a very long title that no cell can hold"], 1.0) < 0.5 * sheets.POINTS

@@ -92,12 +92,12 @@ def test_the_page_of_three_js_draws_what_gonio_says(chromium: Any, tmp_path: Pat
         n = eye + (middle - np.sqrt(middle**2 - eye @ eye + 1.0)) * ray
         t = np.cross([0.3, 1.0, 0.2], n)
         local = np.stack([t / np.linalg.norm(t), np.cross(n, t / np.linalg.norm(t)), n])
-        phi = np.arange(24) * 2.0 * np.pi / 24
-        low = np.arange(24) % 6 < 3
-        toward = np.stack([np.cos(phi), np.where(low, 0.4, 1.5), np.sin(phi)], -1)
+        phi = np.arange(24) // 2 * 2.0 * np.pi / 12
+        bright = np.arange(24) % 2 == 0
+        toward = np.stack([np.cos(phi), np.sin(phi) + 0.2, np.where(bright, 0.6, -0.5)], -1)
         toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
         values = material.eval(np.broadcast_to(local @ -ray, toward.shape), toward @ local.T)
-        linear = np.sum(np.where(low, 0.09, 0.3)[:, None] * np.asarray(values), axis=0)
+        linear = np.sum(np.where(bright, 0.25, 0.1)[:, None] * np.asarray(values), axis=0)
         shown = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         assert np.abs(drawn[int(y), int(x)] - np.clip(shown, 0.0, 1.0)).max() < 2.5 / 255.0
 

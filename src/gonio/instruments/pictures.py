@@ -41,6 +41,7 @@ Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20
 DARK = 0.05  # of the median brightness: residuals are absolute below, relative above
 TILE = 8  # pixels: errors within a tile are correlated
+SHOWN = 16  # samples of the picture that is shown over those of a step, so that its noise hides no difference
 OTHER = 0x9E3779B9  # XOR mask between the seeds of picture and derivatives
 DEEPEST = 8  # segments of paths if the scene sets no depth
 
@@ -307,7 +308,7 @@ def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: flo
     tile = (row * (-(-width // TILE)) + column).ravel()
     sure = certainty(*information(problem.linearized(numbers), tile, problem.count))
     names = tuple(name for one in problem.free for name in one.names)
-    shown = problem.render(numbers)
+    shown = problem.render(numbers, SHOWN * problem.spp)
     materials, at = {}, 0
     for target in problem.targets:
         count = sum(one.count for one in target.moving)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from typing import TYPE_CHECKING
 
@@ -41,11 +42,17 @@ def draw(capture: Capture) -> Drawing:
             _photograph(last[0], shot, "photograph")
         _values(last[1], capture)
         _errors(last[2], capture)
-        title = capture.fit.text if capture.fitted is not None else f"{len(capture.samples.count)} samples"
-        figure.suptitle("\n".join(textwrap.wrap(title, 130)[:3]), fontsize=9)
+        title = _rounded(capture.fit.text) if capture.fitted is not None else f"{len(capture.samples.count)} samples"
+        figure.suptitle("\n".join(textwrap.wrap(title, 90)[:3]), fontsize=11)
         counts = ", ".join(f"{capture.counts[fate]} {fate}" for fate in FATES)
-        figure.supxlabel(f"pixels of {len(capture.chosen.maps)} photographs: {counts}", fontsize=9)
+        figure.supxlabel(f"pixels of {len(capture.chosen.maps)} photographs: {counts}", fontsize=11)
     return Drawing(figure, str(capture))
+
+
+def _rounded(text: str) -> str:
+    """A material as text, with three digits of each number and a space after each parameter."""
+    short = re.sub(r"\d+\.\d+", lambda number: f"{float(number[0]):.3g}", text)
+    return re.sub(r",(?=[a-z])", ", ", short)
 
 
 def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
@@ -60,17 +67,21 @@ def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
     picture = np.full(shot.radiance.shape, np.nan)
     picture[row, column] = predicted
     white = max(float(np.nanpercentile(shot.radiance, 99.5)), 1e-12)
-    _picture(axes[0], shot.radiance, white, f"photograph: {shot.name.rpartition('/')[2]}")
+    used = np.where(np.isfinite(picture), shot.radiance, np.nan)
+    _picture(axes[0], used, white, f"photograph: {shot.name.rpartition('/')[2]}")
     _picture(axes[1], picture, white, "the fit to it")
     off = np.full(shot.radiance.shape[:2], np.nan)
     level = np.maximum(chosen.value.mean(axis=1), 1e-3 * white)
     off[row, column] = 100.0 * (predicted - chosen.value).mean(axis=1) / level
     end = min(max(float(np.nanpercentile(np.abs(off), 98.0)), 1.0), MAX_PERCENT)
     image = axes[2].imshow(off, cmap="RdBu_r", vmin=-end, vmax=end, interpolation="nearest")
-    axes[2].set_title("difference", fontsize=10)
+    axes[2].set_title("difference", fontsize=12)
     axes[2].set_axis_off()
+    for axis in axes:  # the box of these pixels, with a margin
+        axis.set_xlim(column.min() - 4, column.max() + 4)
+        axis.set_ylim(row.max() + 4, row.min() - 4)
     assert axes[2].figure is not None
-    axes[2].figure.colorbar(image, ax=axes[2], shrink=0.85).set_label("%, red: the fit is brighter", fontsize=8)
+    axes[2].figure.colorbar(image, ax=axes[2], shrink=0.85).set_label("%, red: the fit is brighter", fontsize=10)
 
 
 def _photograph(axis: Axes, shot: Photograph, title: str) -> None:
@@ -81,7 +92,7 @@ def _picture(axis: Axes, radiance: Floats, white: float, title: str) -> None:
     """Linear radiance encoded for a screen; light gray without a value."""
     shown = np.clip(np.nan_to_num(radiance / white, nan=0.8), 0.0, 1.0) ** (1.0 / 2.2)
     axis.imshow(shown, interpolation="nearest")
-    axis.set_title(title, fontsize=10)
+    axis.set_title(title, fontsize=12)
     axis.set_axis_off()
 
 
@@ -93,8 +104,8 @@ def _fates(axis: Axes, capture: Capture, shot: Photograph) -> None:
     axis.imshow(codes, cmap=ListedColormap(list(COLORS)), vmin=-0.5, vmax=4.5, interpolation="nearest")
     there = [number for number in range(1, len(COLORS)) if np.any(codes == number)]
     handles = [Patch(color=COLORS[number], label=FATES[number - 1]) for number in there]
-    axis.legend(handles=handles, loc="lower right", fontsize=8, frameon=True, framealpha=0.9)
-    axis.set_title("classification of its pixels", fontsize=10)
+    axis.legend(handles=handles, loc="lower right", fontsize=10, frameon=True, framealpha=0.9)
+    axis.set_title("classification of its pixels", fontsize=12)
     axis.set_axis_off()
 
 
@@ -107,8 +118,20 @@ def _values(axis: Axes, capture: Capture) -> None:
     shown = np.clip(np.cbrt(np.maximum(np.nan_to_num(value), 0.0)) / white, 0.0, 1.0)
     with_alpha = np.concatenate([shown, np.isfinite(value[..., :1])], axis=-1)
     axis.imshow(with_alpha.swapaxes(0, 1), origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto")
-    axis.set_title("samples: f by its cube root", fontsize=10)
+    axis.set_title("samples of f", fontsize=12)
     _angles(axis)
+    _cube_root_bar(axis, white)
+
+
+def _cube_root_bar(axis: Axes, white: float) -> None:
+    """The scale of f: brightness is its cube root, in which dark lobes and peaks are both seen."""
+    from matplotlib.cm import ScalarMappable
+
+    steps = np.linspace(0.0, 1.0, 5)
+    assert axis.figure is not None
+    bar = axis.figure.colorbar(ScalarMappable(cmap="gray"), ax=axis, shrink=0.85)
+    bar.set_ticks(list(steps), labels=[f"{(white * step) ** 3:.2g}" for step in steps])
+    bar.set_label("f, 1/sr", fontsize=10)
 
 
 def _binned(capture: Capture, values: Floats) -> tuple[Floats, Floats]:
@@ -130,8 +153,8 @@ def _errors(axis: Axes, capture: Capture) -> None:
         error.T, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", cmap="viridis_r", vmin=0.0, vmax=end
     )
     assert axis.figure is not None
-    axis.figure.colorbar(image, ax=axis, shrink=0.85).set_label("%", fontsize=8)
-    axis.set_title("standard error of the samples", fontsize=10)
+    axis.figure.colorbar(image, ax=axis, shrink=0.85).set_label("%", fontsize=10)
+    axis.set_title("standard error of the samples", fontsize=12)
     _angles(axis)
 
 

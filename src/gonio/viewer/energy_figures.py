@@ -147,8 +147,13 @@ def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
     from matplotlib.figure import Figure
 
     with mpl.rc_context(figures.STYLE):
-        figure = Figure(figsize=(13, 6.4), layout="constrained")
-        _compare(comparison, figure.subplots(2, len(comparison["albedo"])))
+        figure = Figure(figsize=(10.7, 7.2), layout="constrained")
+        axes = figure.subplots(2, len(comparison["albedo"]), sharey="row", squeeze=False)
+        _compare(comparison, axes)
+        entries: dict[str, Any] = {}
+        for one in axes[0]:  # methods may apply to some materials only
+            entries |= dict(zip(*reversed(one.get_legend_handles_labels()), strict=True))
+        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=4, fontsize=12)
         picture = io.BytesIO()
         figure.savefig(picture, dpi=120, format="png", facecolor="white")
     numbers = json.dumps(comparison).encode()
@@ -165,15 +170,19 @@ def _compare(comparison: dict[str, Any], axes: Any) -> None:
         by_method = {m: np.asarray(v) for m, v in comparison["albedo"][name].items()}
         reference = by_method["random walk"]
         for method, value in by_method.items():
-            line = {"color": colors[method], "linestyle": "--" if method in ("plain", "fdez-aguera") else "-"}
+            order = list(colors).index(method)  # curves that coincide: the first is the widest, and dashes lie on top
+            line = {
+                "color": colors[method],
+                "linestyle": ("-", (0, (6, 3)), (0, (3, 3)), (0, (1, 2)))[max(order - 1, 0) % 4],
+                "linewidth": (1.8, 4.5, 3.4, 2.4, 2.6)[min(order, 4)],
+            }
             style = walk if method == "random walk" else line
             axes[0, column].plot(roughness, value[:, middle].mean(-1), label=method, **style)
             if method not in ("random walk", "plain"):
                 distance = np.sqrt(np.mean((value - reference) ** 2, axis=(1, 2)))
                 axes[1, column].plot(roughness, distance, label=method, **line)
         axes[0, column].set(title=name, xlabel="roughness", ylim=(0, 1.05))
-        axes[1, column].set(xlabel="roughness")
+        axes[1, column].set(xlabel="roughness", yscale="log")
+        axes[1, column].grid(True)
     axes[0, 0].set_ylabel(f"albedo at mu = {comparison['mu'][middle]:g}, mean of channels")
     axes[1, 0].set_ylabel("RMS distance to the walk")
-    axes[0, 0].legend(fontsize=7)
-    axes[1, 1].legend(fontsize=7)

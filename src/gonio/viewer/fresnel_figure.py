@@ -173,8 +173,8 @@ def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
         angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud", rasterized=True
     )
     levels = np.linspace(-top, top, 16)  # none at 0, where rounding errors would draw extra lines
-    contours = axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
-    axes.clabel(contours, fontsize=7, fmt="%.3f")
+    # without labels, which would lie upon one another in the corners: the color bar has the values
+    axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
     for line in lines:
         axes.axhline(line.eta, color=line.color, linewidth=1.2, linestyle=figures.DASHES)
     axes.set_title("Schlick minus exact" + (f", k = {k:.3g}" if k else ""), fontsize=11, fontweight="bold")
