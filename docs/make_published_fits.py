@@ -297,7 +297,8 @@ def figure_energy(cards: list[Card]) -> None:
         mine = [c for c in cards if c.fit == fit]
         color = {"b": "#2b5d8a", "l": "#3f7d4f", "n": "#b3403a"}[fit[0]]
         axes[0].plot([1.0 + c.gain for c in mine], [row + 0.0] * len(mine), "|", color=color, markersize=9)
-        axes[1].plot([max(c.cosine or 0.0, 0.5) for c in mine], [row] * len(mine), "|", color=color, markersize=9)
+        ratios = [c.cosine for c in mine if c.cosine is not None]  # None where there is nothing to compare
+        axes[1].plot(ratios, [row] * len(ratios), "|", color=color, markersize=9)
     axes[0].axvline(1.0, color="0.5", lw=0.8)
     axes[1].axvline(1.0, color="0.5", lw=0.8)
     axes[0].set(xscale="log", xlabel="largest albedo over the views (1: all light)", yticks=range(len(fits)))

@@ -3,7 +3,8 @@
     python examples/caption.py examples/conductor-ggx/print.json conductor-ggx.png 0.01 0.25 0.5 0.75 0.99
 
 takes one text for each sphere of the scene, in its order ("" for none), and draws it below the sphere as the camera
-sees it. `--rows` names rows of balls along the left edge, from the top. The picture is replaced; `-o` names another.
+sees it. `--rows` names rows of balls along the left edge, from the top; `--outlines` draws the outline of each ball,
+dashed, for balls that cannot be seen. The picture is replaced; `-o` names another.
 """
 
 from __future__ import annotations
@@ -55,7 +56,14 @@ def write(picture: Image.Image, at: tuple[float, float], text: str, size: float,
     draw.text(at, text, ink, font(size), anchor)
 
 
-def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str]) -> Image.Image:
+def dashed(picture: Image.Image, center: np.ndarray, radius: float, dashes: int = 36) -> None:
+    """Draw a dashed circle."""
+    box = [*(center - radius), *(center + radius)]
+    for start in np.arange(dashes) * 360 / dashes:
+        ImageDraw.Draw(picture).arc(box, start, start + 180 / dashes, (120, 120, 120), 2)
+
+
+def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str], outlines: bool) -> Image.Image:
     """The picture with a name below each sphere and, along its left edge, a name for each row."""
     picture = picture.convert("RGB")
     balls = spheres(scene)
@@ -65,6 +73,9 @@ def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str]
     centers = projected(balls[:, :3], scene["camera"], *picture.size)
     lowest = projected(balls[:, :3] - balls[:, 3:] * up, scene["camera"], *picture.size)
     size = TEXT_HEIGHT * picture.width
+    for center, foot in zip(centers, lowest, strict=True):
+        if outlines:
+            dashed(picture, center, foot[1] - center[1])
     for name, center, foot in zip(names, centers, lowest, strict=False):
         if name:
             write(picture, (center[0], foot[1] + 0.45 * size), name, size, "ma")
@@ -73,7 +84,7 @@ def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str]
         raise SystemExit(f"{len(rows)} names for {len(levels)} rows")
     for name, level in zip(rows, levels, strict=False):
         turned = picture.rotate(-90, expand=True)  # so that the text reads upward
-        write(turned, (picture.height - level, 0.9 * size), name, 0.66 * size, "mm")
+        write(turned, (picture.height - level, 0.9 * size), name, 0.9 * size, "mm")
         picture = turned.rotate(90, expand=True)
     return picture
 
@@ -84,10 +95,11 @@ def main() -> None:
     parser.add_argument("picture", type=Path, help="its picture")
     parser.add_argument("names", nargs="*", help="a name for each sphere")
     parser.add_argument("--rows", nargs="+", default=[], help="a name for each row, from the top")
+    parser.add_argument("--outlines", action="store_true", help="draw the outline of each sphere")
     parser.add_argument("-o", "--output", type=Path, help="where to write it; the picture itself by default")
     asked = parser.parse_args()
     with Image.open(asked.picture) as picture:
-        done = caption(json.loads(asked.scene.read_text()), picture, asked.names, asked.rows)
+        done = caption(json.loads(asked.scene.read_text()), picture, asked.names, asked.rows, asked.outlines)
     done.save(asked.output or asked.picture, quality=90)
 
 

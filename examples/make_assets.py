@@ -9,10 +9,10 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-import sheets
 from gonio.bridge import engine
 from gonio.instruments.capture import rehearsal
 from gonio.pictures import images
+from scipy.ndimage import map_coordinates
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 HERE = Path(__file__).parent
@@ -128,9 +128,13 @@ def shore_sky(height: int) -> np.ndarray:
     blue = np.array([0.95, 0.95, 0.9]) * (1.0 - up) ** 3 + np.array([0.1, 0.3, 0.72]) * (1.0 - (1.0 - up) ** 3)
     # Clouds as on a map seen from below, so that they have no seam at the zenith.
     radius = height / 2.0 * np.tan(np.minimum(theta, 1.45) / 2.0)
-    x, y = (np.clip(height / 2.0 + radius * f(phi), 0, height - 1).astype(int) for f in (np.cos, np.sin))
-    cover = cloudy(height, 23, range(2, 6))[x, y][..., None]
-    picture = blue + np.clip(1.6 * cover - 0.75, 0.0, 1.0) * (np.array([1.0, 0.98, 0.95]) - blue)
+    place = [height / 2.0 + radius * f(phi) for f in (np.cos, np.sin)]
+    cover, relief = (
+        map_coordinates(cloudy(height, seed, octaves), place, order=1, mode="nearest")[..., None]
+        for seed, octaves in ((23, range(2, 6)), (5, range(3, 7)))
+    )
+    white = np.array([1.0, 0.98, 0.95]) * (0.72 + 0.28 * relief)
+    picture = blue + np.clip(1.6 * cover - 0.75, 0.0, 1.0) * (white - blue)
     waves = sum(np.sin(k * phi + k * k) / k**0.7 for k in (3, 7, 13, 29, 53, 83))
     woods = np.radians(9.0 + 3.0 * waves) * np.clip(2.5 * np.cos(phi - 0.9) - 1.0, 0.0, 1.0)
     picture = np.where((math.pi / 2.0 - theta < woods)[..., None], [0.035, 0.06, 0.03], picture)
@@ -396,9 +400,6 @@ def photographs() -> None:
     paint = go.Sum(go.Lambert((0.3, 0.2, 0.1)), coat)
     folder = HERE / "photographs"
     rehearsal.take(calibration, paint, folder, noise=0.01, bits=8)
-    sheets.draw(
-        folder / "photographs.jpg", [(f"lamp: {name}", images.read(folder / f"{name}.png").pixels) for name in lamps], 4
-    )
 
 
 def main() -> None:
@@ -412,7 +413,7 @@ def main() -> None:
     png("textured/terrazzo.png", terrazzo(400, 260, 3))
     png("full-moon/maria.png", maria(512))
     png("pool-caustic/tiles.png", checker(24, (0.08, 0.4, 0.5), (0.32, 0.62, 0.68)))
-    png("snells-window/sky.png", shore_sky(256))
+    png("snells-window/sky.png", shore_sky(512))
     png("snells-window/tiles.png", checker(16, (0.03, 0.16, 0.2), (0.08, 0.3, 0.34)))
     png("normal-map/hammered.png", hammered(384, 900, 5))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
