@@ -12,7 +12,7 @@ from gonio.shaders import bundle
 from gonio.shaders.read_back import LANGUAGES, difference
 from gonio.spirv.compiler import compiler
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-12
 
 
 def inputs(count: int, transmits: bool) -> list[np.ndarray]:
