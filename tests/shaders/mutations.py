@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -73,7 +74,7 @@ def _with_point(text: str) -> str:
 def _swaps(code: str) -> Places:
     for match in _CALL.finditer(code):
         parts = _arguments(code, match.end())
-        for (a, b), (c, d) in zip(parts, parts[1:], strict=False):
+        for (a, b), (c, d) in itertools.pairwise(parts):
             one, other = code[a:b], code[c:d]
             declares = re.match(r"\w+ \w+$|\w+: ", one)
             if one != other and not declares:
