@@ -165,12 +165,12 @@ def _components(symbol: graph.Node) -> Any:
 def _one(module: Module, made: Bundle, method: str) -> Function:
     """The function of a method: of overloads, as of a mix of mixes, the one that takes the material's struct."""
     name = made.manifest["functions"][method]
-    found = module.function(name)
-    if len(found) > 1:
-        found = [one for one in found if _first(module, one) == made.manifest["struct"]]
-    if len(found) != 1:
-        raise InputError(f"{len(found)} functions '{name}' in the text", "shader")
-    return found[0]
+    candidates = module.function(name)
+    if len(candidates) > 1:
+        candidates = [one for one in candidates if _first(module, one) == made.manifest["struct"]]
+    if len(candidates) != 1:
+        raise InputError(f"{len(candidates)} functions '{name}' in the text", "shader")
+    return candidates[0]
 
 
 def _first(module: Module, function: Function) -> str:

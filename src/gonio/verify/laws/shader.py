@@ -49,12 +49,13 @@ class Shader(Law):
     def _compare(self, model: BSDF, inputs: tuple[np.ndarray, ...], seed: int, finding: Finding) -> None:
         """Add the differences in all languages to the finding."""
         original: read_back.Original | None = None
+        wo, wi, u = inputs
         for language in languages(finding):
             try:
                 made = guarded(model, "sample", lambda language=language: bundle(model, language))
             except InputError as error:
                 raise DoesNotApply(f"no shader code: {error.what}") from error
-            original = original or read_back.Original(model, made, *inputs, seed)
+            original = original or read_back.Original(model, made, wo, wi, u, seed)
             try:
                 figures = original.difference(made)
             except GonioError as error:
