@@ -4,6 +4,10 @@ python benchmarks/ltc.py web/node_modules/three/examples/jsm/lights/RectAreaLigh
 
 The file holds the tables of Heitz2016a's authors, 64 x 64. Both fits are compared with sums over the lobe itself:
 L3, the measure that the paper minimizes; the share of light that goes elsewhere; integrals over 1,024 rectangles.
+
+    python benchmarks/ltc.py --anisotropic docs/images/ltc_anisotropic.png
+
+prints the errors of anisotropic GGX, for which no table is published, and draws the map of widths 4 : 1.
 """
 
 from __future__ import annotations
@@ -14,7 +18,8 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.energy.tables import ltc
+from gonio.energy.tables import ltc, ltc_anisotropic
+from gonio.energy.tables.baked import Baked
 
 SIZE = 64
 
@@ -40,6 +45,44 @@ def main(path: Path) -> None:
         print("{:10} {:9.4f} {:15.4f} {:7.3f} {:16.5f} {:7.3f}".format(name, *figures))
 
 
+def anisotropic(picture: Path) -> None:
+    """Print one line per quotient of the widths, and draw the first."""
+    for first, widths in enumerate([(0.4, 0.1), (0.4, 0.2)]):
+        baked = ltc_anisotropic.bake(go.Conductor(alpha=widths).lossless())
+        lobe, quads = (baked.manifest["error"][name] for name in ("ltc_inverse", "ltc_norm"))
+        rough = baked.arrays["ltc_error"][2:, :, :-1]  # above roughness 0.1, without the horizon
+        print(
+            f"{widths[0] / widths[1]:.0f} : 1  elsewhere {lobe['mean']:.3f}, max {lobe['max']:.2f}; without the "
+            f"horizon {rough.mean():.3f}, {rough.max():.2f}; rectangles {quads['mean']:.4f}, max {quads['max']:.2f}"
+        )
+        if first == 0:
+            _draw(baked, picture)
+
+
+def _draw(baked: Baked, picture: Path) -> None:
+    """The share of the light elsewhere over azimuth and angle, at two roughnesses."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), constrained_layout=True)
+    image = None
+    columns, rows = [0, 5, 8, 11, 13, 15], range(0, ltc_anisotropic.AZIMUTHS, 2)
+    angles = np.degrees(np.arccos(baked.arrays["mu"]))
+    for axis, layer in zip(axes, (6, 12), strict=True):
+        error = baked.arrays["ltc_error"][layer, ..., 0]
+        image = axis.imshow(error, origin="lower", aspect="auto", cmap="viridis", vmin=0.0, vmax=0.5)
+        axis.set_title(f"roughness {baked.arrays['roughness'][layer]:.1f}", fontsize=10)
+        axis.set_xticks(columns, [f"{angles[column]:.0f}" for column in columns])
+        axis.set_yticks(list(rows), [f"{np.degrees(baked.arrays['phi'][row]):g}" for row in rows])
+        axis.set_xlabel("angle from the normal, degrees")
+        axis.tick_params(length=0)
+    axes[0].set_ylabel("azimuth from the wide axis, degrees")
+    figure.colorbar(image, ax=axes, shrink=0.9, label="share of light elsewhere", extend="max")
+    figure.savefig(picture, dpi=110, metadata={"Software": None})
+
+
 def _lobes(model: go.BSDF, roughness: np.ndarray, mu: np.ndarray, inverse: np.ndarray) -> list[tuple]:
     """(L3, share elsewhere) of each cell by row."""
     rows = []
@@ -52,4 +95,4 @@ def _lobes(model: go.BSDF, roughness: np.ndarray, mu: np.ndarray, inverse: np.nd
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    anisotropic(Path(sys.argv[2])) if sys.argv[1] == "--anisotropic" else main(Path(sys.argv[1]))

@@ -590,3 +590,17 @@ def test_several_errors_of_a_scene_are_told_apart(scene: Path, capsys: pytest.Ca
     (scene / "scene.json").write_text(json.dumps(text))
     assert gonio("render", scene) == 2
     assert "; also " in capsys.readouterr().err
+
+
+def test_emit_names_the_tables_that_only_a_folder_receives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    material = "kulla-conty(base=conductor)"
+    assert gonio("emit", material, "--functions", "eval", "-o", "a.glsl") == 0
+    names = "table_missing_ggx_smith_correlated"
+    said = f"the shader reads a table that is not in its text: {names}; -o DIR/ writes them too\n"
+    assert capsys.readouterr().err == said
+    assert "missing_ggx_smith_correlated.f32, which an output folder (-o DIR/) holds" in Path("a.glsl").read_text()
+    assert gonio("emit", material, "--functions", "eval", "-o", "a/") == 0
+    assert not capsys.readouterr().err and Path("a/missing_ggx_smith_correlated.f32").is_file()

@@ -138,8 +138,8 @@ class LawItem(pytest.Item):
         verdict = self.parent.report()[self.name]
         if verdict.failed:
             raise Broken(verdict)
-        if verdict.status == "does not apply":
-            pytest.skip("; ".join(verdict.why))
+        if verdict.status in ("does not apply", "not tried"):
+            pytest.skip(f"{verdict.status}: {'; '.join(verdict.why)}")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, Broken):

@@ -16,7 +16,7 @@ def test_a_cosine_lobe_seen_through_quadrilaterals_is_its_integral() -> None:
     covered = ltc.covered(np.tile(IDENTITY, (40, 1)), np.tile(UP, (40, 1)), quads)
     points = ltc.points_of(go.Lambert(1.0), np.ones(1), 8_000, 8_000)
     light = points.weight[0] * points.value[0, :, 0]
-    summed = [np.sum(light[ltc._inside(quad, points.wi[0])]) for quad in quads]
+    summed = [np.sum(light[ltc.inside(quad, points.wi[0])]) for quad in quads]
     cut = np.any(quads[..., 2] < 0.0, axis=1)
     assert cut.any() and not cut.all()
     assert np.max(np.abs(covered - summed)) < 1e-2
@@ -58,7 +58,6 @@ def test_a_distribution_has_the_two_albedos_of_the_split_sum() -> None:
 @pytest.mark.parametrize(
     ("model", "words"),
     [
-        (go.Conductor(alpha=(0.1, 0.3)), "Conductor is anisotropic"),
         (go.RandomWalk(go.Conductor()), "RandomWalk is estimated by random walks"),
         (go.model("mirror")(), "has a mirror lobe"),
     ],

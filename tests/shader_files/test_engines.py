@@ -57,6 +57,84 @@ def three(tmp_path: Path) -> Path:
     return package
 
 
+# chunks with the names and signatures that our program calls, and formulas of our own
+CHUNKS = {
+    "metalnessModulate": """
+vec3 getSpecularModulate(vec3 s, vec3 albedo, float metal, float f0, float factor) {
+    return mix(f0 * s * factor, albedo, metal);
+}
+vec3 getAlbedoModulate(vec3 albedo, float metal) { return (1.0 - metal) * albedo; }
+""",
+    "fresnelSchlick": "vec3 getFresnel(float c, float gloss, vec3 specularity) { return specularity; }",
+    "lightDiffuseLambert": "float getLightDiffuse(vec3 n, vec3 v, vec3 l) { return -l.z; }",
+    "lightSpecularGGX": """
+float getLightSpecular(vec3 h, vec3 r, vec3 n, vec3 v, vec3 l, float gloss, mat3 tbn) { return 0.5 * gloss; }
+""",
+    "lightSpecularAnisoGGX": """
+float getLightSpecular(vec3 h, vec3 r, vec3 n, vec3 v, vec3 l, float gloss, mat3 tbn) { return dAnisotropy; }
+""",
+    "lightSheen": "float getLightSpecularSheen(vec3 h, vec3 n, vec3 v, vec3 l, float gloss) { return gloss; }",
+    "combine": """
+vec3 combineColor(vec3 albedo, vec3 sheen, float coat) {
+    return albedo * dDiffuseLight + dSpecularLight + sheen * sSpecularLight;
+}
+""",
+}
+
+
+def test_playcanvas_adds_its_lobes(tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    package = tmp_path / "node_modules" / "playcanvas"
+    folder = package / "build/playcanvas/src/scene/shader-lib/glsl/chunks/lit/frag"
+    folder.mkdir(parents=True)
+    for name, text in CHUNKS.items():
+        (folder / f"{name}.js").write_text(f"var {name}_default = `{text}`;\nexport {{ {name}_default as default }};\n")
+    (package / "package.json").write_text(json.dumps({"name": "playcanvas", "version": "2.999.0"}))
+    files = {one.stem: one for one in shaders.adopt_package(package, tmp_path / "playcanvas")}
+    assert set(files) == {"playcanvas-standard", "playcanvas-anisotropic", "playcanvas-sheen"}
+    wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.8, 0.0, 0.6]])
+
+    def value(name: str, **more: float) -> float:
+        made = go.Shader(files[f"playcanvas-{name}"], color=0.5, rough=0.2, lamp=0.5, **more)
+        return float(made.eval(wo, wi, precision="float64")[0, 0])
+
+    lamp = 0.5 * 0.6
+    assert value("standard", metal=1.0) == pytest.approx(lamp * 0.5 * 0.8 * 0.5, rel=1e-6)
+    assert value("standard", metal=0.0) == pytest.approx(lamp * (0.5 + 0.5 * 0.8 * 0.04), rel=1e-6)
+    assert value("anisotropic", metal=1.0, strength=0.3) == pytest.approx(lamp * 0.3 * 0.5, rel=1e-6)
+    assert value("sheen", metal=1.0, sheenRough=0.7) == pytest.approx(lamp * (0.5 * 0.8 * 0.5 + 0.7), rel=1e-6)
+
+
+def test_gltf_viewer_mixes_its_lobes(tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    package = tmp_path / "node_modules" / "@khronosgroup" / "gltf-viewer"
+    (package / "dist").mkdir(parents=True)
+    text = """vec3 F_Schlick(vec3 f0, vec3 f90, float c) { return f0; }
+vec3 BRDF_lambertian(vec3 color) { return color / M_PI; }
+vec3 BRDF_specularGGX(float alpha, float l, float v, float h) { return vec3(alpha + v); }
+vec3 BRDF_specularGGXAnisotropy(float a, float s, vec3 n, vec3 v, vec3 l, vec3 h, vec3 t, vec3 b) { return vec3(s); }
+"""
+    bundle = f"let other = `x`;\nvar brdfShader = {json.dumps(text)};\n"
+    (package / "dist" / "gltf-viewer.module.js").write_text(bundle)
+    (package / "package.json").write_text(json.dumps({"name": "@khronosgroup/gltf-viewer", "version": "9.9.9"}))
+    files = {one.stem: one for one in shaders.adopt_package(package, tmp_path / "gltf")}
+    wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.8, 0.0, 0.6]])
+
+    def value(name: str, **more: float) -> float:
+        made = go.Shader(files[f"gltf-{name}"], color=0.5, rough=0.4, **more)
+        return float(made.eval(wo, wi, precision="float64")[0, 0])
+
+    assert value("standard", metal=1.0) == pytest.approx(0.6 * 0.5 * (0.16 + 0.8), rel=1e-6)
+    assert value("standard", metal=0.0) == pytest.approx(0.6 * (0.96 * 0.5 / np.pi + 0.04 * 0.96), rel=1e-6)
+    assert value("anisotropic", metal=1.0, strength=0.3) == pytest.approx(0.6 * 0.5 * 0.3, rel=1e-6)
+
+
 def test_program_of_the_package_is_the_material(three: Path, tmp_path: Path) -> None:
     written = shaders.adopt_package(three, tmp_path / "three")
     assert "three-standard.glsl" in {one.name for one in written}

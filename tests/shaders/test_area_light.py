@@ -13,8 +13,8 @@ from gonio.shaders.area_light import area_light
 from test_compile import GLSLANG, _glslang
 
 
-def _tables(*shape: int, channels: int) -> Baked:
-    return Baked({"ltc_inverse": np.ones((*shape, 4)), "ltc_norm": np.ones((*shape, channels))}, {})
+def _tables(*shape: int, channels: int, numbers: int = 4) -> Baked:
+    return Baked({"ltc_inverse": np.ones((*shape, numbers)), "ltc_norm": np.ones((*shape, channels))}, {})
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,8 @@ def _tables(*shape: int, channels: int) -> Baked:
         (_tables(4, 4, channels=2), "area_light(f0, roughness, wo, a, b, c, d)"),
         (_tables(4, 4, channels=3), "area_light(roughness, wo, a, b, c, d)"),
         (_tables(4, channels=3), "area_light(wo, a, b, c, d)"),
+        (_tables(4, 3, 4, channels=3, numbers=8), "area_light(roughness, wo, a, b, c, d)"),
+        (_tables(3, 4, channels=2, numbers=8), "area_light(f0, wo, a, b, c, d)"),
     ],
 )
 def test_the_arguments_are_those_that_the_tables_need(baked: Baked, head: str, tmp_path: Path) -> None:

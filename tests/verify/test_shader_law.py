@@ -5,8 +5,10 @@ from typing import Any
 
 import gonio as go
 import pytest
+from gonio.errors import MachineError
 from gonio.shaders import bundle
-from gonio.verify import verify
+from gonio.verify import page, verify
+from gonio.verify.ci import github, junit
 from gonio.verify.laws import shader
 
 
@@ -37,3 +39,31 @@ def test_text_that_differs_fails_with_language_function_and_values(monkeypatch: 
 def test_a_material_without_shader_code_is_not_judged() -> None:
     found = verify(go.RandomWalk(go.Conductor(alpha=0.3)), quick=True, law="shader")["shader"]
     assert found.status == "does not apply" and "random walks" in found.why[0]
+
+
+def test_without_a_compiler_the_law_is_not_tried_and_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> str:
+        raise MachineError("no compiler of shaders is installed", "shader", "install it")
+
+    monkeypatch.setattr(shader, "compiler", missing)
+    report = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)
+    found = report["shader"]
+    assert found.status == "not tried" and "no compiler" in found.why[0] and found.figure is not None
+    assert "NOT TRIED" in str(report) and "shader holds" not in str(report)
+    assert report.untried == ["shader"]
+    assert 'skipped="1"' in junit.text(report) and "::notice" in github.text(report)
+    assert "All laws hold" not in page.page(report)
+
+
+def test_text_that_differs_fails_without_a_compiler_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> str:
+        raise MachineError("no compiler of shaders is installed", "shader", "install it")
+
+    def wrong(material: go.BSDF, language: str) -> Any:
+        made = bundle(material, language)
+        return dataclasses.replace(made, text=made.text.replace("0.31830987", "0.3183"))
+
+    monkeypatch.setattr(shader, "compiler", missing)
+    monkeypatch.setattr(shader, "bundle", wrong)
+    found = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)["shader"]
+    assert found.status == "fail" and found.worst.startswith("wgsl")

@@ -167,11 +167,14 @@ class Graph:
 
     replacements  operation -> a vocabulary function to record instead, for languages without the operation
     single        whether it is recorded for 32 bits, see `ops.is_short`
+    named         whether values get the names of the variables that hold them, nine tenths of the time of a recording
     """
 
-    def __init__(self, replacements: dict[str, Callable] | None = None, single: bool = False) -> None:
+    def __init__(
+        self, replacements: dict[str, Callable] | None = None, single: bool = False, named: bool = True
+    ) -> None:
         self.functions: list[Function] = []
-        self.replacements, self.single = replacements or {}, single
+        self.replacements, self.single, self.named = replacements or {}, single, named
         self._known: dict[object, Function] = {}
 
     @property
@@ -273,7 +276,7 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
     source = f"{python_function.__code__.co_filename}:{python_function.__code__.co_firstlineno}"
     function = Function(name, inspect.getdoc(python_function) or "", source)
     _stack.append((graph, function))
-    function.names = LocalNames(function, Node, _define.__code__)
+    function.names = LocalNames(function, Node, _define.__code__) if graph.named else None
     try:
         given = [pair for argument, value in arguments.items() for pair in _flatten(value, argument)]
         parameters = iter([function.parameter(path, node.type) for path, node in given])

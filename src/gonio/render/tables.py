@@ -24,7 +24,7 @@ from ..catalog import library, notation, operands, outside, texts
 from ..catalog.material import MaterialLike, material
 from ..catalog.operands import Kind
 from ..energy.tables import bake as baking
-from ..energy.tables import ltc, prefilter
+from ..energy.tables import ltc, ltc_anisotropic, prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, is_model, model, models
@@ -72,8 +72,8 @@ def bake(
               environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
     output    folder to write to, all files or none; None writes nothing
     lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass. Or "ltc" alone: linearly
-              transformed cosines of an isotropic target, with the shader code of light from quadrilaterals
-    resolution  texels along each axis, 1 to 4096; None is 128, and 64 of "ltc", which has at most 256
+              transformed cosines of the target, with the shader code of light from quadrilaterals
+    resolution  texels along each axis, 1 to 4096; None is 128, and 64 of "ltc" (anisotropic: 16), which has at most 256
     method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
               by the `sampler` "hammersley", "stratified" or "independent" (of `seed`, 0 if None)
     masking   masking of a distribution; a material has its own
@@ -100,7 +100,7 @@ def bake(
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
     if lut and "ltc" in lut:
         _check_ltc(lut, {**axes, "resolution": None, **sampling, **picture})
-        return _cosines(_target(target), folder, ltc.SIZE if resolution is None else resolution, masking)
+        return _cosines(_target(target), folder, resolution, masking)
     options = {"masking": masking, **axes, "resolution": 128 if resolution is None else resolution, **sampling}
     if layout == "homework":
         return _homework(_target(target), folder, lut, options, picture)
@@ -131,7 +131,7 @@ def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
     _check_default(options, "ltc has axes and a method of its own")
 
 
-def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: str | None) -> Baked:
+def _cosines(target: str | BSDF, folder: Path | None, resolution: int | None, masking: str | None) -> Baked:
     """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
     material: Any = target
     if isinstance(target, str):
@@ -139,7 +139,8 @@ def _cosines(target: str | BSDF, folder: Path | None, resolution: int, masking: 
         material = made(ndf=target, masking=masking or "smith-correlated").lossless()
     elif masking is not None:
         raise InputError("masking given for a material", "--masking", "the parameters of the material define it")
-    baked = ltc.bake(material, resolution, schlick=isinstance(target, str))
+    fit: Any = ltc if material.isotropic else ltc_anisotropic
+    baked = fit.bake(material, fit.SIZE if resolution is None else resolution, schlick=isinstance(target, str))
     codes = [area_light(baked, language) for language in LANGUAGES]
     baked.manifest["textures"] = codes[0].manifest["textures"]
     if folder is not None:

@@ -21,15 +21,16 @@ def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> B
     """The function `area_light` over the tables of `energy.tables.ltc`: with an argument `roughness` if they have this
     axis, and `f0` if they serve any Schlick reflectance."""
     inverse, norm = (Table(name, baked.arrays[name]) for name in ("ltc_inverse", "ltc_norm"))
-    swept, colored = len(inverse.shape) == 2, norm.channels == 3
+    anisotropic, colored = inverse.channels == 8, norm.channels == 3
+    swept = len(inverse.shape) == 2 + anisotropic
 
     @function
     def area_light(
         f0: Spectrum | None, roughness: Scalar, wo: Direction, a: Direction, b: Direction, c: Direction, d: Direction
     ) -> Spectrum:
         """Radiance reflected toward wo, from a light of radiance 1 with the corners a, b, c, d."""
-        place = formulas.coordinates(inverse, roughness, wo)
-        covered = formulas.quad(lookup(inverse, *place), wo, (a, b, c, d))
+        place = (formulas.turned_coordinates if anisotropic else formulas.coordinates)(inverse, roughness, wo)
+        covered = (formulas.turned_quad if anisotropic else formulas.quad)(lookup(inverse, *place), wo, (a, b, c, d))
         albedo = lookup(norm, *place)
         if f0 is None:
             color: Spectrum = vec3(*albedo) * covered  # type: ignore[assignment]  # three channels in a shader

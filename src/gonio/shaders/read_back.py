@@ -1,6 +1,7 @@
 """The round trip: a material written as shader text, the text read again, and the values of both compared in 64 bits.
 
-    difference(material, bundle(material, "wgsl"), wo, wi, u)
+    made = bundle(material, "wgsl")
+    Original(material, made, wo, wi, u).difference(made)
 
 The reference is the recording from which the text was written, in NumPy, with its constants and tables rounded to 32
 bits as the text's are. What is left is the order of additions, so that a difference beyond rounding in 64 bits is a
@@ -9,6 +10,7 @@ fault of the writer or of the reader.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -22,12 +24,13 @@ from ..ops import graph
 from ..ops.table import Table
 from ..spirv import Machine, Module, compile_text, parse, translated
 from ..spirv.images import Texture
+from ..spirv.module import Function
 from ..spirv.values import leaves, numeric
 from . import program as programs
 from .bundle import Bundle
 
 LANGUAGES = ("glsl", "hlsl", "wgsl")  # those that are read
-FLOOR = 1e-9  # of the largest value: smaller ones are what a difference of larger ones leaves
+TINY = 1e-100  # in 64 bits, smaller values may be what underflow left
 Array = NDArray[np.float64]
 
 
@@ -41,20 +44,59 @@ class Difference(NamedTuple):
     read: float
 
 
-def difference(material: BSDF, made: Bundle, wo: Array, wi: Array, u: Array) -> list[Difference]:
-    """The largest relative difference of each function of a material between its recording and its text.
+class Original:
+    """The values of a material's recording, with which those of its texts are compared.
 
-    made    the text with its tables, of `bundle`
+    made    one of the texts, which may be in any language that is read
     wo, wi  directions, (N, 3)
     u       random numbers, (N, 3)
-    Raises InputError for text that cannot be read; MachineError without a compiler for GLSL and HLSL.
+    seed    of the parameter values of half of the rows, see `parameters`
     """
-    names = [name for name in programs.FUNCTIONS if name in made.manifest["functions"]]
-    given = {"wo": wo.T, "wi": wi.T, "u": u.T}
-    with np.errstate(all="ignore"):
-        read = _read(_module(made.text, made.manifest["lang"]), made, names, given)
-        written = _recorded(material, made, names, given)
-    return [_largest(name, written[name], read[name], len(wo)) for name in names]
+
+    def __init__(self, material: BSDF, made: Bundle, wo: Array, wi: Array, u: Array, seed: int = 0) -> None:
+        self.given = {"wo": wo.T, "wi": wi.T, "u": u.T}
+        self.count = len(wo)
+        self.fields = parameters(made, self.count, seed)
+        names = [name for name in programs.FUNCTIONS if name in made.manifest["functions"]]
+        with np.errstate(all="ignore"):
+            self.values = _recorded(material, names, self.given, self.fields)
+
+    def difference(self, made: Bundle) -> list[Difference]:
+        """The largest relative difference of each function of the text.
+
+        Raises InputError for text that cannot be read; MachineError without a compiler for GLSL and HLSL.
+        """
+        with np.errstate(all="ignore"):
+            read = _read(_module(made.text, made.manifest["lang"]), made, list(self.values), self.given, self.fields)
+        return [_largest(name, written, read[name], self.count) for name, written in self.values.items()]
+
+
+def parameters(made: Bundle, count: int, seed: int) -> dict[str, Array]:
+    """A value of each field of the struct per row, by path: (N,) or (components, N), in 32 bits.
+
+    Even rows have the material's values, odd rows random ones: a fifth at the ends of the range, half close to its
+    lower end, where code has other branches. A range without an end extends to twice or half the value. What tables
+    depend on stays.
+    """
+    random = np.random.default_rng([seed, 3])
+    kinds = {one["path"]: one for one in made.manifest["parameters"]}
+    values = {}
+    for field in made.manifest["fields"]:
+        own = np.asarray(field["value"], float).reshape(-1, 1)
+        rows = np.repeat(own, count, axis=1)
+        kind = kinds[field["path"]]
+        odd = slice(1, None, 2)
+        share = np.clip(random.uniform(-0.125, 1.125, rows[:, odd].shape), 0.0, 1.0)
+        share = np.where(random.random(share.shape) < 0.5, share**4, share)
+        if kind["kind"] == "angle":
+            rows[:, odd] = np.stack([np.cos(2.0 * np.pi * share[0]), np.sin(2.0 * np.pi * share[0])])
+        elif not kind["fixed"]:
+            low = np.minimum(0.5 * own, 2.0 * own) if kind["low"] is None else kind["low"]
+            high = np.maximum(0.5 * own, 2.0 * own) if kind["high"] is None else kind["high"]
+            rows[:, odd] = low + (high - low) * share
+        rows = rows.astype(np.float32).astype(float)
+        values[field["path"]] = rows if isinstance(field["value"], list) else rows[0]
+    return values
 
 
 def _largest(name: str, written: list[Array], read: list[Array], count: int) -> Difference:
@@ -63,12 +105,9 @@ def _largest(name: str, written: list[Array], read: list[Array], count: int) -> 
     worst = Difference(name, 0.0, 0, 0.0, 0.0)
     for one, other in zip(written, read, strict=True):
         a, b = np.broadcast_to(one, count).astype(float), np.broadcast_to(other, count).astype(float)
-        size = np.maximum(
-            np.maximum(np.abs(a), np.abs(b)), FLOOR * np.max(np.abs(a), where=np.isfinite(a), initial=0.0)
-        )
         same = (a == b) | (np.isnan(a) & np.isnan(b))
         with np.errstate(all="ignore"):
-            error = np.where(same, 0.0, np.abs(a - b) / size)
+            error = np.where(same, 0.0, np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), TINY))
         error = np.where(np.isfinite(error), error, np.inf)
         row = int(np.argmax(error))
         if error[row] > worst.figure:
@@ -86,43 +125,65 @@ def _module(text: str, language: str) -> Module:
     return parse(compile_text(text, where, language=language), where)
 
 
-def _read(module: Module, made: Bundle, names: list[str], given: dict[str, Array]) -> dict[str, list[Array]]:
+def _read(
+    module: Module, made: Bundle, names: list[str], given: dict[str, Array], fields: dict[str, Array]
+) -> dict[str, list[Array]]:
     """The values of the text's functions."""
     textures = {name: Texture(name, Table(name, texels.astype(float))) for name, texels in made.tables.items()}
-    fields = made.manifest["fields"]
-    values = tuple(
-        tuple(map(float, field["value"])) if isinstance(field["value"], list) else float(field["value"])
-        for field in fields
-    )
+    columns = {f"field_{place}": column for place, column in enumerate(fields.values())}
 
-    def formula(wo: ops.Direction, wi: ops.Direction, u: ops.Direction) -> tuple[tuple[Any, ...], ...]:
+    def formula(**symbols: Any) -> tuple[tuple[Any, ...], ...]:
         machine = Machine(module, {}, textures)
         for start in module.function("main"):  # of GLSL; it assigns the initial values of globals
             machine.call(start, ())
-        directions = {"wo": (wo.x, wo.y, wo.z), "wi": (wi.x, wi.y, wi.z), "u": (u.x, u.y, u.z)}
-        structs = [values] if fields else []
-        functions = made.manifest["functions"]
-        if "derive" in functions:
-            structs.append(machine.call(_one(module, functions["derive"]), structs))
+        split = {name: _components(symbol) for name, symbol in symbols.items()}
+        structs = [tuple(split[name] for name in columns)] if columns else []
+        if "derive" in made.manifest["functions"]:
+            structs.append(machine.call(_one(module, made, "derive"), structs))
         results = []
         for name in names:
-            function = _one(module, functions[name])
-            more = [directions["wo"], directions["u" if name == "sample" else "wi"]]
+            function = _one(module, made, name)
+            more = [split["wo"], split["u" if name == "sample" else "wi"]]
             results.append(_called(machine, module, function, structs, more))
         return tuple(results)
 
-    recorded = ops.record(formula, types=dict.fromkeys(given, "vec3"), name="formula", into=graph.Graph())
-    return {name: _numbers(one) for name, one in zip(names, recorded.evaluate(**given), strict=True)}
+    types = {name: "float" if column.ndim == 1 else f"vec{len(column)}" for name, column in columns.items()}
+    types |= dict.fromkeys(given, "vec3")
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    formula.__signature__ = inspect.Signature([inspect.Parameter(name, keyword) for name in types])  # type: ignore[attr-defined]
+    recorded = ops.record(formula, types=types, name="formula", into=graph.Graph(named=False))
+    return {name: _numbers(one) for name, one in zip(names, recorded.evaluate(**columns, **given), strict=True)}
 
 
-def _one(module: Module, name: str) -> Any:
-    entry = module.function(name)
-    if len(entry) != 1:
-        raise InputError(f"{len(entry)} functions '{name}' in the text", "shader")
-    return entry[0]
+def _components(symbol: graph.Node) -> Any:
+    """A vector as the machine holds it: a tuple of numbers."""
+    if symbol.type == "float":
+        return symbol
+    return tuple(getattr(symbol, letter) for letter in "xyz"[: int(symbol.type[-1])])
 
 
-def _called(machine: Machine, module: Module, function: Any, structs: list[Any], more: list[Any]) -> tuple[Any, ...]:
+def _one(module: Module, made: Bundle, method: str) -> Function:
+    """The function of a method: of overloads, as of a mix of mixes, the one that takes the material's struct."""
+    name = made.manifest["functions"][method]
+    candidates = module.function(name)
+    if len(candidates) > 1:
+        candidates = [one for one in candidates if _first(module, one) == made.manifest["struct"]]
+    if len(candidates) != 1:
+        raise InputError(f"{len(candidates)} functions '{name}' in the text", "shader")
+    return candidates[0]
+
+
+def _first(module: Module, function: Function) -> str:
+    """The name of the type of a function's first parameter, as far as it is a struct."""
+    type_ = function.parameters[0][1] if function.parameters else 0
+    if type_ and module.type(type_).kind == "pointer":
+        type_ = module.type(type_).parts[0]
+    return module.names.get(type_, "")
+
+
+def _called(
+    machine: Machine, module: Module, function: Function, structs: list[Any], more: list[Any]
+) -> tuple[Any, ...]:
     """A function's result as numbers; those that need no parameters or derived values take fewer structs."""
     names = [module.names.get(id, "") for id, _ in function.parameters]
     offered = dict(zip(("self", "derived"), structs, strict=False))
@@ -134,11 +195,15 @@ def _called(machine: Machine, module: Module, function: Any, structs: list[Any],
 # ---------------------------------------------------------------------- what was written
 
 
-def _recorded(material: BSDF, made: Bundle, names: list[str], given: dict[str, Array]) -> dict[str, list[Array]]:
+def _recorded(
+    material: BSDF, names: list[str], given: dict[str, Array], fields: dict[str, Array]
+) -> dict[str, list[Array]]:
     """The values of the recording, with constants of 32 bits."""
     tables: dict[int, Table] = {}
     recorded = programs.recorded(recording.symbols(material), tuple(names), True)
     for function in recorded.functions:
+        for node in function.nodes:
+            _fold(node)
         for node in function.nodes:
             node.args = tuple(map(_single, node.args))
             if node.op == "constant":
@@ -146,12 +211,19 @@ def _recorded(material: BSDF, made: Bundle, names: list[str], given: dict[str, A
             elif node.op in ("lookup", "fetch"):
                 table, channel = node.static
                 node.static = tables.setdefault(id(table), _rounded(table)), channel
-    values = {}
-    for field in made.manifest["fields"]:
-        value = np.asarray(field["value"], float)
-        values[f"self_{field['path'].replace('.', '_')}"] = value[:, None] if value.ndim else value
+    values = {f"self_{path.replace('.', '_')}": column for path, column in fields.items()}
     result = recorded.evaluate(**values, **given)
     return {name: _numbers(one) for name, one in zip(names, result, strict=True)}
+
+
+def _fold(node: graph.Node) -> None:
+    """Turn an operation on numbers alone into its result, which the text has as one number of 32 bits."""
+    node.args = tuple(arg.static if isinstance(arg, graph.Node) and arg.op == "constant" else arg for arg in node.args)
+    if node.op == "mul" and node.type == "float" and 0.0 in [arg for arg in node.args if isinstance(arg, float)]:
+        node.op, node.args, node.static = "constant", (), 0.0  # of `zeros_like` and `ones_like`
+    elif node.args and node.op in graph.NUMPY and not any(isinstance(arg, graph.Node) for arg in node.args):
+        number = graph.NUMPY[node.op](*node.args)
+        node.op, node.args, node.static = "constant", (), number if isinstance(number, bool) else float(number)
 
 
 def _single(value: object) -> object:

@@ -101,14 +101,17 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
     channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
     readings = sorted(made.readings[id(table)])
     rule = "linear between texel centers, " if "lookup" in readings else ""
-    about = f"// {size} texels, {channels}; {rule}clamped outside."
+    about = [
+        f"// {size} texels, {channels}; {rule}clamped outside.",
+        f"// They are in {names.table(table)}.f32, which an output folder (-o DIR/) holds beside the shader.",
+    ]
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2
     binding_lines = language.binding(names.table(table, "table_"), dimension, binding, *group)
     if language.methods:
-        return [*binding_lines, "", about, *method_readers(names, table, readings)]
+        return [*binding_lines, "", *about, *method_readers(names, table, readings)]
     readers = [line for how in readings for line in ("", *READERS[how](names, table))]
-    return [*binding_lines, "", about, *readers[1:]]
+    return [*binding_lines, "", *about, *readers[1:]]
 
 
 def values(made: Program, names: Names, numbers: Mapping[str, Any]) -> Block:

@@ -28,10 +28,21 @@ def cast(value: Value, kind: str) -> Value:
     if isinstance(value, Bits):
         if kind != "float" or value.number is not None:
             return value.number if kind == "float" else value
-        return ops.exp((value.exponent - float(BIAS)) * math.log(2.0))
+        return _power_of_two(value.exponent - float(BIAS))
     if kind == "float":
         raise refuse("a float from the bits of an integer that varies", "compute with floats")
     return Bits(value, None)
+
+
+def _power_of_two(e: Value) -> Value:
+    """2^e of a whole e, exactly; in 32 bits within rounding from 2^100 on.
+
+    `exp` is off by some roundings. They are in the lower half of the digits, which is 0 in a power of two and is cut
+    off by Veltkamp's splitting (Dekker1971).
+    """
+    about = ops.exp(e * math.log(2.0))
+    multiple = about * ((2.0**12 if ops.is_short(e) else 2.0**27) + 1.0)
+    return ops.where(e < 100.0, multiple - (multiple - about), about)
 
 
 def shifted_right(value: Bits, count: Value) -> Value:

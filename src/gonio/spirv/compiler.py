@@ -147,13 +147,16 @@ def _environment(program: str) -> dict[str, str]:
     return {"PATH": os.environ.get("PATH", ""), "LANG": "C", "LD_LIBRARY_PATH": str(libraries)}
 
 
-def _limit() -> None:
-    import resource
+def _limited(command: list[str]) -> list[str]:
+    """A command under limits of memory, time and output.
 
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 26, 1 << 26))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    The shell sets them: a `preexec_fn` would copy this process's page tables for every compilation.
+    """
+    if os.name != "posix":
+        return command
+    limits = {"v": MEMORY >> 10, "t": SECONDS, "f": (1 << 26) >> 9, "c": 0}  # KiB, seconds, blocks of 512 bytes
+    words = "; ".join(f"ulimit -{letter} {limit}" for letter, limit in limits.items())
+    return ["/bin/sh", "-c", f'{words}; exec "$@"', "sh", *command]
 
 
 def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
@@ -165,10 +168,9 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
         options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
         try:
             done = subprocess.run(
-                [compiler(), *options, str(source)],
+                _limited([compiler(), *options, str(source)]),
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                 timeout=2 * SECONDS, cwd=folder, env=_environment(compiler()),
-                preexec_fn=_limit if os.name == "posix" else None,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             raise InputError(f"the compiler took over {2 * SECONDS} s", name, "shorten the shader") from None

@@ -1,4 +1,4 @@
-"""Shader text in JavaScript files: template literals, read as data. No JavaScript is executed.
+"""Shader text in JavaScript files: template literals, or named strings, read as data. No JavaScript is executed.
 
 Engines on npm keep their shaders in such files:
 
@@ -8,6 +8,7 @@ Engines on npm keep their shaders in such files:
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from ..errors import InputError
@@ -51,6 +52,8 @@ def shader_in(text: str, name: str, where: str) -> Literal:
     """The literal of a name; of a file with one literal, that. Raises InputError if there is none without code."""
     every = literals(text, where)
     chosen = [one for one in every if one.name == name] if name else every
+    if name and not chosen:  # bundlers write strings
+        chosen = [one for one in _strings(text) if one.name == name]
     if len(chosen) != 1:
         what = f"{len(chosen)} template literals{f' named {name}' if name else ''}"
         known = ", ".join(one.name for one in every if one.name)
@@ -58,6 +61,16 @@ def shader_in(text: str, name: str, where: str) -> Literal:
     if chosen[0].code:
         raise InputError("'${': this text is made by running JavaScript", f"{where}:{chosen[0].code}", "write it out")
     return chosen[0]
+
+
+def _strings(text: str) -> Iterator[Literal]:
+    """The strings of a JavaScript text that are given a name."""
+    for token in _TOKEN.finditer(text):
+        if token[0][0] in "'\"" and (
+            named := _NAMED.search(text[max(token.start() - _NAME_BEFORE, 0) : token.start()])
+        ):
+            line = text.count("\n", 0, token.start()) + 1
+            yield Literal(named[1] or named[2], _unescaped(token[0][1:-1]), line)
 
 
 def _end(text: str, start: int, where: str) -> tuple[int, int]:

@@ -141,8 +141,8 @@ def length(v: Value) -> Value:
 
 
 def normalize(v: Value) -> Value:
-    """v / |v|."""
-    return elementwise(divide, v, length(v))
+    """v (1 / |v|), as GPUs and the vocabulary compute it."""
+    return elementwise(multiply, v, divide(1.0, length(v)))
 
 
 def cross(a: tuple[Value, ...], b: tuple[Value, ...]) -> Value:

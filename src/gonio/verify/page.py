@@ -13,7 +13,7 @@ from pathlib import Path
 from .. import files
 from .forensics import diagnosis
 from .report import Report
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, NOT_TRIED, PASS, TOLERATED, Card, Verdict
 
 CLASSES = {
     PASS: "pass",
@@ -22,6 +22,7 @@ CLASSES = {
     KNOWN: "declared",
     TOLERATED: "declared",
     NOT_APPLICABLE: "none",
+    NOT_TRIED: "declared",
 }
 
 STYLE = """
@@ -71,6 +72,9 @@ def page(report: Report) -> str:
     broken = len(report.failures)
     word = "All laws hold" if not broken else f"{broken} {'law is' if broken == 1 else 'laws are'} violated"
     kind = "pass" if not broken else "fail"
+    if report.untried:
+        word = f"{word if broken else 'No law is violated'}; not tried: {', '.join(report.untried)}"
+        kind = kind if broken else "declared"
     tests = (
         f"{report.tests} statistical tests at {report.threshold:.2e} each, one false alarm in a hundred reports; "
         "a rejection is confirmed with a second seed."

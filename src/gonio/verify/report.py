@@ -10,7 +10,7 @@ from .._version import __version__
 from . import statistics, terminal
 from .laws import chosen
 from .severity import Grade
-from .verdict import DECLARED, Card, Verdict
+from .verdict import DECLARED, NOT_TRIED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,6 +56,12 @@ class Report:
     def failures(self) -> list[Verdict]:
         return [verdict for card in self.cards for verdict in card.verdicts if verdict.failed]
 
+    @property
+    def untried(self) -> list[str]:
+        """The laws that could not be tried here, or not completely."""
+        verdicts = [verdict for card in self.cards for verdict in card.verdicts]
+        return list(dict.fromkeys(verdict.law for verdict in verdicts if verdict.status == NOT_TRIED))
+
     def __getitem__(self, law: str) -> Verdict:
         """The first failing verdict of that law, else the first."""
         verdicts = [card[law] for card in self.cards]
@@ -85,6 +91,8 @@ class Report:
             console.print(f"fixed: {line}", markup=False)
         broken = len(self.failures)
         word = f"[green]{self._holding()}[/]" if not broken else f"[bold red]{broken} violated[/]"
+        if self.untried:
+            word = " ".join(filter(None, [word, f"[bold yellow]{' and '.join(self.untried)} NOT TRIED[/]"]))
         tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (0.01 over all)"
         asked = tests if self.tests else "no statistical test"
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
@@ -94,8 +102,8 @@ class Report:
         statuses = [(verdict.law, verdict.status) for card in self.cards for verdict in card.verdicts]
         judged = dict.fromkeys(law for law, _ in statuses)
         declared = dict.fromkeys(law for law, status in statuses if status == DECLARED)
-        sound = [law for law in judged if law not in declared]
-        if all(law.name in judged for law in chosen(None)):
+        sound = [law for law in judged if law not in declared and law not in self.untried]
+        if all(law.name in sound or law.name in declared for law in chosen(None)):
             return "all laws hold" + (f", but {' and '.join(declared)} as declared" if declared else "")
         holding = f"{' and '.join(sound)} hold{'s' if len(sound) == 1 else ''}" if sound else ""
         breaking = f"{' and '.join(declared)} break{'s' if len(declared) == 1 else ''} as declared" if declared else ""

@@ -27,7 +27,7 @@ from .isolation.watch import limited
 from .laws import Law, chosen
 from .report import Report, significance
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, Finding, Verdict
+from .verdict import DECLARED, FAIL, NOT_APPLICABLE, NOT_TRIED, PASS, Card, DoesNotApply, Finding, Verdict
 
 DEFAULT_SEED = 1
 # steps of judging a subject besides the laws
@@ -331,6 +331,8 @@ def decide(
     elif over:
         why.append(_exceeds(finding))
     why += statistical
+    if status == PASS and finding.untried:
+        status, why = NOT_TRIED, [finding.untried]
     settings = Subject(one.model, one.target, {**one.settings, **finding.settings})
     more = ["--at", "/".join(directions.text(w) for w in finding.at)] if finding.at is not None else []
     if finding.at is None:

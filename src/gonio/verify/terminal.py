@@ -9,7 +9,7 @@ import numpy as np
 from . import directions
 from .forensics import diagnosis
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, TOLERATED, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, NOT_TRIED, PASS, TOLERATED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +21,7 @@ MARKS = {
     KNOWN: "[yellow]fails, known[/]",
     TOLERATED: "[yellow]fails, tolerated:[/]",
     NOT_APPLICABLE: "[dim]-[/]",
+    NOT_TRIED: "[bold yellow]NOT TRIED[/]",
 }
 
 
@@ -70,6 +71,8 @@ def _remark(verdict: Verdict) -> str:
         return "does not apply: " + "; ".join(verdict.why)
     if verdict.failed or verdict.excused:
         return verdict.title
+    if verdict.status == NOT_TRIED:
+        return "; ".join(verdict.why)
     return verdict.notes[0] if verdict.notes else ""
 
 

@@ -20,6 +20,7 @@ from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
 KNOWN = "known"  # failed already when the baseline was written
+NOT_TRIED = "not tried"  # something that the law needs is not installed here
 TOLERATED = "tolerated"  # fails, but no more than the user tolerates in pictures
 
 
@@ -50,6 +51,7 @@ class Finding:
     worst      description of the worst case; `at` is its pair of directions, for the command that repeats it
     settings   parameter values of the worst case, if they are not the given ones
     problems   violations that fail the law regardless of the figure
+    untried    why some of it could not be tried here, so that the law cannot pass; "" if all was tried
     notes      further information
     breach     size to compare with a declared violation, if that is not the figure
     evidence   data of the report's figure
@@ -66,6 +68,7 @@ class Finding:
     settings: dict[str, object] = dataclasses.field(default_factory=dict)
     trials: list[Trial] = dataclasses.field(default_factory=list)
     problems: list[str] = dataclasses.field(default_factory=list)
+    untried: str = ""
     notes: list[str] = dataclasses.field(default_factory=list)
     breach: float | None = None
     evidence: Evidence | None = None

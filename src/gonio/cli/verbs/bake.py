@@ -18,7 +18,7 @@ class Baking(Options):
     """What is baked, and how."""
 
     lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""
-    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, of ltc 64.")] = None
+    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, of ltc 64, or 16.")] = None
     method: Annotated[str, Option(metavar="NAME", help="Integrate by quadrature, cosine, ggx, visible, ...")] = (
         "quadrature"
     )
@@ -84,8 +84,8 @@ def bake(
     Tables of an anisotropic distribution have a third axis, the azimuth. Of a material without roughness: E over the
     cosine. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
 
-    `--lut ltc` fits linearly transformed cosines to an isotropic material, and writes their error and the shader code
-    of area lights.
+    `--lut ltc` fits linearly transformed cosines to a material, and writes their error and the shader code of area
+    lights. Of an anisotropic material the tables have an axis for the azimuth, and 16 texels along the others.
 
     \b
     Examples:

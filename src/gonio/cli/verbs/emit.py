@@ -123,6 +123,11 @@ def _write_shader(shader: Bundle, single: list[Path], folders: list[Path], as_js
     """Write a shader to files and folders, or print it."""
     from ... import files
 
+    if shader.tables and not folders:
+        count = len(shader.tables)
+        words = "a table that is" if count == 1 else f"{count} tables that are"
+        names = ", ".join(shader.tables)
+        print(f"the shader reads {words} not in its text: {names}; -o DIR/ writes them too", file=sys.stderr)
     written = [str(path) for folder in folders for path in shader.write(folder)]
     for path in single:
         files.write_whole(path, shader.text.encode())

@@ -86,6 +86,43 @@ def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar
     return cosine_quad(a, b, c, d)
 
 
+@function
+def in_view(wo: Direction, p: Direction) -> Direction:
+    """p in the frame whose x axis lies below wo, of a surface whose own axes are planes of symmetry.
+
+    wo and p are mirrored first, so that wo lies between +x and +y.
+    """
+    size = sqrt(maximum(wo.x * wo.x + wo.y * wo.y, 1e-20))
+    c = where(size > 1e-8, ops.abs(wo.x) / size, 1.0)
+    s = where(size > 1e-8, ops.abs(wo.y) / size, 0.0)
+    x, y = where(wo.x < 0.0, -p.x, p.x), where(wo.y < 0.0, -p.y, p.y)
+    return vec3(x * c + y * s, y * c - x * s, p.z)
+
+
+def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
+    """`quad` of an anisotropic lobe.
+
+    inverse  the numbers of W by rows, without the middle one, which is 1; W acts in the frame of `in_view`
+    """
+    a, b, c, d, e, f, g, h = inverse
+
+    def transformed(p: Direction) -> Direction:
+        v = in_view(wo, p)
+        return ops.normalize(vec3(a * v.x + b * v.y + c * v.z, d * v.x + v.y + e * v.z, f * v.x + g * v.y + h * v.z))
+
+    first, second, third, fourth = (transformed(p) for p in corners)
+    return cosine_quad(first, second, third, fourth)
+
+
+def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
+    """`coordinates` of a table with an axis for the azimuth, before that for the angle."""
+    size = wo.x * wo.x + wo.y * wo.y
+    azimuth = ops.atan2(ops.abs(wo.y), where(size > 1e-16, ops.abs(wo.x), 1.0)) * (2.0 / ops.pi)
+    column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
+    place = (inset(azimuth, table.shape[-2]), column)
+    return (inset(minimum(roughness, 1.0), table.shape[0]), *place) if len(table.shape) == 3 else place
+
+
 def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
     """Where a table is read: of one row only the angle counts."""
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])

@@ -10,7 +10,7 @@ a roughness at once, from two starts: the fit of the rougher row, and the covari
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -55,6 +55,19 @@ class Row(NamedTuple):
     cubed: Array
 
 
+class Form(NamedTuple):
+    """How numbers describe W, one row of them per cell, and D by them.
+
+    density   (numbers, wi) -> D (cells, K)
+    slopes    (numbers, wi) -> D, and its derivatives (cells, numbers, K)
+    mirrored  numbers -> whether W mirrors, (cells,)
+    """
+
+    density: Callable[[Array, Array], Array]
+    slopes: Callable[[Array, Array], tuple[Array, Array]]
+    mirrored: Callable[[Array], NDArray[np.bool_]]
+
+
 class Points(NamedTuple):
     """Directions of integration per cell, their weights and the values there.
 
@@ -67,14 +80,14 @@ class Points(NamedTuple):
 
 
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
-    """Tables of a material's linearly transformed cosines over (roughness, sqrt(1 - mu)), nodes at both ends.
+    """Tables of an isotropic material over (roughness, sqrt(1 - mu)), nodes at both ends.
 
     schlick  store E and B in place of E in color, of a material with F = 1
     Returns arrays ltc_inverse (..., 4), ltc_norm (..., 2 or 3), ltc_error (..., 1); the manifest states the mean and
     the largest error of the lobe and of integrals over random quadrilaterals. A material without a roughness has one
-    row. Raises InputError if it is not isotropic, has a mirror lobe, is estimated by sampling or absorbs everything.
+    row. Raises InputError if it has a mirror lobe, is estimated by sampling or absorbs everything.
     """
-    path = _check(model, size)
+    path = check(model, size)
     roughness = np.linspace(0.0, 1.0, size) if path else np.zeros(1)
     mu = cosines(size)
     rows: list[Row] = []
@@ -107,14 +120,12 @@ def cosines(size: int) -> Array:
     return np.maximum(1.0 - np.linspace(0.0, 1.0, size) ** 2, MIN_COSINE)
 
 
-def _check(model: BSDF, size: int) -> str:
+def check(model: BSDF, size: int) -> str:
     """The path of the parameter that the roughness sets, or ""."""
     check_uniform(model)
     kind = type(model).__name__
     if not 2 <= size <= 256:
         raise InputError(f"linearly transformed cosines of {size} x {size} asked for", "--resolution", "give 2 to 256")
-    if not model.isotropic:
-        raise InputError(f"{kind} is anisotropic", "--lut", "ltc has one matrix per angle: give both widths one value")
     path = next(roughness_paths(model), "")
     if model.stochastic or at(model, path, 1.0).delta != "never":
         what = f"{kind} is estimated by random walks" if model.stochastic else f"{kind} has a mirror lobe"
@@ -142,11 +153,11 @@ def at(model: BSDF, path: str, roughness: float) -> BSDF:
 # --------------------------------------------------------------------------- values
 
 
-def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE) -> Points:
-    """Points for the integrals over a lobe and its surroundings, of a material and each cosine."""
+def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, phi: Array | None = None) -> Points:
+    """Points for the integrals over a lobe and its surroundings, of each cosine, at azimuths phi or 0."""
     kind = backend.types("float64")
     bound, cells = model.bind(kind), len(mu)
-    wo = direction(mu, np.pi * 0.0 * mu)
+    wo = direction(mu, np.zeros_like(mu) if phi is None else phi)
     u = np.tile(r_sequence(lobe, 3, 0.5), (cells, 1))
     sampled = bound.sample(kind.vec3(np.repeat(wo, lobe, 0).T), kind.vec3(u.T), "importance")
     near = np.array(sampled.wi, float).T.reshape(cells, lobe, 3)
@@ -195,23 +206,25 @@ def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
     given = points.wi, points.weight, lobe
     best = _first(points, lobe)
     if start is not None:
-        better = _loss(start, *given) < _loss(best, *given)
+        better = loss_of(PLANE, start, *given) < loss_of(PLANE, best, *given)
         best = np.where(better[:, None], start, best)
-    best, loss = _fitted(*given, best)
+    best, loss = fitted(PLANE, *given, best)
     for side in (1, -1):  # the fits of the neighbors, where they are better
         start = np.roll(best, side, axis=0)
-        cells = np.flatnonzero(_loss(start, *given) < loss)
+        cells = np.flatnonzero(loss_of(PLANE, start, *given) < loss)
         if len(cells):
             wi, weight, values = (part[cells] for part in given)
-            best[cells], loss[cells] = _fitted(wi, weight, values, start[cells])
+            best[cells], loss[cells] = fitted(PLANE, wi, weight, values, start[cells])
     best = best / best[:, 2:3]
     cubed, misplaced = lobe_errors(points, points.value.mean(-1), total, best)
     return Row(best, norm, misplaced, cubed)
 
 
-def lobe_errors(points: Points, lobe: Array, total: Array, inverse: Array) -> tuple[Array, Array]:
+def lobe_errors(
+    points: Points, lobe: Array, total: Array, inverse: Array, form: Form | None = None
+) -> tuple[Array, Array]:
     """(int |f cos - E D|^3, half of int |f cos / E - D|) of each cell; total (cells, 1) is E."""
-    difference = np.abs(lobe - total * _density(inverse, points.wi))
+    difference = np.abs(lobe - total * (form or PLANE).density(inverse, points.wi))
     shares = 0.5 * np.sum(points.weight * difference, axis=1) / total[:, 0]
     return np.sum(points.weight * difference**3, axis=1), shares
 
@@ -262,21 +275,30 @@ def _slopes(inverse: Array, wi: Array) -> tuple[Array, Array]:
     return value, slopes
 
 
-def _loss(inverse: Array, wi: Array, weight: Array, lobe: Array) -> Array:
+def _mirrored(inverse: Array) -> NDArray[np.bool_]:
+    determinant = inverse[:, 0] * inverse[:, 4] - inverse[:, 1] * inverse[:, 3]
+    mirrored: NDArray[np.bool_] = (inverse[:, 2] <= 0.0) | (determinant <= 0.0)
+    return mirrored
+
+
+PLANE = Form(_density, _slopes, _mirrored)  # a mirror plane through o and n
+
+
+def loss_of(form: Form, inverse: Array, wi: Array, weight: Array, lobe: Array) -> Array:
     """int |f - D|^3 of each cell; infinite where W mirrors."""
-    inverted = (inverse[:, 2] <= 0.0) | (inverse[:, 0] * inverse[:, 4] - inverse[:, 1] * inverse[:, 3] <= 0.0)
-    safe = np.where(inverted[:, None], (1.0, 0.0, 1.0, 0.0, 1.0), inverse)
-    return np.where(inverted, np.inf, np.sum(weight * np.abs(lobe - _density(safe, wi)) ** 3, axis=1))
+    with np.errstate(all="ignore"):
+        loss = np.sum(weight * np.abs(lobe - form.density(inverse, wi)) ** 3, axis=1)
+    return np.where(form.mirrored(inverse) | ~np.isfinite(loss), np.inf, loss)
 
 
-def _fitted(wi: Array, weight: Array, lobe: Array, start: Array) -> tuple[Array, Array]:
+def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array) -> tuple[Array, Array]:
     """(W, loss) of each cell from a start, by damped steps of Newton's method without second derivatives of D."""
     inverse, damping = start.copy(), np.full(len(start), 1e-2)
-    loss = _loss(inverse, wi, weight, lobe)
+    loss = loss_of(form, inverse, wi, weight, lobe)
     active = np.arange(len(start))
     for _ in range(STEPS):
         points = wi[active]
-        value, slopes = _slopes(inverse[active], points)
+        value, slopes = form.slopes(inverse[active], points)
         rest = lobe[active] - value
         pull = weight[active] * np.abs(rest)
         gradient = slopes @ (pull * rest)[..., None]
@@ -285,7 +307,7 @@ def _fitted(wi: Array, weight: Array, lobe: Array, start: Array) -> tuple[Array,
         diagonal *= 1.0 + damping[active, None]
         diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-300
         tried = inverse[active] + np.linalg.solve(matrix, gradient)[..., 0]
-        its = _loss(tried, points, weight[active], lobe[active])
+        its = loss_of(form, tried, points, weight[active], lobe[active])
         better = its < loss[active]
         done = better & (its > loss[active] * (1.0 - 1e-6))
         inverse[active[better]], loss[active[better]] = tried[better], its[better]
@@ -310,7 +332,7 @@ def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse:
         for cell in range(len(columns)):
             light = points.weight[cell] * points.value[cell].mean(-1)
             quads = corners[len(summed) : len(summed) + each]
-            summed += [np.sum(light[_inside(quad, points.wi[cell])]) / np.sum(light) for quad in quads]
+            summed += [np.sum(light[inside(quad, points.wi[cell])]) / np.sum(light) for quad in quads]
     used = np.repeat(inverse[np.ix_(rows, columns)].reshape(-1, 5), each, axis=0)
     wo = direction(np.tile(np.repeat(mu[columns], each), len(rows)), np.zeros(1))
     return np.abs(covered(used, wo, corners) - summed)
@@ -326,7 +348,7 @@ def random_quads(rng: np.random.Generator, count: int) -> Array:
     return np.asarray(corners, float)
 
 
-def _inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
+def inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
     """Whether directions pass through a quadrilateral."""
     sides = np.cross(quad, np.roll(quad, -1, axis=0)) @ wi.T
     ahead = quad.mean(0) @ np.cross(quad[1] - quad[0], quad[3] - quad[0])

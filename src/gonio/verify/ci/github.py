@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 from ..report import Report
+from ..verdict import NOT_TRIED
 from . import places
 
 _KINDS = {"error": "error", "warning": "warning", "note": "notice"}
@@ -16,15 +17,18 @@ def wanted() -> bool:
 
 
 def text(report: Report) -> str:
-    """A line per violated law, for its file if there is one; "" if all laws hold."""
+    """A line per law that is violated or was not tried, for its file if there is one; "" if all laws hold."""
     lines = []
     for card in report.cards:
         for verdict in card.verdicts:
-            if not verdict.failed and not verdict.excused:
+            untried = verdict.status == NOT_TRIED
+            if not verdict.failed and not verdict.excused and not untried:
                 continue
             place = places.of(card, verdict)
             options = {"file": place.file, "line": str(place.line)} if place else {}
-            options["title"] = f"{card.title}: {verdict.law}" + (f": {verdict.status}" if verdict.excused else "")
+            options["title"] = f"{card.title}: {verdict.law}" + (
+                f": {verdict.status}" if verdict.excused or untried else ""
+            )
             named = ",".join(f"{name}={_property(value)}" for name, value in options.items())
             lines.append(f"::{_KINDS[places.level(verdict)]} {named}::{_data(chr(10).join(places.words(verdict)))}\n")
     return "".join(lines)

@@ -6,7 +6,7 @@ import re
 from xml.etree import ElementTree as xml
 
 from ..report import Report
-from ..verdict import NOT_APPLICABLE, Card, Verdict
+from ..verdict import NOT_APPLICABLE, NOT_TRIED, Card, Verdict
 from . import places
 
 _FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0, even when escaped
@@ -39,10 +39,14 @@ def _case(suite: xml.Element, card: Card, verdict: Verdict) -> None:
     if verdict.failed:
         failure = xml.SubElement(case, "failure", message=first, type=places.grade(verdict) or verdict.law)
         failure.text = clean("\n".join(places.words(verdict)))
-    elif verdict.excused or verdict.status == NOT_APPLICABLE:
+    elif _skipped(verdict):
         xml.SubElement(case, "skipped", message=f"{verdict.status}: {first}")
     elif verdict.notes:
         xml.SubElement(case, "system-out").text = clean("\n".join(verdict.notes))
+
+
+def _skipped(verdict: Verdict) -> bool:
+    return verdict.excused or verdict.status in (NOT_APPLICABLE, NOT_TRIED)
 
 
 def _counts(cards: list[Card]) -> dict[str, str]:
@@ -51,7 +55,7 @@ def _counts(cards: list[Card]) -> dict[str, str]:
         "tests": str(len(verdicts)),
         "failures": str(sum(verdict.failed for verdict in verdicts)),
         "errors": "0",
-        "skipped": str(sum(verdict.excused or verdict.status == NOT_APPLICABLE for verdict in verdicts)),
+        "skipped": str(sum(map(_skipped, verdicts))),
     }
 
 

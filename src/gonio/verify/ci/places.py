@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...catalog import shaders
 from ...errors import GonioError
-from ..verdict import DECLARED, FAIL, Card, Verdict
+from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Verdict
 
 _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
@@ -44,10 +44,11 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def level(verdict: Verdict) -> str:
-    """ "error" for a failure, "warning" if no picture shows it, "note" if declared or known, else "none"."""
+    """ "error" for a failure, "warning" if no picture shows it, "note" if declared, known or not
+    tried, else "none"."""
     if verdict.status == FAIL:
         return "warning" if grade(verdict) in _SLIGHT else "error"
-    return "note" if verdict.excused or verdict.status == DECLARED else "none"
+    return "note" if verdict.excused or verdict.status in (DECLARED, NOT_TRIED) else "none"
 
 
 def grade(verdict: Verdict) -> str:

@@ -1,0 +1,78 @@
+"""glTF-Sample-Viewer: furnaces, the clamp of its anisotropic masking term, and causes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .base import Engine, Furnace, furnace, material
+
+INTRO = """The viewer that shows what the glTF specification means: `BRDF_lambertian`, `BRDF_specularGGX` and
+`BRDF_specularGGXAnisotropy`, mixed by Fresnel's terms as the loop over lamps in its program does. Sheen, clear coat,
+iridescence, transmission and environments are not judged."""
+
+
+def trials(folder: Path) -> dict[str, float]:
+    """Narrow lobes with the anisotropic term at strength 0, and with the other one."""
+    figures = {}
+    for rough in (0.25, 0.5):
+        settings = {"rough": rough, "strength": 0.0}
+        plain = furnace(material(folder, "gltf-standard", rough=rough), (0.05, 0.25, 1.0))
+        clamped = furnace(material(folder, "gltf-anisotropic", **settings), (0.05, 0.25, 1.0))
+        for name, cosine in enumerate(("005", "025", "1")):
+            figures |= {f"plain_{rough:g}_{cosine}": plain[name], f"clamped_{rough:g}_{cosine}": clamped[name]}
+    return figures
+
+
+def sections(figures: dict[str, dict[str, float]]) -> str:
+    """The clamp."""
+    last = list(figures.values())[-1]
+    rows = "\n".join(
+        f"| {rough:g} | {cosine} | {last[f'plain_{rough:g}_{key}']:.3f} | {last[f'clamped_{rough:g}_{key}']:.3f} |"
+        for rough in (0.25, 0.5)
+        for key, cosine in (("005", "0.05"), ("025", "0.25"), ("1", "1"))
+    )
+    return f"""## The clamp of the anisotropic masking term
+
+`V_GGX_anisotropic` ends in `clamp(v, 0.0, 1.0)`. V is G / (4 n.l n.v), which is 1/4 at normal incidence and exceeds 1
+wherever n.l n.v is less than a quarter of G, at grazing angles: there light is lost. `V_GGX` has no such clamp. White
+metal with anisotropy 0, for which both terms are the same function:
+
+| roughness | n.v | `BRDF_specularGGX` | `BRDF_specularGGXAnisotropy` |
+|---|---|---|---|
+{rows}
+
+Remedy: `max(v, 0.0)`, or the test of `V_GGX`."""
+
+
+CAUSES = {
+    ("gltf-standard", "precision"): "`D_GGX` computes `NdotH^2 (a2 - 1) + 1`, which near the lobe's center is the "
+    "difference of two numbers near 1. Remedy: 1 - NdotH^2 as the squared length of cross(n, h), as in Filament.",
+    ("gltf-standard", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
+    ("gltf-anisotropic", "positivity"): "At roughness 0 and strength 0 both widths of `D_GGX_anisotropic` are so small "
+    "that a2 / dot(f, f) is 0 / 0. Remedy: a smallest alpha for `at` too.",
+    ("gltf-standard", "positivity"): "At roughness 0 `D_GGX` divides 0 by 0 where h is the normal. Remedy: a smallest "
+    "alpha.",
+}
+
+ENGINE = Engine(
+    package="@khronosgroup/gltf-viewer",
+    title="glTF-Sample-Viewer",
+    home="https://github.com/KhronosGroup/glTF-Sample-Viewer",
+    intro=INTRO,
+    materials=("gltf-standard", "gltf-anisotropic"),
+    furnaces=(
+        Furnace("White metal", "gltf-standard", lambda r: {"rough": r}),
+        Furnace("White dielectric", "gltf-standard", lambda r: {"rough": r, "metal": 0.0}),
+        Furnace("White metal, anisotropy 0.7", "gltf-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
+    ),
+    remarks={
+        "White metal": "Single scattering without compensation, as the specification has it; the loss is that of GGX.",
+        "White dielectric": "`mix` of the diffuse and the specular lobe by F at the half vector of each lamp, as the "
+        "specification's appendix B has it. At grazing angles most lamps have a large v.h and a small F, so that the "
+        "diffuse lobe keeps nearly all, while the specular lobe reflects far more.",
+    },
+    trials=trials,
+    sections=sections,
+    causes=CAUSES,
+    programs=(),
+)
