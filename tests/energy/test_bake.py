@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gonio import cli
 from gonio.energy.albedo import quadrature
+from gonio.energy.albedo.monte_carlo import Sampling
 from gonio.energy.tables import bake as baking
 from gonio.energy.tables import baked as baked_files
 from gonio.energy.tables.axes import Axes
@@ -131,7 +132,7 @@ def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
 
 
 def test_sampled_tables_of_two_widths_agree_with_the_quadrature():
-    baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, method="visible", spp=4096)
+    baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, sampling=Sampling("visible", 4096))
     assert baked.manifest["error"]["E"]["max"] < 5e-3
     assert baked.manifest["error"]["E_avg"]["max"] < 2e-2
 

@@ -8,6 +8,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.energy import cache
+from gonio.energy.albedo.monte_carlo import Sampling
 from gonio.energy.compensation import curves
 from gonio.energy.tables import bake
 
@@ -88,7 +89,13 @@ def test_a_table_in_anothers_place_is_not_taken_for_it(folder):
 
 @pytest.mark.parametrize(
     "other",
-    [{"size": 5}, {"masking": "schlick-ibl"}, {"layout": "stretched"}, {"aspect": 0.5}, {"method": "ggx"}],
+    [
+        {"size": 5},
+        {"masking": "schlick-ibl"},
+        {"layout": "stretched"},
+        {"aspect": 0.5},
+        {"sampling": Sampling("ggx")},
+    ],
     ids=lambda o: next(iter(o)),
 )
 def test_another_option_is_another_file(folder, other):
