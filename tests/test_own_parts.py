@@ -145,6 +145,7 @@ def described(material: dict[str, Any]) -> dict[str, Any]:
 # --------------------------------------------------------------------------- scenes
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_scene_names_a_part_by_its_file_where_code_is_allowed(here: Path, kind: str) -> None:
     file = here / "scene.json"
@@ -295,6 +296,7 @@ def test_the_command_that_shows_a_failure_again_can_be_run(here: Path) -> None:
 # --------------------------------------------------------------------------- errors
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "command",
     ["emit sub/mine.py:OwnPower", "verify sub/mine.py:OwnPower --quick", "view sub/mine.py:OwnPower -o p"],

@@ -176,6 +176,7 @@ assert product() > 0
 """
 
 
+@pytest.mark.slow
 def test_denormal_numbers_depend_on_the_number_of_threads() -> None:
     """In a process of its own: what other tests load may change how the main thread rounds."""
     done = subprocess.run([sys.executable, "-c", DENORMAL], capture_output=True, text=True)
@@ -191,6 +192,7 @@ def ended(program: str, seconds: float) -> int | None:
         return None
 
 
+@pytest.mark.slow
 def test_asking_for_a_missing_emissive_texture_ends_the_process() -> None:
     assert ended("mi.Properties('x').get_emissive_texture('radiance')", 60) == -signal.SIGSEGV
 

@@ -28,6 +28,7 @@ def test_a_floor_of_light_covers_the_whole_hemisphere() -> None:
     assert ltc.covered(IDENTITY[None], UP[None], corners * (1, 1, -1))[0] == 0.0
 
 
+@pytest.mark.slow
 def test_lambert_is_a_cosine_itself() -> None:
     baked = ltc.bake(go.Lambert(0.5), 4)
     assert baked.arrays["ltc_inverse"].shape == (4, 4)
@@ -36,7 +37,7 @@ def test_lambert_is_a_cosine_itself() -> None:
     assert baked.manifest["error"]["ltc_inverse"]["max"] < 1e-5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     gold = go.Conductor.preset("Au")
     baked = ltc.bake(gold, 6)
@@ -49,6 +50,7 @@ def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     assert np.max(baked.arrays["ltc_error"][1:, :3]) < 0.03
 
 
+@pytest.mark.slow
 def test_a_distribution_has_the_two_albedos_of_the_split_sum() -> None:
     baked = go.bake("ggx", lut=["ltc"], resolution=3)
     both = go.bake("ggx", lut=["dfg"], resolution=3, layout="stretched")

@@ -12,6 +12,7 @@ CENTRES = (np.arange(64) + 0.5) / 64
 MU, ROUGHNESS = np.meshgrid(CENTRES, CENTRES[CENTRES >= 0.1])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("masking", "bar"),
     [("schlick-direct", 0.005), ("schlick-ibl", 0.005), ("smith-separable", 0.006), ("smith-correlated", 0.006)],
@@ -22,6 +23,7 @@ def test_hammersley_points_at_1024_samples_meet_the_homeworks_bar(masking, bar):
     assert np.sqrt(np.mean((found.value - exact) ** 2)) <= bar
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ndf", "method"), [("ggx", "ggx"), ("ggx", "visible"), ("beckmann", "beckmann"), ("beckmann", "visible")]
 )

@@ -19,6 +19,7 @@ N = 7
 WO, WI, U = random_directions(N, 91, upper=True), random_directions(N, 92, upper=True), random_numbers(N, 91)
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("precision, dtype", [("float32", np.float32), ("float64", np.float64)])
 @pytest.mark.parametrize("name", SMALL)
 def test_shapes_and_types_of_answers(name: str, precision: str, dtype: type) -> None:
@@ -35,6 +36,7 @@ def test_shapes_and_types_of_answers(name: str, precision: str, dtype: type) -> 
         assert [x.dtype for x in s] == [dtype, dtype, dtype, np.bool_, dtype]
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", SMALL)
 def test_drjit_vectors_give_drjit_values(name: str) -> None:
     material = SMALL[name]
@@ -74,6 +76,7 @@ def test_precision_is_set_for_all_or_for_one_call() -> None:
         go.Lambert().eval(WO, WI, precision="half")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["number", "array", "pair", "pair of arrays", "numpy number", "drjit"])
 def test_width_takes_every_form(form: str) -> None:
     a = np.linspace(0.1, 0.7, N)

@@ -126,6 +126,7 @@ def test_its_facets_add_up_to_the_surface_that_a_direction_sees(strangers: Any, 
     assert ndf.G1(vector(v), alpha).numpy()[0] * visible == pytest.approx(v[2], rel=1e-4)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "chosen",
     [{"ndf": "student-t-4"}, {"ndf": "flat"}, {"masking": "grooves"}, {"fresnel": "games"}, NAMES],
@@ -149,6 +150,7 @@ def test_a_conductor_samples_what_it_evaluates(strangers: Any, chosen: dict[str,
     assert np.all(integral < 1.0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("chosen", [{"ndf": "student-t-4"}, {"masking": "grooves"}], ids=["ndf", "masking"])
 def test_kulla_conty_closes_its_furnace(strangers: Any, chosen: dict[str, str]) -> None:
     """Tables of what single scattering misses are made for it, on axes chosen by the facts that it inherits."""

@@ -104,19 +104,21 @@ def agree(scene: Any, theirs_dict: dict, spp: int = 256, runs: int = 4, **settin
         assert worst < 6, f"{worst:.1f} sigma apart"
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_path_agrees_with_mitsuba_under_every_light(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))
     agree(scene, {"type": "path", "max_depth": 5}, integrator="path", max_depth=5)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", ["area", "gonio_area", "point", "constant", "two areas"])
 def test_direct_agrees_with_mitsuba(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))
     agree(scene, {"type": "direct"}, integrator="direct")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("light", [{"type": "constant"}, {"type": "directional", "direction": [0.2, -1.0, 0.1]}])
 def test_what_mitsuba_merges_stands_in_the_way_of_light(light: dict) -> None:
     """Two sheets of one material are one mesh, which the scene's box leaves out: without it light ends at 2 metres."""
@@ -155,6 +157,7 @@ def test_rough_glass_agrees_with_mitsuba() -> None:
     agree(scene, {"type": "path", "max_depth": 6}, integrator="path", max_depth=6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["directSampleLight", "directSampleBSDF"])
 def test_single_strategies_reach_the_same_mean(name: str) -> None:
     rough = {"type": "diffuse", "reflectance": rgb(0.5)}  # finite variance for either strategy alone
@@ -190,17 +193,20 @@ def furnace(bsdf: dict, **settings: Any) -> np.ndarray:
     return picture(scene, 256, **settings).mean(axis=(0, 1))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "directSampleLight", "directSampleBSDF", "whitted"])
 def test_a_white_ball_vanishes_in_a_white_furnace(name: str) -> None:
     assert furnace({"type": "diffuse", "reflectance": rgb(1.0)}, integrator=name) == pytest.approx(1, rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("bsdf", [{"type": "conductor", "material": "none"}, {"type": "dielectric"}])
 def test_mirror_and_glass_vanish_in_a_white_furnace(bsdf: dict) -> None:
     # Mitsuba's glass also scales radiance by 1/eta^2 on the way in and back on the way out: nothing remains.
     assert furnace(bsdf, integrator="path", max_depth=50) == pytest.approx(1, rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "whitted", "directSampleBSDF", "normal"])
 def test_passes_of_any_size_give_the_same_bits(name: str) -> None:
     scene = mi.load_dict(scene_dict(ball={"type": "dielectric"}, lamp=LAMPS["point and constant and area"]))
@@ -232,6 +238,7 @@ def test_max_depth_1_shows_lights_only_and_2_is_direct() -> None:
     assert np.array_equal(picture(scene, 16, max_depth=2), picture(scene, 16, integrator="direct"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "directSampleLight"])
 @pytest.mark.parametrize("kind, behind", [("gonio_area", True), ("area", False)])
 def test_the_back_of_a_two_sided_lamp_lights_the_floor(name: str, kind: str, behind: bool) -> None:
@@ -392,6 +399,7 @@ def test_the_recompilation_test_would_see_a_new_kernel() -> None:
     assert launched(work) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["directSampleLight", "path"])
 def test_ambient_light_adds_its_radiance_times_the_materials_coefficient(name: str) -> None:
     import gonio.mitsuba  # noqa: F401  (registers gonio_phong)
@@ -408,6 +416,7 @@ def test_ambient_light_changes_nothing_where_no_material_takes_it() -> None:
     assert np.array_equal(picture(scene, 4), picture(scene, 4, ambient=(1.0, 1.0, 1.0)))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", ["area", "two areas"])
 def test_a_spectral_scene_has_the_colours_of_mitsubas(lamp: str) -> None:
     try:
@@ -441,6 +450,7 @@ def test_zero_samples_and_a_scene_without_a_camera_are_errors() -> None:
         Render(mi.load_dict({"type": "scene", "s": {"type": "sphere"}}), Settings())
 
 
+@pytest.mark.slow
 def test_every_name_renders() -> None:
     scene = mi.load_dict(scene_dict(size=4))
     for integrator in Integrator.family.all():

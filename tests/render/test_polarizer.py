@@ -80,7 +80,7 @@ def expected(degrees: float, roll: float) -> np.ndarray:
     return found
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0])
 @pytest.mark.parametrize("roll", [0.0, 25.0])
 def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(
@@ -93,6 +93,7 @@ def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(
     assert np.abs(luminance - right).max() < 0.01 * expected(0.0, roll).max()
 
 
+@pytest.mark.slow
 def test_at_brewsters_angle_the_reflection_goes_out(tmp_path: Path) -> None:
     through, across = (rendered(tmp_path, polarizer=p)[8, 12].mean() for p in (0, 90))
     plain = rendered(tmp_path)[8, 12].mean()
@@ -100,6 +101,7 @@ def test_at_brewsters_angle_the_reflection_goes_out(tmp_path: Path) -> None:
     assert across < 0.01 * through
 
 
+@pytest.mark.slow
 def test_light_that_is_not_polarized_loses_a_half(tmp_path: Path) -> None:
     matte = {"type": "gonio-lambert", "albedo": 0.5}
     for degrees in (0, 77):

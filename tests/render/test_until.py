@@ -48,6 +48,7 @@ def finish(render: until.Until, size: int = 7) -> np.ndarray:
     return render.image()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("adapts", [False, True])
 def test_the_error_is_what_was_promised(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, adapts: bool
@@ -208,6 +209,7 @@ def test_passes_of_any_size_add_up_to_the_same_bits(scene: Path, tmp_path: Path,
     assert np.array_equal(a, b) and one.done == other.done > 2 * until.FIRST
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("at", [5, 16, 27])
 def test_one_that_was_stopped_goes_on_to_the_same_bits(scene: Path, tmp_path: Path, shared_out: None, at: int) -> None:
     whole = finish(drawing(scene, 3e-4, tmp_path))
@@ -230,6 +232,7 @@ def test_a_checkpoint_keeps_the_error_that_was_asked_for(scene: Path, tmp_path: 
         go.render(scene, until_error=1e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_pixels_samples_do_not_follow_its_own_values(scene: Path, tmp_path: Path, shared_out: None) -> None:
     """The mean of many pictures is the picture: shares that are chosen by samples which count too have no bias."""
     truth = go.render(scene, spp=16384, size=(16, 12), integrator="direct", seed=99)

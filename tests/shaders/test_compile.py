@@ -77,6 +77,7 @@ def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> 
 WGSL_QUICK = [n for n in SHAPES if n != "disney2015"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names",
     [WGSL_QUICK, pytest.param([n for n in EVERY if n not in WGSL_QUICK], marks=pytest.mark.slow)],
@@ -109,7 +110,7 @@ def _glslang(text: str, folder: Path) -> str:
 QUICK = set(SHAPES) - set(materials.COMPOSED) | {"openpbr"}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", materials.each(EVERY, QUICK))
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = written(name, "hlsl").text
@@ -124,6 +125,7 @@ def test_the_hlsl_compiler_refuses_what_is_wrong(tmp_path: Path) -> None:
     assert "unknown variable" in _glslang("float f() { return missing; }", tmp_path)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.long
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
 def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
@@ -134,6 +136,7 @@ def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
                 assert len(body) <= 60, f"{name}: {body[0]}"
 
 
+@pytest.mark.slow
 def test_random_walks_cannot_be_written_and_say_so() -> None:
     with pytest.raises(go.InputError, match="RandomWalk is estimated by random walks"):
         go.emit(go.RandomWalk(go.Conductor()))

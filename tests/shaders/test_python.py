@@ -87,7 +87,7 @@ def _check(name: str, language: str, number: Any) -> None:
             assert wrong.mean() <= 1e-2, (method, place, wrong.mean(), np.nanmax(np.abs(value - truth)))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", materials.each(EVERY, SOME))
 def test_numpy_says_what_gonio_says(name: str) -> None:
     _check(name, "numpy", np.asarray)
@@ -156,6 +156,7 @@ def test_gradients_are_those_of_differences(language: str) -> None:
         assert float(slope) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("language", ["numpy", "torch", "jax"])
 def test_every_file_is_python(language: str) -> None:
     """Compiled, not run: no library is needed."""

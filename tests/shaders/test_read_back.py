@@ -23,7 +23,7 @@ def inputs(count: int, transmits: bool) -> list[np.ndarray]:
     return [wo, wi, random.random((count, 3))]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("name", variants.SHAPES)
 def test_text_read_back_has_the_values_of_its_material(name: str, language: str) -> None:

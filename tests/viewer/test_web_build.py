@@ -50,6 +50,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return web
 
 
+@pytest.mark.slow
 def test_committed_files_equal_a_rebuild(copy: Path) -> None:
     npm("run", "build", folder=copy)
     built = copy.parent / "src" / "gonio" / "viewer" / "static"
