@@ -28,7 +28,7 @@ from gonio.fitting import batch
 from gonio.instruments.capture import rehearsal
 from gonio.pictures import images
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 RIG = {
     "camera": {"size": [24, 24], "focal": 95.0},

@@ -15,7 +15,7 @@ from pathlib import Path
 import gonio
 import pytest
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 GONIO = Path(sys.executable).with_name("gonio")
 TRACE = ("strace", "-f", "-qq", "-y", "-s", "4096", "-e", "trace=open,openat,openat2,execve", "-e", "signal=none")

@@ -19,7 +19,7 @@ from gonio.render.request import Request
 from gonio.scene import mitsuba_scene
 from gonio.verify import targets
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 XML = """<scene version="3.0.0"><integrator type="path"/>
 <sensor type="perspective"><film type="hdrfilm"/></sensor>
