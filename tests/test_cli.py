@@ -294,6 +294,7 @@ def test_a_file_in_a_folder_is_a_material(tmp_path: Path, monkeypatch: pytest.Mo
     assert Path("mine-own-albedo.png").is_file()
 
 
+@pytest.mark.slow
 def test_a_text_longer_than_a_files_name_may_be_is_a_material(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -541,6 +542,7 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
 
 
+@pytest.mark.slow
 def test_schema_is_a_json_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("schema") == 0
     printed = json.loads(capsys.readouterr().out)

@@ -191,7 +191,7 @@ def test_what_is_computed_lies_where_the_error_says(
     assert kept is not None and kept.stat().st_size > 0, told
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("stream", ["/dev/full", "&-"])
 def test_a_stream_that_takes_nothing_costs_no_picture(stream: str, place: Path) -> None:
     command = f"{sys.executable} -m gonio.cli render scene.json --spp 1 -o out/a.npz >{stream}"

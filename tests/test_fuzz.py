@@ -21,7 +21,7 @@ def test_what_was_found_and_a_few_spoilt_inputs_more_are_survived(tmp_path: Path
     assert run.run(targets, seed=7, count=known + FEW, finds=tmp_path) == {}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RENDERING)
 def test_readers_that_load_scenes_survive_in_a_process_each(name: str, tmp_path: Path) -> None:
     assert run.run([TARGETS[name]], seed=7, count=len(run.corpus(TARGETS[name])) + FEW, finds=tmp_path) == {}

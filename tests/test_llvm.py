@@ -140,7 +140,7 @@ def _python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("code", [
     "import gonio as go; go.Lambert().eval([0, 0, 1.], [0, 0, 1.])", "import gonio.mitsuba"
 ])  # fmt: skip
@@ -187,7 +187,7 @@ _QUICK = {(first, *order) for first in _IMPORTS for others in [[n for n in _IMPO
           for order in (others, others[::-1])}  # fmt: skip
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "order",
     [

@@ -195,6 +195,7 @@ def test_what_was_registered_since_is_a_name_in_scenes(here: Path) -> None:
     assert scene.read(here / "scene.json")
 
 
+@pytest.mark.slow
 def test_workers_get_files_with_what_they_import(here: Path) -> None:
     material = notation.named("sub/mine.py:OwnMetal")[0]
     described_material = scene.of_material(material, {})

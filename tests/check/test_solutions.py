@@ -105,7 +105,7 @@ def _judged(solution: Any, folder: Path) -> go.GonioError | Any:
     return go.check(folder / "f.csv", MODELS[model or kind])
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_solution_passes(name: str, tmp_path: Path) -> None:
     finding = _judged(RIGHT[name], tmp_path)

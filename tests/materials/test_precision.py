@@ -17,7 +17,7 @@ WO = random_directions(COUNT, 21).astype(np.float32).astype(np.float64)
 U = random_numbers(COUNT, 21)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", each(FINITE))
 def test_float32_is_close_to_float64(name: str) -> None:
     material = FINITE[name]
@@ -46,7 +46,7 @@ def test_transmission_near_the_critical_angle_keeps_its_digits_in_float32() -> N
     assert np.median(relative(quick[lit], precise[lit])) < 1e-4
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", each(FINITE))
 def test_samples_in_float32_are_those_in_float64(name: str) -> None:
     quick = FINITE[name].sample(WO, U, precision="float32")

@@ -55,6 +55,7 @@ def test_a_metal_is_found_again_with_its_indices() -> None:
     assert any("tied" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> None:
     """The channels of a Lambertian are independent, though the gloss that it lacks moves all three."""
     found = fit(table(PLASTIC), "lambert")

@@ -44,7 +44,7 @@ def test_projected_density_integrates_to_one(name: str, alpha: tuple[float, floa
     assert (d * DIRECTIONS[:, 2]) @ WEIGHTS == pytest.approx(1.0, abs=1e-8)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 55.0, 80.0, 88.0])
 @pytest.mark.parametrize("alpha", WIDTHS, ids=str)
 @pytest.mark.parametrize("name", NAMES)
@@ -112,7 +112,7 @@ def test_sampled_normals_follow_the_density(name: str, alpha: tuple[float, float
     assert _chi_square(lambda m: ndf.pdf(m, widths), normals) > SIGNIFICANCE
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("degrees", [0.0, 45.0, 85.0])
 @pytest.mark.parametrize("alpha", [(0.1, 0.1), (1.0, 1.0), (0.1, 0.5)], ids=str)
 @pytest.mark.parametrize("name", OWN_VISIBLE)

@@ -20,7 +20,7 @@ BY_PATH_ALL_THE_SAME = {"diamond/scene.json", "fibre/scene.json", "rainbow/scene
 EIGHT_KERNELS = "openpbr-layers/scene.json"  # one for each combination of layers
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == EIGHT_KERNELS else []) for name in SCENES]
 )

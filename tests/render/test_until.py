@@ -267,6 +267,7 @@ def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> N
         go.render(scene, spp=4, until_error=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("integrator", ["caustics", "light", "normal"])
 def test_every_integrator_of_gonios_goes_on_until_an_error(scene: Path, tmp_path: Path, integrator: str) -> None:
     render = drawing(scene, 0.02, tmp_path, integrator=integrator, denoise=False, max_depth=None)

@@ -255,7 +255,7 @@ class Ward(BSDF):
 """
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [
     "import gonio.mitsuba; go.BSDF.family.add(Ward)",
     "go.BSDF.family.add(Ward); import gonio.mitsuba",

@@ -110,7 +110,7 @@ def _glslang(text: str, folder: Path) -> str:
 QUICK = set(SHAPES) - set(materials.COMPOSED) | {"openpbr"}
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", materials.each(EVERY, QUICK))
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = written(name, "hlsl").text
@@ -125,8 +125,7 @@ def test_the_hlsl_compiler_refuses_what_is_wrong(tmp_path: Path) -> None:
     assert "unknown variable" in _glslang("float f() { return missing; }", tmp_path)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
 def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
     for name in FEW:

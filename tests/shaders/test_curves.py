@@ -72,6 +72,7 @@ def test_a_budget_chooses_the_most_exact_form() -> None:
     assert str(found[0]) in made.text.replace("\n// ", " ")
 
 
+@pytest.mark.slow
 def test_a_budget_chooses_cheaper_terms_of_a_material() -> None:
     model, found = tiers.cheapest(GOLD, 150)
     assert model.fresnel == "schlick" and found[0].cost == 140 and 0.0 < found[0].mean < 0.01

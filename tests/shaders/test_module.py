@@ -27,6 +27,7 @@ def _declared(text: str) -> list[str]:
     return [*functions, *others]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "wgsl"])
 def test_bundles_with_prefixes_share_no_name(lang: str) -> None:
     """Any two bundles shared 11 to 38 names, and could not stand in one module."""
@@ -36,8 +37,7 @@ def test_bundles_with_prefixes_share_no_name(lang: str) -> None:
     assert not a & b and all(name.startswith("a_") for name in a)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "wgsl"])
 def test_a_module_declares_each_name_once(lang: str) -> None:
     made = bundle(SEVERAL, lang, constants=True)

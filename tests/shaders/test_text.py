@@ -75,7 +75,7 @@ def test_nothing_is_defined_and_not_used(name: str) -> None:
             assert len(re.findall(rf"\b{local}\b", body)) > 1, f"{function}: {local}"
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", [n for n in COMPENSATED if "turquin" not in n])
 def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) -> None:
     made = bundle(COMPENSATED[name])
@@ -88,7 +88,7 @@ def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) 
     assert "lookup_missing" in derive and not any("lookup_missing" in body for body in functions.values())
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lang", LANGS)
 def test_manifest_tells_what_a_program_must_know(lang: str) -> None:
     made = bundle(go.KullaConty(go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.5)), lang)
@@ -220,7 +220,7 @@ def test_the_manifest_names_functions_of_its_own_struct(name: str, lang: str) ->
         assert re.search(rf"\b{function} ?\({first}", made.text), f"{function} of {struct}"
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FEW)
 def test_locals_have_names_of_the_source_and_a_digit_is_a_power(name: str) -> None:
     """Two values of one name are x, x_2: x2 is the square of x. None is named for its operation."""
@@ -252,6 +252,7 @@ def test_values_made_by_small_functions_of_the_source_bear_their_names() -> None
     assert "bool above = wo.z > 0.0 && wi.z > 0.0;" in _functions(go.emit(GOLD))["Conductor_sample"]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("lang", LANGS)
 def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: str) -> None:
     text = go.emit(go.KullaConty(GOLD), lang)

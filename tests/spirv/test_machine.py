@@ -102,7 +102,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("what", REFUSED)
 def test_construct_without_meaning_is_refused_by_name_and_line(what: str) -> None:
     with pytest.raises(InputError) as error:

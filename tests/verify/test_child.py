@@ -113,7 +113,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
     return verify(f"{file}:{name}", quick=True, law=["reciprocity", "weight", "isotropy"], **more)  # type: ignore[arg-type]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "words"),
     [

@@ -272,7 +272,7 @@ def test_a_scene_without_light_gets_the_pages_and_a_note(tmp_path: Path) -> None
     assert any("no light" in note for note in what.notes)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["shading-balls", "conductor-ggx", "textured", "white-furnace", "rough-dielectric"])
 def test_the_examples_can_be_viewed(name: str) -> None:
     data = page.page_data(lab_scene.stage(EXAMPLES / name))

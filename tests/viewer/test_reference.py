@@ -204,6 +204,7 @@ def test_under_a_black_environment_a_ball_is_black_and_not_gone() -> None:
     assert np.array_equal(dark[..., 3], lit[..., 3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "light",
     [pytest.param("directional", marks=pytest.mark.slow), pytest.param("area", marks=pytest.mark.slow), "environment"],

@@ -117,7 +117,7 @@ def test_old_classes_go(file: Path) -> None:
     assert sum(cls() is not None for cls in made) <= 1
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", list(BROKEN))
 def test_an_error_names_file_line_and_remedy(file: Path, name: str) -> None:
     before, after, where, what, hint = BROKEN[name]

@@ -59,6 +59,7 @@ def test_committed_files_equal_a_rebuild(copy: Path) -> None:
         assert (built / name).read_bytes() == (STATIC / name).read_bytes(), f"{name}: run `npm run build` in web/"
 
 
+@pytest.mark.slow
 def test_types_hold(copy: Path) -> None:
     npm("run", "check", folder=copy)
 

@@ -176,5 +176,6 @@ def test_what_is_read_of_the_picture_is_sampled_alone(lit: Page) -> None:
     np.testing.assert_array_equal(lit.picture(4), with_it)
 
 
+@pytest.mark.slow
 def test_the_page_stays_small(lit_page: Page) -> None:
     assert Path(lit_page.path).stat().st_size <= 1_500_000
