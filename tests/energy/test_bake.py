@@ -39,7 +39,7 @@ def test_axes_are_texel_centres_and_rows_are_roughness():
     assert baked.arrays["E_avg"].shape == (16,)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_manifests_error_is_within_a_factor_3_of_the_truth():
     baked = baking.bake("ggx", ["E"], size=64)
     mu, roughness = baked.arrays["mu"], baked.arrays["roughness"]

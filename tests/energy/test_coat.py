@@ -50,7 +50,6 @@ def test_white_on_white_keeps_all_light(alpha: float) -> None:
         assert np.all((found > 0.99) & (found < 1.004)), found
 
 
-@pytest.mark.slow
 def test_a_coat_is_reciprocal_over_any_base() -> None:
     model = COAT(go.Conductor.preset("Au", alpha=0.3), absorption=(0.1, 0.5, 1.0))
     forth, back = model.f(WO, WI, precision="float64"), model.f(WI, WO, precision="float64")

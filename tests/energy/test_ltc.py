@@ -28,7 +28,6 @@ def test_a_floor_of_light_covers_the_whole_hemisphere() -> None:
     assert ltc.covered(IDENTITY[None], UP[None], corners * (1, 1, -1))[0] == 0.0
 
 
-@pytest.mark.slow
 def test_lambert_is_a_cosine_itself() -> None:
     baked = ltc.bake(go.Lambert(0.5), 4)
     assert baked.arrays["ltc_inverse"].shape == (4, 4)
@@ -37,7 +36,7 @@ def test_lambert_is_a_cosine_itself() -> None:
     assert baked.manifest["error"]["ltc_inverse"]["max"] < 1e-5
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     gold = go.Conductor.preset("Au")
     baked = ltc.bake(gold, 6)

@@ -88,7 +88,7 @@ def test_it_is_reciprocal_where_its_base_is():
         np.testing.assert_allclose(forth, back, rtol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["phong", "own", "coated"])
 def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
     model = go.KullaConty(WHITE[name])

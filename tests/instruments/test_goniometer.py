@@ -197,7 +197,6 @@ def test_a_measured_table_is_what_convert_writes(suffix: str, tmp_path: Path) ->
     assert np.array_equal(values(a), values(b))
 
 
-@pytest.mark.slow
 def test_a_model_s_cells_hold_its_values_at_their_middles(tmp_path: Path) -> None:
     gold = go.Conductor.preset("Au", alpha=0.2)
     found = go.measure(gold, tmp_path / "gold.binary")

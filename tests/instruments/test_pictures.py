@@ -57,7 +57,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_width_and_colour_are_found_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["fit", "--from", folder / "true.npz", "--scene", folder / "scene.json", "--spp", 64, "--json"]
     words += ["-o", folder / "found.json", *(word for path in FREE for word in ("--free", path))]

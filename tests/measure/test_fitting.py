@@ -65,7 +65,7 @@ def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> N
     assert np.all(ends[:, 0] >= 0.0) and np.all(ends[:3, 1] <= 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_sum_of_lobes_is_found_again() -> None:
     found = fit(table(PLASTIC), "lambert+ggx")
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.01)
@@ -188,7 +188,6 @@ def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
     np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
-@pytest.mark.slow
 def test_parameters_that_are_held_stay() -> None:
     found = fit(table(METAL), "conductor(alpha=.25)", param={"k": METAL.k})
     assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")

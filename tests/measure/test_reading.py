@@ -89,7 +89,6 @@ def test_invalid_cells_of_merl_are_kept_and_are_no_light(files: dict[str, Path])
     assert model.eval(wo[lit], wi[lit]).min() >= 0.0
 
 
-@pytest.mark.slow
 def test_merl_is_exact_at_the_middle_of_cells() -> None:
     model = go.Conductor.preset("Au", alpha=0.2)
     merl = formats()["merl"]

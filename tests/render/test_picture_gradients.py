@@ -78,7 +78,6 @@ def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.abs(a.mean(0) - b.mean(0)) / np.sqrt(0.5 * (square + square.mean()) + 1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("material", "path", "values", "step"),
     [

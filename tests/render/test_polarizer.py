@@ -93,7 +93,6 @@ def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(
     assert np.abs(luminance - right).max() < 0.01 * expected(0.0, roll).max()
 
 
-@pytest.mark.slow
 def test_at_brewsters_angle_the_reflection_goes_out(tmp_path: Path) -> None:
     through, across = (rendered(tmp_path, polarizer=p)[8, 12].mean() for p in (0, 90))
     plain = rendered(tmp_path)[8, 12].mean()

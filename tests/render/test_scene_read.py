@@ -506,7 +506,6 @@ def test_mutated_scene_reads_or_is_refused_but_nothing_else(tmp_path, data):
         assert error.what and error.where and error.hint
 
 
-@pytest.mark.slow
 @settings(
     max_examples=200, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

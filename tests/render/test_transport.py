@@ -185,7 +185,6 @@ def test_the_map_of_caustics_takes_nothing_and_adds_nothing(lamp: str) -> None:
     assert b.mean() == pytest.approx(a.mean(), rel=0.01)
 
 
-@pytest.mark.slow
 def test_caustics_of_a_point_which_no_path_finds_are_those_of_particles() -> None:
     lamp = {"type": "point", "position": [2.5, 1.6, 0.5], "intensity": rgb(20)}
     drawn = scene({"lamp": lamp}, GLASS, size=32)

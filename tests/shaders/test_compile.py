@@ -77,7 +77,6 @@ def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> 
 WGSL_QUICK = [n for n in SHAPES if n != "disney2015"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "names",
     [WGSL_QUICK, pytest.param([n for n in EVERY if n not in WGSL_QUICK], marks=pytest.mark.slow)],

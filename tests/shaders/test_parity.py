@@ -72,7 +72,6 @@ def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
     _check(page, "glsl", name, 64)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])
 def test_wgsl_gives_the_values_of_python(page: Any, name: str) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):

@@ -78,7 +78,6 @@ def step(w: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.nextafter(w32, w32 + rng.choice(np.float32([-1, 1]), w.shape), dtype=np.float32).astype(float)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("slot", range(len(MODELS)))
 def test_evaluator_agrees_with_python(opened: Opened, slot: int) -> None:
     rng = np.random.default_rng(1)
