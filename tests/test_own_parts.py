@@ -145,7 +145,6 @@ def described(material: dict[str, Any]) -> dict[str, Any]:
 # --------------------------------------------------------------------------- scenes
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_scene_names_a_part_by_its_file_where_code_is_allowed(here: Path, kind: str) -> None:
     file = here / "scene.json"

@@ -138,7 +138,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("change", ["none", "a row", "exposure", "linear"])
 def test_a_right_picture_passes_moved_exposed_or_without_gamma(scene: Path, tmp_path: Path, change: str) -> None:
     picture = go.render(scene, spp=8, seed=7)

@@ -18,7 +18,6 @@ def test_the_sphere_has_its_area_and_a_cosine_its_half() -> None:
     np.testing.assert_allclose(area.value, np.tile([4.0 * np.pi, np.pi], (4, 1)), rtol=1e-9)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("alpha", [0.003, 0.05, 1.0])
 def test_the_error_that_is_stated_covers_the_one_that_is_made(alpha: float) -> None:
     model = go.Conductor(alpha=alpha, fresnel="one")

@@ -126,7 +126,6 @@ def test_a_wrong_level_is_told():
     assert stated["level_2"]["rms"] == pytest.approx(0.05, rel=0.02)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("alpha", [0.1, 0.6])
 def test_the_split_sum_is_judged_by_the_metal_itself(alpha):
     """int L f cos di with `eval` of a white metal, in a frame of its own."""

@@ -104,7 +104,6 @@ def test_e_avg_of_schlick_direct_at_low_roughness_is_the_false_rim():
     assert quadrature.average("ggx", "schlick-direct", np.array([0.05**2]))[0] == pytest.approx(0.835, abs=5e-4)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("masking", MASKINGS)
 def test_e_avg_agrees_with_adaptive_integration_of_e(masking):
     alpha = 0.36

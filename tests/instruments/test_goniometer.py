@@ -33,7 +33,7 @@ def values(table: Measurement) -> np.ndarray:
 # ---------------------------------------------------------------------- light is counted
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "surface", ["gaussian:alpha=1,squares=64", "vgroove:sigma=.6", "spheres:coverage=.1", "heights.exr"]
 )

@@ -76,7 +76,6 @@ def test_precision_is_set_for_all_or_for_one_call() -> None:
         go.Lambert().eval(WO, WI, precision="half")
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["number", "array", "pair", "pair of arrays", "numpy number", "drjit"])
 def test_width_takes_every_form(form: str) -> None:
     a = np.linspace(0.1, 0.7, N)

@@ -42,7 +42,6 @@ def test_eon_is_single_scattering_and_what_that_loses(r: float) -> None:
     np.testing.assert_allclose(got, expected, rtol=2e-4)
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("energy", ["exact", "fit"])
 @pytest.mark.parametrize("r", [0.0, 0.2, 1.0])
 def test_a_white_eon_returns_all_light(r: float, energy: str) -> None:

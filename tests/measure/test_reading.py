@@ -194,7 +194,6 @@ def claiming(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
     return stream.getvalue()
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "archive",
     [

@@ -150,7 +150,6 @@ def test_a_conductor_samples_what_it_evaluates(strangers: Any, chosen: dict[str,
     assert np.all(integral < 1.0)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("chosen", [{"ndf": "student-t-4"}, {"masking": "grooves"}], ids=["ndf", "masking"])
 def test_kulla_conty_closes_its_furnace(strangers: Any, chosen: dict[str, str]) -> None:
     """Tables of what single scattering misses are made for it, on axes chosen by the facts that it inherits."""

@@ -61,7 +61,6 @@ def test_beta_of_a_grazing_direction_is_its_limit() -> None:
     np.testing.assert_allclose(beta(_number(np.ones(50), "float64"), _number(b, "float64")).numpy(), 1 / b, rtol=1e-7)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("p", [None, 1.0, 30.0, 1000.0])
 def test_warps_follow_their_densities(p: float | None) -> None:
     kind = backend.types("float64")

@@ -68,7 +68,7 @@ def written(folder: Path, materials: list[Material]) -> Path:
     return folder
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", [paint, gold, brushed, layered, polished])
 def test_the_picture_is_that_of_the_single_materials(
     kind: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -376,7 +376,6 @@ def test_a_full_disk_costs_the_checkpoint_and_not_the_picture(
 # --- Mitsuba's scenes ----------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("integrator", [None, "path"])
 def test_a_mitsuba_scene_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str | None) -> None:
     monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples

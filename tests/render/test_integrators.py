@@ -104,14 +104,13 @@ def agree(scene: Any, theirs_dict: dict, spp: int = 256, runs: int = 4, **settin
         assert worst < 6, f"{worst:.1f} sigma apart"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_path_agrees_with_mitsuba_under_every_light(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))
     agree(scene, {"type": "path", "max_depth": 5}, integrator="path", max_depth=5)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", ["area", "gonio_area", "point", "constant", "two areas"])
 def test_direct_agrees_with_mitsuba(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))
@@ -157,7 +156,6 @@ def test_rough_glass_agrees_with_mitsuba() -> None:
     agree(scene, {"type": "path", "max_depth": 6}, integrator="path", max_depth=6)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["directSampleLight", "directSampleBSDF"])
 def test_single_strategies_reach_the_same_mean(name: str) -> None:
     rough = {"type": "diffuse", "reflectance": rgb(0.5)}  # finite variance for either strategy alone
@@ -193,13 +191,11 @@ def furnace(bsdf: dict, **settings: Any) -> np.ndarray:
     return picture(scene, 256, **settings).mean(axis=(0, 1))
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "directSampleLight", "directSampleBSDF", "whitted"])
 def test_a_white_ball_vanishes_in_a_white_furnace(name: str) -> None:
     assert furnace({"type": "diffuse", "reflectance": rgb(1.0)}, integrator=name) == pytest.approx(1, rel=2e-3)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("bsdf", [{"type": "conductor", "material": "none"}, {"type": "dielectric"}])
 def test_mirror_and_glass_vanish_in_a_white_furnace(bsdf: dict) -> None:
     # Mitsuba's glass also scales radiance by 1/eta^2 on the way in and back on the way out: nothing remains.
@@ -450,7 +446,6 @@ def test_zero_samples_and_a_scene_without_a_camera_are_errors() -> None:
         Render(mi.load_dict({"type": "scene", "s": {"type": "sphere"}}), Settings())
 
 
-@pytest.mark.slow
 def test_every_name_renders() -> None:
     scene = mi.load_dict(scene_dict(size=4))
     for integrator in Integrator.family.all():

@@ -26,7 +26,6 @@ def solid_angle_64(p: tuple[float, float, float]) -> float:
     return float((abs(p[2]) / rr**1.5).mean() * 3.0)
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "p", [(0, 0, 1), (0.3, 0.2, -0.4), (3, 2, 1), (5, 0.1, 0.05), (0.2, 0.1, 20), (100, 50, 70), (-1, -0.5, 0.3)]
 )
@@ -35,7 +34,6 @@ def test_solid_angle_agrees_with_quadrature_near_and_far(p: tuple[float, float, 
     assert float(seen.solid_angle[0]) == pytest.approx(solid_angle_64(p), rel=2e-5)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("p", [(0, 0, 1), (0.3, 0.2, -0.4), (3, 2, 1), (2, 2, 4), (-1, -0.5, 0.3), (0.2, 0.1, 60)])
 def test_directions_are_uniform_in_the_solid_angle(p: tuple[float, float, float]) -> None:
     """Moments of the sampled points, weighted 1/pdf, are those of the rectangle under the solid angle measure."""
@@ -89,7 +87,6 @@ def test_gonio_area_shines_from_both_sides_where_area_does_not() -> None:
     assert one[0] > 0 and one[1] == 0
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("shape", ["sphere", "disk", "cube", "cylinder"])
 @pytest.mark.parametrize("z", [4.0, -4.0])
 def test_gonio_area_sends_from_any_shape_what_rays_find_there(shape: str, z: float) -> None:

@@ -137,7 +137,6 @@ def test_what_is_close_to_a_lamp_hides_it(integrator: str, others: int) -> None:
     assert not np.any(picture([4.5, 1, 0], [0, 0, 0], 5, integrator, 3, sheet=sheet, **scene))
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     """Bright in a few stripes of its u, on a turned sphere: sampled lights and sampled lobes agree on a small floor."""
@@ -154,7 +153,7 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     assert found[0] == pytest.approx(found[1], rel=4e-3)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize(
     "shape, flipped",
@@ -178,7 +177,6 @@ def test_a_lamp_with_a_texture_is_found_as_rays_find_it(shape: str, flipped: boo
     assert found[0] == pytest.approx(found[1], rel=0.01) and found[2] == pytest.approx(found[1], rel=0.01)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("p", [(0, 0, 5), (1.2, -0.3, 0.4), (300, 20, -10), (0.3, 0.2, 0.1), (0.6, 0.9, 0.8)])
 def test_a_cap_is_sampled_with_the_density_that_it_tells(p: tuple[float, float, float]) -> None:
     """Moments of directions, weighted by 1 / pdf, are those of all directions that meet the ball."""

@@ -421,7 +421,6 @@ FAILS = {
 BUMP = """<shape type="cube"><bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf></shape>"""
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("element", FAILS)
 def test_what_mitsuba_cannot_render_is_an_error_of_the_scene(element: str, tmp_path: Path) -> None:
     path = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
@@ -431,7 +430,6 @@ def test_what_mitsuba_cannot_render_is_an_error_of_the_scene(element: str, tmp_p
     assert caught.value.where == str(tmp_path / "a.xml")
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("integrator", [None, "path"])
 def test_a_plugin_that_is_not_made_for_it_is_an_error_of_the_scene(integrator: str | None, tmp_path: Path) -> None:
     (tmp_path / "a.xml").write_text(XML.replace("<shape", f"{BUMP}<shape", 1))

@@ -263,7 +263,6 @@ def test_image_with_nan(tmp_path):
         textures.load_image(tmp_path / "a.exr", "here")
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "hdr"])
 def test_damaged_image_reads_or_is_refused_but_nothing_else(tmp_path, suffix):
     mi = engine.load()

@@ -215,7 +215,6 @@ def test_a_colour_in_mono_is_its_luminance() -> None:
     assert reflectance == pytest.approx(float(mi.luminance(mi.Color3f(0.2, 0.9, 0.4))[0]), rel=1e-6)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SCALAR)
 def test_scalar_variants_are_one_clear_error(name: str) -> None:
     mi.set_variant(name)
@@ -223,7 +222,6 @@ def test_scalar_variants_are_one_clear_error(name: str) -> None:
         mi.load_dict({"type": "gonio_conductor"})
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name, what", [("llvm_ad_mono_polarized", "is polarized"), ("scalar_rgb", "works on one ray at a time")]
 )

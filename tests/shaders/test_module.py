@@ -27,7 +27,6 @@ def _declared(text: str) -> list[str]:
     return [*functions, *others]
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "wgsl"])
 def test_bundles_with_prefixes_share_no_name(lang: str) -> None:
     """Any two bundles shared 11 to 38 names, and could not stand in one module."""

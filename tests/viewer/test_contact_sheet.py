@@ -111,7 +111,6 @@ def test_wide_pictures_are_stacked() -> None:
     assert sheet_layout._columns_of_a_row(5, aspect=10 / 3) == 1
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("suffix", [".pdf", ".svg"])
 def test_sheets_can_be_vector_files(tmp_path: Path, suffix: str) -> None:
     path = _saved(contact_sheet.draw(_colours(2), [Variation("kd", (1, 2))], "title", "about"), tmp_path / f"a{suffix}")

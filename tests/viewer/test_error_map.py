@@ -28,7 +28,6 @@ def test_the_mean_of_the_map_is_the_metric(pictures: tuple[Picture, Picture]) ->
     assert np.sqrt(squares.mean()) == pytest.approx(metrics.rmse(test, reference))
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("metric", list(metrics.METRICS))
 def test_the_map_is_bright_where_the_error_is(pictures: tuple[Picture, Picture], tmp_path: Path, metric: str) -> None:
     from PIL import Image
