@@ -184,6 +184,13 @@ WRONG = [
         "0, -1, 0",
     ),
     (SHAPE + "/type", "spere", None, "unknown type 'spere'", "did you mean 'sphere'"),
+    (
+        "/scene/lights/0/type",
+        "pointLight",
+        None,
+        "unknown type 'pointLight'",
+        "write 'spotLight', which shines equally",
+    ),
     (SHAPE + "/center", [0, 0], None, "expected 3 numbers", "x, y, z"),
     (SHAPE + "/transform/scale", [1, 0, 1], None, "flattens", "other than 0"),
     (SHAPE + "/transform/rotate/axis", [0, 0, 0], None, "length 0", "direction"),
