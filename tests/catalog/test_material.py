@@ -56,6 +56,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "own.py").write_text(OWN)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("form", FORMS)
 def test_every_form_is_a_material(form: str) -> None:
     value = go.material(FORMS[form]).eval([0.0, 0.0, 1.0], [0.6, 0.0, 0.8])

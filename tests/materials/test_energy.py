@@ -18,6 +18,7 @@ def _power(material: go.BSDF, wo: np.ndarray) -> np.ndarray:
     return material.eval(wo, BOTH, "importance", precision="float64").T @ BOTH_WEIGHTS
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("masking", ["smith-correlated", "smith-separable", "smith-separable-exact"])
 @pytest.mark.parametrize("ndf", NDFS)
 def test_perfectly_reflecting_facets_gain_nothing(ndf: str, masking: str) -> None:

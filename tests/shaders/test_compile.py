@@ -109,7 +109,7 @@ def _glslang(text: str, folder: Path) -> str:
 QUICK = set(SHAPES) - set(materials.COMPOSED) | {"openpbr"}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", materials.each(EVERY, QUICK))
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = written(name, "hlsl").text
