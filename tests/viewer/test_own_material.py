@@ -126,6 +126,7 @@ def test_its_presets_set_values_and_choices(opened: tuple[stage.Stage, Page]) ->
     assert preset.input_value() == ""
 
 
+@pytest.mark.slow
 def test_a_preset_of_what_the_balls_differ_in_sets_them_all(opened: tuple[stage.Stage, Page]) -> None:
     _, page = opened
     page.reset()
