@@ -118,7 +118,6 @@ def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: 
 # ---------------------------------------------------------------------- networks
 
 
-@pytest.mark.slow
 def test_a_network_is_near_what_it_has_seen(network: Network) -> None:
     assert network.shape == {"weight": 675}
     assert compare.difference(read(SAMPLE), network) < 0.1
