@@ -21,6 +21,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 from gonio.energy.albedo import monte_carlo, quadrature, walk
+from gonio.energy.albedo.monte_carlo import Sampling
 from gonio.energy.tables import bake
 from gonio.materials.compensated import comparison
 from gonio.ops import backend
@@ -159,7 +160,7 @@ def sampling() -> None:
         "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).white,
         "normals, 1024 independent samples": lambda: (
             monte_carlo.estimate(
-                "ggx", "smith-correlated", quadrature.Points(MU, ROUGHNESS**2), "ggx", 1024, "independent"
+                "ggx", "smith-correlated", quadrature.Points(MU, ROUGHNESS**2), Sampling("ggx", points="independent")
             ).value
         ),
     }
@@ -175,7 +176,9 @@ def sampling() -> None:
     for masking in MASKINGS:
         truth = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).white
         for points in ("hammersley", "independent"):
-            found = monte_carlo.estimate("ggx", masking, quadrature.Points(MU, ROUGHNESS**2), "ggx", 1024, points)
+            found = monte_carlo.estimate(
+                "ggx", masking, quadrature.Points(MU, ROUGHNESS**2), Sampling("ggx", points=points)
+            )
             rms = np.sqrt(np.mean((found.value - truth)[part] ** 2))
             if points == "hammersley":
                 figure(

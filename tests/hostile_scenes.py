@@ -19,7 +19,7 @@ from typing import Any
 
 import gonio as go
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 MARK = "/hostile/scene/"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"

@@ -28,6 +28,7 @@ def test_arrays_come_back_as_they_were(tmp_path: Path) -> None:
     assert archives.read(tmp_path / "a.npz", ["a", "b"]).keys() == {"a"}
 
 
+@pytest.mark.slow
 def test_three_megabytes_do_not_take_six_gigabytes(tmp_path: Path) -> None:
     path = tmp_path / "bomb.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("radiance.npy", "w") as file:

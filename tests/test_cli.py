@@ -52,6 +52,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.stdout.strip().splitlines()[-1] == "[]"
 
 
+@pytest.mark.slow
 def test_rendering_loads_no_plotting(scene: Path) -> None:
     program = (
         "import sys; from gonio import cli\n"
@@ -63,6 +64,7 @@ def test_rendering_loads_no_plotting(scene: Path) -> None:
     assert done.stdout.strip().splitlines()[-1] == "[]", done.stderr
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_an_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio(verb, "--help") == 0
@@ -130,6 +132,7 @@ def _in_another_process(folder: Path, *arguments: str, **environment: str) -> su
     )
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_verb_by_one_file(package: Path) -> None:
     done = _in_another_process(package, "sheen", "wool", "--loud", "-n", "3")
     assert (done.returncode, done.stdout) == (0, "wool True Fabric(weave='twill', threads=3)\n"), done.stderr
@@ -278,6 +281,7 @@ def test_a_scenes_own_name_for_the_picture_counts_where_it_is_used(
     assert gonio("study", scene, "--vary", "shapes.0.material.p=4", "--spp", 1) == 0
 
 
+@pytest.mark.slow
 def test_a_file_in_a_folder_is_a_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`plot sub/mine.py:Own` said "no tables.npz here"."""
     (tmp_path / "sub").mkdir()
@@ -290,6 +294,7 @@ def test_a_file_in_a_folder_is_a_material(tmp_path: Path, monkeypatch: pytest.Mo
     assert Path("mine-own-albedo.png").is_file()
 
 
+@pytest.mark.slow
 def test_a_text_longer_than_a_files_name_may_be_is_a_material(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -432,6 +437,7 @@ def test_plots_of_classes_of_one_name_get_files_of_their_own() -> None:
     assert [*map(_file_name, heads)] == ["conductor", "ward", "velvet-ward", "gloss-ward"]
 
 
+@pytest.mark.slow
 def test_a_new_material_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -536,6 +542,7 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
 
 
+@pytest.mark.slow
 def test_schema_is_a_json_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("schema") == 0
     printed = json.loads(capsys.readouterr().out)
@@ -573,6 +580,7 @@ def test_the_doctor_prints_brackets(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert "pip install 'gonio[denoise]' :smile:" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_doctor_survives_a_library_that_is_none(tmp_path: Path) -> None:
     wrong = tmp_path / "libLLVM.so"
     wrong.write_bytes(b"no library")

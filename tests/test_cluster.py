@@ -83,6 +83,7 @@ def test_a_part_that_fails_by_its_input_is_tried_once(two: Cluster) -> None:
     assert caught.value.hint == "give another"
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
     with executor.using(two):
         count = 0
@@ -93,6 +94,7 @@ def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
     assert count == 10 and two.restarts >= 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("options", [{}, {"integrator": "direct", "denoise": True}])
 def test_a_picture_has_the_same_bits(
     two: Cluster, scene: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, object]
@@ -180,6 +182,7 @@ def test_a_picture_goes_on_to_more_samples_by_a_crew(two: Cluster, scene: Path, 
         assert np.array_equal(go.resume(tmp_path / "c", spp=7), go.render(scene, spp=7))
 
 
+@pytest.mark.slow
 def test_files_travel_and_so_does_code_that_the_user_named(two: Cluster, scene: Path, tmp_path: Path) -> None:
     source = "import gonio as go\n\nclass Flat(go.Lambert):\n    'Flat.'\n    name = 'flat-for-cluster'\n"
     (tmp_path / "flat.py").write_text(source)
@@ -265,6 +268,7 @@ def test_a_scheduler_without_workers_is_waited_for_and_told(scheduler: LocalClus
     assert caught.value.code == 3
 
 
+@pytest.mark.slow
 def test_one_worker_is_a_cluster_and_of_another_version_refused(
     scheduler: LocalCluster, scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,7 +28,7 @@ from gonio.fitting import batch
 from gonio.instruments.capture import rehearsal
 from gonio.pictures import images
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 RIG = {
     "camera": {"size": [24, 24], "focal": 95.0},
@@ -160,7 +160,7 @@ def place_in(text: str) -> Path | None:
     return None if found is None else Path(found[1])
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_is_computed_lies_where_the_error_says(
     name: str, place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
@@ -191,6 +191,7 @@ def test_what_is_computed_lies_where_the_error_says(
     assert kept is not None and kept.stat().st_size > 0, told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stream", ["/dev/full", "&-"])
 def test_a_stream_that_takes_nothing_costs_no_picture(stream: str, place: Path) -> None:
     command = f"{sys.executable} -m gonio.cli render scene.json --spp 1 -o out/a.npz >{stream}"

@@ -121,7 +121,7 @@ def test_every_verb_is_asked() -> None:
     assert {command.split()[0] for command in COMMANDS.values()} == set(Verb.family.all())
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_word_makes_a_verb_fail(command: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     words = [*_files(), "metadata.npz", *WORDS]
@@ -156,7 +156,7 @@ def test_a_current_folder_that_was_deleted_is_one_error(
     assert "no current folder" in done.stdout + done.stderr
 
 
-@pytest.mark.sample(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["schema", "models", "models --json", "--version", "no-such-verb --json"])
 @pytest.mark.parametrize("output", ["/dev/full", "&-"])
 def test_an_output_that_takes_nothing_is_one_error(command: str, output: str) -> None:
@@ -167,12 +167,14 @@ def test_an_output_that_takes_nothing_is_one_error(command: str, output: str) ->
     assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_file_is_never_the_standard_output(tmp_path: Path) -> None:
     shell = f"exec {sys.executable} -m gonio.cli schema -o {tmp_path / 'a.json'} <&- >&- 2>&-"
     subprocess.run(["bash", "-c", shell], check=False)
     assert json.loads((tmp_path / "a.json").read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_a_name_that_is_no_text_is_printed_as_it_is(tmp_path: Path, encoding: str) -> None:
     name = os.fsencode(tmp_path) + b"/caf\xe9.json"

@@ -35,7 +35,7 @@ def imported(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     return (targets & known.keys()) - {name, "gonio"}  # the public list imports everything, for type checkers
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_two_files_import_each_other() -> None:
     known = modules()
     graph = {name: imported(name, path, known) for name, path in known.items() if name != "gonio"}
@@ -49,6 +49,7 @@ def test_no_two_files_import_each_other() -> None:
     assert not graph, f"cycles among {sorted(graph)}"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -66,6 +67,7 @@ def test_an_import_path_of_the_former_layout_works_and_names_the_new_one(old: st
     assert f"is now {new}" in ran.stderr
 
 
+@pytest.mark.slow
 def test_a_package_does_not_hide_the_function_of_its_name() -> None:
     code = "import gonio as go, gonio.render.finish, gonio.measure; print(callable(go.render), callable(go.measure))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

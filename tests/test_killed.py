@@ -9,6 +9,7 @@ import pytest
 from killing import KINDS, trial
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["path"])
 def test_a_killed_render_goes_on_to_the_same_bits(kind: str, tmp_path: Path) -> None:
     same, told = trial(kind, tmp_path, seed=1, length=0.5, kills=1)

@@ -140,6 +140,7 @@ def _python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", [
     "import gonio as go; go.Lambert().eval([0, 0, 1.], [0, 0, 1.])", "import gonio.mitsuba"
 ])  # fmt: skip
@@ -186,7 +187,7 @@ _QUICK = {(first, *order) for first in _IMPORTS for others in [[n for n in _IMPO
           for order in (others, others[::-1])}  # fmt: skip
 
 
-@pytest.mark.sample(3)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "order",
     [
@@ -209,6 +210,7 @@ def test_a_variant_set_before_gonio_stays() -> None:
     assert got.stdout.strip() == "works" if _finds_llvm_alone() else "ImportError" in got.stderr, got.stderr
 
 
+@pytest.mark.slow
 def test_dr_jit_without_any_llvm_is_one_error_whose_hint_is_true() -> None:
     """DRJIT_LIBLLVM_PATH, taken back after Dr.Jit has looked, is as on a machine whose system has none."""
     code = "import os, drjit, warnings; del os.environ['DRJIT_LIBLLVM_PATH']; import gonio.mitsuba"

@@ -30,6 +30,7 @@ def value(material: go.BSDF) -> np.ndarray:
     return np.asarray(material.eval(W, W[::-1]))
 
 
+@pytest.mark.slow
 def test_materials_go_to_spawned_processes() -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         for material, found in zip(MATERIALS, pool.map(value, MATERIALS), strict=True):
@@ -101,6 +102,7 @@ def test_shapes_of_another_size_compile_no_kernel(scene: Path) -> None:
     assert compiled(0.6180339) == 0
 
 
+@pytest.mark.slow
 def test_renders_in_a_loop_leave_nothing_behind(scene: Path) -> None:
     import resource
 

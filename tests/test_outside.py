@@ -137,7 +137,7 @@ def scene(material: dict) -> dict:
     }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -194,6 +194,7 @@ def test_what_was_registered_since_is_a_name_in_scenes(here: Path) -> None:
     assert scene.read(here / "scene.json")
 
 
+@pytest.mark.slow
 def test_workers_get_files_with_what_they_import(here: Path) -> None:
     material = notation.named("sub/mine.py:OwnMetal")[0]
     described_material = scene.of_material(material, {})
@@ -295,6 +296,7 @@ def test_the_command_that_shows_a_failure_again_can_be_run(here: Path) -> None:
 # --------------------------------------------------------------------------- errors
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "command",
     ["emit sub/mine.py:OwnPower", "verify sub/mine.py:OwnPower --quick", "view sub/mine.py:OwnPower -o p"],

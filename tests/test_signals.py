@@ -31,6 +31,7 @@ def _sent(number: int, module: str, *arguments: str) -> subprocess.CompletedProc
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", ENDING)
 @pytest.mark.parametrize("module", ["typer", "numpy"])  # while the command starts, and in the middle of a verb
 def test_a_signal_while_it_loads_is_one_line(number: signal.Signals, module: str) -> None:

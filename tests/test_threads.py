@@ -103,6 +103,7 @@ sys.exit(bool(errors))
 """
 
 
+@pytest.mark.slow
 def test_threads_get_what_one_thread_gets() -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM, "1", "4"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0 and done.stdout.startswith("same"), done.stdout + done.stderr

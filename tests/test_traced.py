@@ -15,7 +15,7 @@ from pathlib import Path
 import gonio
 import pytest
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 GONIO = Path(sys.executable).with_name("gonio")
 TRACE = ("strace", "-f", "-qq", "-y", "-s", "4096", "-e", "trace=open,openat,openat2,execve", "-e", "signal=none")
@@ -147,6 +147,7 @@ def trusted() -> list[Path]:
 QUICK = ("plot",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in COMMANDS])
 def test_only_what_was_given_is_opened(name: str, place: Path) -> None:
     folder, trace = place / "download", place / f"{name}.trace"

@@ -11,6 +11,7 @@ these. Arguments with other annotations are not checked. Integers, NumPy's inclu
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 import math
@@ -50,6 +51,30 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
         return call(*bound.args, **bound.kwargs)
 
     return guarded
+
+
+def takes_fields(options: type, keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function with `**options` takes the fields of a dataclass that are not among its own parameters: its signature
+    is expanded to them and their defaults, for `help`, notebooks and `checked`.
+
+    keywords  a TypedDict that repeats their types for type checkers, since Python cannot derive them from a class
+    """
+
+    def decorate(call: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(call)
+        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        types = {name: getattr(one, "__forward_arg__", one) for name, one in keywords.__annotations__.items()}
+        fields = [
+            inspect.Parameter(
+                field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=types[field.name]
+            )
+            for field in dataclasses.fields(options)
+            if field.name not in signature.parameters
+        ]
+        call.__signature__ = signature.replace(parameters=[*own, *fields])  # type: ignore[attr-defined]
+        return call
+
+    return decorate
 
 
 def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:

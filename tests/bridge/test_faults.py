@@ -5,6 +5,9 @@ Faults that end or hang a process have one of their own. Of `kernel_array_order`
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import pkgutil
 import signal
 import subprocess
 import sys
@@ -14,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gonio.bridge import engine
+from gonio.bridge import engine, faults
 from gonio.bridge.faults.black_environment import is_black_environment
 from gonio.bridge.faults.interrupted_recording import interruptible
 from gonio.bridge.faults.lost_derivatives import own_variable
@@ -41,6 +44,18 @@ def at(*place: float) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, 1)
     si.p, si.n, si.t = mi.Point3f(*place), mi.Normal3f(0, 0, 1), 1.0
     return si
+
+
+UNSAFE = {"exr_threads", "missing_texture"}  # they hang or end the process
+
+
+@pytest.mark.parametrize("name", [one.name for one in pkgutil.iter_modules(faults.__path__) if one.name not in UNSAFE])
+def test_a_reproduction_runs_as_printed(name: str) -> None:
+    doc = importlib.import_module(f"gonio.bridge.faults.{name}").__doc__ or ""
+    lines = [line.removeprefix("    ") for line in doc.splitlines() if line.startswith("    ")]
+    assert lines or name == "kernel_array_order"
+    with pytest.raises(RuntimeError) if name == "interrupted_recording" else contextlib.nullcontext():
+        exec("\n".join(lines), {"mi": mi, "dr": dr, "np": np})
 
 
 def test_a_black_environment_has_no_density() -> None:
@@ -143,7 +158,7 @@ def test_another_kernel_is_compiled_for_numpys_memory_where_it_is_not_aligned() 
 
 DENORMAL = """
 import drjit as dr, numpy as np
-from gonio.bridge import engine
+from gonio.bridge import engine, faults
 from gonio.bridge.faults.denormal_numbers import denormals_rounded
 mi = engine.load()
 
@@ -161,6 +176,7 @@ assert product() > 0
 """
 
 
+@pytest.mark.slow
 def test_denormal_numbers_depend_on_the_number_of_threads() -> None:
     """In a process of its own: what other tests load may change how the main thread rounds."""
     done = subprocess.run([sys.executable, "-c", DENORMAL], capture_output=True, text=True)
@@ -176,6 +192,7 @@ def ended(program: str, seconds: float) -> int | None:
         return None
 
 
+@pytest.mark.slow
 def test_asking_for_a_missing_emissive_texture_ends_the_process() -> None:
     assert ended("mi.Properties('x').get_emissive_texture('radiance')", 60) == -signal.SIGSEGV
 

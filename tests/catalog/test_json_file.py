@@ -143,6 +143,7 @@ def test_what_is_no_material_is_one_clear_error(tmp_path: Path, content: str, te
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_code_that_it_names_runs_where_that_is_allowed(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN)
     (tmp_path / "found.json").write_text('{"type": "own.py:Own", "albedo": 0.25}')

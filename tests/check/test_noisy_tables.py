@@ -16,6 +16,7 @@ def _judged(seed: int = 3, samples: int = 1024, **changes: Any) -> Finding:
     return tables.check(tables.Table("E.png", table.picture() / 255.0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("k", ["figure", "text"])
 @pytest.mark.parametrize("samples", [256, 1024])
 def test_a_right_table_passes_with_its_noise(k: str, samples: int) -> None:
@@ -23,6 +24,7 @@ def test_a_right_table_passes_with_its_noise(k: str, samples: int) -> None:
     assert finding.passed and finding.figures["converged"] > 3.0, finding.lines()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("changes", "cause"),
     [

@@ -105,6 +105,7 @@ def _judged(solution: Any, folder: Path) -> go.GonioError | Any:
     return go.check(folder / "f.csv", MODELS[model or kind])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_solution_passes(name: str, tmp_path: Path) -> None:
     finding = _judged(RIGHT[name], tmp_path)
@@ -112,6 +113,7 @@ def test_a_right_solution_passes(name: str, tmp_path: Path) -> None:
     assert finding.exit_code == 0 and not finding.cause
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_solution_fails_and_its_cause_is_named(name: str, tmp_path: Path) -> None:
     solution, cause = WRONG[name]

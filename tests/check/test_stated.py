@@ -110,6 +110,7 @@ def test_parameters_that_a_file_does_not_name_are_found(tmp_path: Path, capsys: 
     assert cli.run(["check", str(tmp_path / "s/phong.csv"), "phong", "-p", "p=16"]) == 1  # these were named
 
 
+@pytest.mark.slow
 def test_wrong_values_without_parameters_name_the_defaults(tmp_path: Path) -> None:
     text = _written("blinn-phong(kd=0.25,ks=0.6,p=16)", "")
     finding, points = _mark(tmp_path / "s", "phong.csv", text)
@@ -138,6 +139,7 @@ def test_the_line_of_a_file_gives_what_the_command_leaves_out(
     assert "file's line" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_command_prevails_over_the_line(capsys: pytest.CaptureFixture[str]) -> None:
     path = str(VALUES / "conductor-ggx.csv")
     assert cli.run(["check", path, "conductor", "--preset", "Au"]) == 1

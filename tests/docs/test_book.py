@@ -44,6 +44,7 @@ def test_every_family_and_member_has_its_place() -> None:
     assert "## reciprocity" in str(pages["reference/families/law.md"])
 
 
+@pytest.mark.slow
 def test_errors_are_listed_with_their_remedies() -> None:
     messages = list(errors.messages())
     assert len(messages) > 300

@@ -54,9 +54,14 @@ def _words(command: str) -> list[str]:
 
 
 @functools.cache
+def _group() -> click.Command:
+    return typer.main.get_command(app)
+
+
+@functools.cache
 def _verbs() -> dict[str, set[str]]:
     """The options of every verb, and under "" those of the command itself."""
-    group = typer.main.get_command(app)
+    group = _group()
     with click.Context(group) as context:
         verbs = {name: group.get_command(context, name) for name in group.list_commands(context)}  # type: ignore[attr-defined]
     options = {name: {o for p in one.params for o in (*p.opts, *p.secondary_opts)} for name, one in verbs.items()}
@@ -75,7 +80,7 @@ def _scripts() -> set[str]:
 
 @pytest.mark.parametrize("page", HAND, ids=pages.name)
 def test_every_command_has_its_verb_and_its_options(page: Path) -> None:
-    group = typer.main.get_command(app)
+    group = _group()
     for program, *words in filter(None, commands(page)):
         if program != "gonio" or not words or "--help" in words or words[0].startswith("-"):
             continue

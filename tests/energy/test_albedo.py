@@ -21,6 +21,7 @@ def test_a_mix_of_closed_forms_is_one():
     np.testing.assert_allclose(found.value, 0.625, rtol=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "model",
     [

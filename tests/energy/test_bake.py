@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gonio import cli
 from gonio.energy.albedo import quadrature
+from gonio.energy.albedo.monte_carlo import Sampling
 from gonio.energy.tables import bake as baking
 from gonio.energy.tables import baked as baked_files
 from gonio.energy.tables.axes import Axes
@@ -97,8 +98,7 @@ def test_models_are_baked_with_their_own_fresnel():
     assert glass.arrays["E"].shape == (8, 8, 3)
 
 
-@pytest.mark.long
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["linear", "stretched"])
 def test_two_widths_add_the_azimuth_as_an_axis(layout):
     baked = baking.bake("beckmann", size=5, aspect=0.4, azimuths=3, layout=layout)
@@ -120,7 +120,7 @@ def test_two_widths_swapped_are_the_table_turned():
     np.testing.assert_allclose(wide.arrays["E_avg"], tall.arrays["E_avg"], atol=2e-6)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
     baked = baking.bake("ggx", ["Eavg"], size=3, aspect=0.2)
     x, w = quadrature.gauss(48)
@@ -131,7 +131,7 @@ def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
 
 
 def test_sampled_tables_of_two_widths_agree_with_the_quadrature():
-    baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, method="visible", spp=4096)
+    baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, sampling=Sampling("visible", 4096))
     assert baked.manifest["error"]["E"]["max"] < 5e-3
     assert baked.manifest["error"]["E_avg"]["max"] < 2e-2
 

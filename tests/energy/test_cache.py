@@ -8,6 +8,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.energy import cache
+from gonio.energy.albedo.monte_carlo import Sampling
 from gonio.energy.compensation import curves
 from gonio.energy.tables import bake
 
@@ -61,6 +62,7 @@ def test_an_altered_array_is_rebuilt(folder):
         cache.remember(("trial", 1), lambda: np.arange(3.0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("how", DAMAGES)
 def test_baked_tables_are_kept_and_a_damaged_one_is_baked_again(folder, monkeypatch, how):
     first = bake.cached("ggx", size=4)
@@ -86,9 +88,16 @@ def test_a_table_in_anothers_place_is_not_taken_for_it(folder):
         assert bake.cached("beckmann", size=4, lut=("E",)).manifest["ndf"] == "beckmann"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "other",
-    [{"size": 5}, {"masking": "schlick-ibl"}, {"layout": "stretched"}, {"aspect": 0.5}, {"method": "ggx"}],
+    [
+        {"size": 5},
+        {"masking": "schlick-ibl"},
+        {"layout": "stretched"},
+        {"aspect": 0.5},
+        {"sampling": Sampling("ggx")},
+    ],
     ids=lambda o: next(iter(o)),
 )
 def test_another_option_is_another_file(folder, other):
@@ -97,6 +106,7 @@ def test_another_option_is_another_file(folder, other):
     assert len(list(folder.glob("baked-*.npz"))) == 2
 
 
+@pytest.mark.slow
 def test_two_widths_of_a_material_are_part_of_its_name(folder):
     bake.cached(go.Conductor(alpha=(0.1, 0.2)), lut=("E",), size=3)
     found = bake.cached(go.Conductor(alpha=(0.1, 0.4)), lut=("E",), size=3)
@@ -123,7 +133,7 @@ def test_every_package_that_a_table_depends_on_is_hashed():
     assert all(list((package / name).rglob("*.py")) for name in cache.PACKAGES)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):
     cache.formulas.cache_clear()
     first = cache.formulas()

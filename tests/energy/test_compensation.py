@@ -32,6 +32,7 @@ def whole_albedo(model, mu):
     return total
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ndf", "masking"),
     [
@@ -48,6 +49,7 @@ def test_white_furnace_of_metal_is_closed(ndf, masking):
             assert whole_albedo(metal, mu) == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("eta", [1.5, 1 / 1.5, pytest.param(1.33, marks=pytest.mark.slow)])
 def test_white_furnace_of_glass_is_closed_on_both_sides(eta):
     for alpha in (0.05, 0.2, 0.5, 1.0):
@@ -56,6 +58,7 @@ def test_white_furnace_of_glass_is_closed_on_both_sides(eta):
             assert 0.995 <= whole_albedo(glass, mu)[0] <= 1.002
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("eta", "loss"), [(1.02, 0.015), (1.1, 0.004), (2.4, 0.002)])
 def test_glass_keeps_nearly_all_its_energy_near_and_far_from_eta_1(eta, loss):
     for alpha in (0.1, 0.4, 1.0):
@@ -95,7 +98,7 @@ def test_kulla_conty_is_reciprocal(base):
     np.testing.assert_allclose(forth, back, rtol=1e-6, atol=1e-12)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("cls", [go.KullaConty, go.Turquin, go.FdezAguera])
 @pytest.mark.parametrize("alpha", [0.1, 0.7, (0.2, 0.5)])
 def test_weight_is_eval_over_pdf_and_pdf_integrates_to_one(cls, alpha):

@@ -60,7 +60,7 @@ def test_tables_are_compared_where_they_are_known(tmp_path: Path) -> None:
     assert [view.theta for view in found.views] == [0.0, 15.0, 30.0, 45.0, 60.0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_verb_says_where_and_by_how_much(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

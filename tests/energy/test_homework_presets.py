@@ -42,12 +42,14 @@ def test_the_figure_has_the_means_of_the_homeworks(shared: Path, tmp_path: Path)
 def test_stratified_points_have_less_noise_than_independent_ones() -> None:
     at = Points(np.full(256, 0.5), np.full(256, 0.6))
     spread = {
-        points: float(np.std(monte_carlo.estimate("ggx", "schlick-ibl", at, "cosine", 256, points).value))
+        points: float(
+            np.std(monte_carlo.estimate("ggx", "schlick-ibl", at, monte_carlo.Sampling("cosine", 256, points)).value)
+        )
         for points in ("stratified", "independent")
     }
     assert spread["stratified"] < 0.4 * spread["independent"]
     with pytest.raises(go.InputError, match="250 stratified samples"):
-        monte_carlo.estimate("ggx", "schlick-ibl", at, "cosine", 250, "stratified")
+        monte_carlo.estimate("ggx", "schlick-ibl", at, monte_carlo.Sampling("cosine", 250, "stratified"))
 
 
 def test_what_a_preset_sets_cannot_be_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -49,6 +49,7 @@ def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     assert np.max(baked.arrays["ltc_error"][1:, :3]) < 0.03
 
 
+@pytest.mark.slow
 def test_a_distribution_has_the_two_albedos_of_the_split_sum() -> None:
     baked = go.bake("ggx", lut=["ltc"], resolution=3)
     both = go.bake("ggx", lut=["dfg"], resolution=3, layout="stretched")

@@ -89,7 +89,6 @@ def test_it_is_reciprocal_where_its_base_is():
 
 
 @pytest.mark.long
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["phong", "own", "coated"])
 def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
     model = go.KullaConty(WHITE[name])

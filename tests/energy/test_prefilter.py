@@ -55,8 +55,7 @@ def by_brute_force(light, n, alpha, ndf="ggx", parts=8):
     return (between(light, parts) * weight[..., None]).sum((0, 1)) / weight.sum()
 
 
-@pytest.mark.long
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("ndf", DENSITIES)
 def test_every_level_agrees_with_brute_force(ndf):
     light = environment()
@@ -118,6 +117,7 @@ def test_the_errors_are_as_stated():
         assert stated["rms"] <= stated["max"] < 2e-3
 
 
+@pytest.mark.slow
 def test_a_wrong_level_is_told():
     levels = prefilter.prefilter(environment(), levels=3)
     levels[2] = 1.05 * levels[2]

@@ -10,6 +10,7 @@ from gonio.energy.tables import bake, split_sum
 from gonio.ops import backend
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("masking", ["smith-correlated", "schlick-direct"])
 @pytest.mark.parametrize("ndf", ["ggx", "beckmann"])
 def test_f0_a_plus_b_is_the_albedo_with_schlicks_fresnel(ndf, masking):

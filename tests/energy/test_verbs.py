@@ -20,7 +20,7 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "words",
     [

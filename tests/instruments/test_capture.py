@@ -75,6 +75,7 @@ def again(folder: Path, tmp_path: Path, raw: Raw) -> Path:
 # ---------------------------------------------------------------------- fits
 
 
+@pytest.mark.slow
 def test_a_ball_tells_its_material(found: run.Capture) -> None:
     np.testing.assert_allclose(found.fit.values[:3], TRUTH[:3], rtol=0.01)
     np.testing.assert_allclose(found.fit.values[-1], TRUTH[-1], rtol=0.03)
@@ -84,6 +85,7 @@ def test_a_ball_tells_its_material(found: run.Capture) -> None:
     assert found.warnings == ()
 
 
+@pytest.mark.slow
 def test_faults_that_are_stated_are_put_right(taken: Path, tmp_path: Path) -> None:
     stated = {"light": 1.0, "radius": 0.01, "center": 1.0, "intensity": 0.01, "scale": 0.005}
     got = go.capture(again(taken, tmp_path, off(rig()) | {"uncertainty": stated}), "lambert+ggx")
@@ -113,6 +115,7 @@ def test_intervals_are_wider_by_what_the_calibration_leaves_open(
     assert np.all(got.fit.errors[:3] > 5.0 * found.fit.errors[:3])
 
 
+@pytest.mark.slow
 def test_the_outline_of_a_ball_is_found(taken: Path, tmp_path: Path) -> None:
     got = go.capture(again(taken, tmp_path, rig(ball={"radius": 50.0})), "lambert+ggx")
     assert got.scene.ball is not None

@@ -27,6 +27,7 @@ def gonio(*words: object) -> int:
     return int(ended.value.code or 0)
 
 
+@pytest.mark.slow
 def test_several_models_are_ranked_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = rehearsal.take(RIG, go.Lambert((0.5, 0.4, 0.3)), tmp_path / "photographs", noise=0.01)
     output = tmp_path / "chalk.json"

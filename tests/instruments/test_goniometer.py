@@ -117,6 +117,7 @@ def test_a_flat_lambertian_surface_is_lambert_and_errors_are_honest() -> None:
     assert np.array_equal(f, found.table.beside["first"])
 
 
+@pytest.mark.slow
 def test_the_first_bounce_of_a_gaussian_surface_is_beckmann_s() -> None:
     lights, azimuths = [0.0, 30.0, 60.0], [0.0, 90.0, 180.0]
     found = go.measure(
@@ -172,6 +173,7 @@ def test_one_bounce_among_grooves_is_oren_and_nayar_s() -> None:
 # ---------------------------------------------------------------------- the same again
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_values_and_another_others() -> None:
     def found(seed: int) -> np.ndarray:
         return values(
@@ -186,6 +188,7 @@ def test_a_seed_gives_the_same_values_and_another_others() -> None:
 # ---------------------------------------------------------------------- models as any file
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("suffix", [".bsdf", ".astm", ".zbsdf"])
 def test_a_measured_table_is_what_convert_writes(suffix: str, tmp_path: Path) -> None:
     go.measure(go.Measured("sample"), tmp_path / f"a{suffix}")
@@ -303,6 +306,7 @@ def test_few_angles_are_measured_each_and_many_on_a_grid() -> None:
     assert 10 < len(many.lights) < 20 and many.lights[-1] == pytest.approx(np.radians(89.0))
 
 
+@pytest.mark.slow
 def test_later_bounces_alone_can_be_measured() -> None:
     asked = {
         "surface": "vgroove:slope=.9",

@@ -66,6 +66,7 @@ def test_a_series_without_noise_is_merged_within_its_steps(bits: int) -> None:
     assert np.nanmax(np.abs(merged.light - LIGHT) * np.minimum(0.32, 0.9 / LIGHT)) < 2.5 / 2**bits
 
 
+@pytest.mark.slow
 def test_intervals_of_a_capture_from_series_hold_the_truth(tmp_path) -> None:
     raw = rig(suffix="png")
     for shot in raw["photographs"]:

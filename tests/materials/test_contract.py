@@ -19,6 +19,7 @@ N = 7
 WO, WI, U = random_directions(N, 91, upper=True), random_directions(N, 92, upper=True), random_numbers(N, 91)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("precision, dtype", [("float32", np.float32), ("float64", np.float64)])
 @pytest.mark.parametrize("name", SMALL)
 def test_shapes_and_types_of_answers(name: str, precision: str, dtype: type) -> None:
@@ -35,6 +36,7 @@ def test_shapes_and_types_of_answers(name: str, precision: str, dtype: type) -> 
         assert [x.dtype for x in s] == [dtype, dtype, dtype, np.bool_, dtype]
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", SMALL)
 def test_drjit_vectors_give_drjit_values(name: str) -> None:
     material = SMALL[name]

@@ -43,6 +43,7 @@ def _agree(pair: tuple[np.ndarray, np.ndarray]) -> None:
     np.testing.assert_allclose(automatic, finite, rtol=1e-4, atol=1e-6 * scale)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("masking", ["smith-correlated", "smith-separable", "schlick-direct"])
 @pytest.mark.parametrize("ndf", ["ggx", "beckmann", "student-t"])
 @pytest.mark.parametrize("cls", [go.Conductor, go.Dielectric])

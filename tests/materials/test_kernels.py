@@ -12,6 +12,7 @@ from materials import SMALL
 from sphere import random_directions
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("material", SMALL.values(), ids=SMALL)
 def test_more_directions_compile_no_kernel(material: go.BSDF) -> None:
     """Dr.Jit's mean over channels once wrote the number of lanes into the kernel."""

@@ -67,6 +67,7 @@ def _fit_over_exact(ndf: str, alpha: Any, sampling: str) -> np.ndarray:
     return (beckmann.G1_customary(wo, widths) / beckmann.G1(wo, widths)).numpy()
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("sampling", ["visible", "normals"])
 @pytest.mark.parametrize("alpha", WIDTHS, ids=str)
 @pytest.mark.parametrize("ndf", ["ggx", "beckmann"])
@@ -81,6 +82,7 @@ def test_conductor_is_mitsubas_roughconductor(native: Any, ndf: str, alpha: Any,
         assert relative(ours.pdf(WO, WI, precision=precision) * fit, pdf, 1e-6).max() < BAR
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("sampling", ["visible", "normals"])
 @pytest.mark.parametrize("alpha", WIDTHS, ids=str)
 @pytest.mark.parametrize("ndf", ["ggx", "beckmann"])

@@ -17,6 +17,7 @@ WO = random_directions(COUNT, 21).astype(np.float32).astype(np.float64)
 U = random_numbers(COUNT, 21)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", each(FINITE))
 def test_float32_is_close_to_float64(name: str) -> None:
     material = FINITE[name]
@@ -45,6 +46,7 @@ def test_transmission_near_the_critical_angle_keeps_its_digits_in_float32() -> N
     assert np.median(relative(quick[lit], precise[lit])) < 1e-4
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", each(FINITE))
 def test_samples_in_float32_are_those_in_float64(name: str) -> None:
     quick = FINITE[name].sample(WO, U, precision="float32")
@@ -114,11 +116,13 @@ def _finite_everywhere(material: go.BSDF) -> None:
         assert np.isfinite(material.f(wo, wi, precision=precision)).all()
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", [*SMALL, *(pytest.param(x, marks=pytest.mark.slow) for x in ALL if x not in SMALL)])
 def test_every_model_is_finite_and_positive_at_the_edges(name: str) -> None:
     _finite_everywhere(ALL[name])
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", EXTREME)
 def test_facets_are_finite_and_positive_at_extreme_parameters(name: str) -> None:
     import dataclasses

@@ -25,6 +25,7 @@ def _index(material: go.BSDF, w: np.ndarray) -> np.ndarray:
 LAWFUL = {name: m for name, m in FINITE.items() if "reciprocity" not in m.violations()}
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", each(LAWFUL))
 def test_scattering_is_reciprocal(name: str) -> None:
     material = LAWFUL[name]
@@ -34,6 +35,7 @@ def test_scattering_is_reciprocal(name: str) -> None:
     np.testing.assert_allclose(forth, back, rtol=1e-8, atol=1e-10 * np.median(forth[forth > 0]))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "name", each([name for name, m in LAWFUL.items() if isinstance(m, go.Dielectric) and m.transmits])
 )

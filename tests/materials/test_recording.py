@@ -81,13 +81,14 @@ def _check(name: str, method: str, mode: str = "radiance") -> None:
         )
 
 
-@pytest.mark.sample(70)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("method", ["eval", "pdf", "sample"])
 @pytest.mark.parametrize("name", each(MATERIALS, QUICK))
 def test_recorded_graph_equals_the_model(name: str, method: str) -> None:
     _check(name, method)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("method", ["eval", "sample"])
 @pytest.mark.parametrize("name", each([name for name, m in {**SMALL, **COMPENSATED}.items() if m.transmits], QUICK))
 def test_recorded_graph_of_importance_equals_the_model(name: str, method: str) -> None:
@@ -108,6 +109,7 @@ def test_graph_keeps_names_docstrings_and_source_lines() -> None:
     assert any("ggx.py" in line for line in lines)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", each([*SMALL, *COMPENSATED], QUICK))
 def test_every_recorded_function_is_documented(name: str) -> None:
     for method in ("eval", "pdf", "sample"):

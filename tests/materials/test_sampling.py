@@ -48,7 +48,7 @@ def _few_views(name: str) -> list[str]:
     return views if name in ROUND else [view for view in views if view in ("60", "inside")]
 
 
-@pytest.mark.sample(30)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name, view", [(name, view) for name in QUICK for view in _few_views(name)])
 def test_samples_follow_the_density(name: str, view: str) -> None:
     p, integral, failed = _judge(QUICK[name], VIEWS[view])
@@ -77,6 +77,7 @@ def test_the_chi_square_test_rejects_a_wrong_density(fault: str) -> None:
     assert p_value(s.wi.astype(np.float64), s.pdf > 0, wrong)[0] < SIGNIFICANCE
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("ndf", NDFS)
 def test_visible_normals_estimate_the_same_albedo_as_all_normals_and_as_quadrature(ndf: str, alpha: float) -> None:

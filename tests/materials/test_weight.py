@@ -20,6 +20,7 @@ BOTH_MODES = [
 ]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "mode"), BOTH_MODES)
 def test_weight_is_eval_over_pdf_in_float64(name: str, mode: str) -> None:
     material = ALL[name]
@@ -33,6 +34,7 @@ def test_weight_is_eval_over_pdf_in_float64(name: str, mode: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(s.wi, axis=1), 1.0, rtol=1e-10)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", each(ALL))
 def test_failed_samples_have_neither_weight_nor_density(name: str) -> None:
     s = ALL[name].sample(WO, U)
@@ -50,6 +52,7 @@ def test_delta_samples_have_a_probability_while_eval_and_pdf_are_zero(name: str)
     assert not material.pdf(wo, s.wi, precision="float64").any()
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "mode"), BOTH_MODES)
 def test_weight_is_eval_over_pdf_in_float32(name: str, mode: str) -> None:
     """For every ray and parameter: both are made of the same rounded wi."""

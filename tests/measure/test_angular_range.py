@@ -46,7 +46,7 @@ def test_azimuths_that_were_not_measured_are_not_known() -> None:
     assert plane.holds(wo, directions((30, 180), (30, 90), (30, 0))).tolist() == [True, False, False]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_plot_ends_where_the_data_end(narrow: str, tmp_path: Path) -> None:
     found = go.Measured(narrow)
     assert plots._views(None, [("au", found)]) == (0.0, 30.0, 60.0)
@@ -64,7 +64,7 @@ def test_a_plot_ends_where_the_data_end(narrow: str, tmp_path: Path) -> None:
         go.plot(found, angles=[80])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_fit_reads_what_was_measured_alone(narrow: str) -> None:
     """It read the held values beyond as well, up to 80 degrees, and came out 18 % off with an index of 61."""
     data = data_of(go.Measured(narrow).table)

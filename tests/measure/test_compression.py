@@ -55,6 +55,7 @@ def network(folder: Path) -> Network:
     return found
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("method", "size"), [("log", 2048), ("log", 4096), ("lowrank", 4096)])
 def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, size: int, folder: Path) -> None:
     path = folder / f"{method}-{size}.gonio"
@@ -138,6 +139,7 @@ def test_a_network_keeps_the_laws(network: Network, folder: Path) -> None:
     assert found.passed, str(found)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])
 def test_a_shader_carries_the_weights(language: str, network: Network, folder: Path) -> None:
     made = bundle(go.Measured(str(folder / "network.gonio")), language, functions=("eval",))

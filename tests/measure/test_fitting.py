@@ -45,7 +45,7 @@ def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
     return np.array(found, float)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_metal_is_found_again_with_its_indices() -> None:
     found = fit(table(METAL), "conductor")
     known = truth(METAL, found.names)
@@ -55,6 +55,7 @@ def test_a_metal_is_found_again_with_its_indices() -> None:
     assert any("tied" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> None:
     """The channels of a Lambertian are independent, though the gloss that it lacks moves all three."""
     found = fit(table(PLASTIC), "lambert")
@@ -77,6 +78,7 @@ def test_a_sum_of_lobes_is_found_again() -> None:
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("metric", ["log", "log1p", "cuberoot", "linear"])
 def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
     found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", loss=metric)
@@ -106,7 +108,7 @@ def test_a_model_of_0_is_no_solution() -> None:
     assert dark > 100.0 * right
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_negative_values_in_a_channel_are_counted_and_do_not_carry_the_others_away() -> None:
     cells = data.data_of(table(PLASTIC))
     value = cells.value.copy()
@@ -117,6 +119,7 @@ def test_negative_values_in_a_channel_are_counted_and_do_not_carry_the_others_aw
     assert found.as_dict()["negative"] == [0, 0, int(highlight.sum())]
 
 
+@pytest.mark.slow
 def test_saturated_values_are_left_out_and_told() -> None:
     clipped = table(PLASTIC)
     values = np.minimum(clipped.values, 2.0)
@@ -176,6 +179,7 @@ def test_what_the_data_do_not_tell_is_said() -> None:
     assert any("only a combination of a.albedo.r and b.albedo.r" in note for note in found.notes)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("model", "gone"), [("lambert+lambert", "b.albedo"), ("lambert+ward", "b.diffuse")])
 def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
     found = fit(table(go.Lambert((0.3, 0.2, 0.1)), shape=(12, 12, 16)), model)
@@ -189,7 +193,7 @@ def test_parameters_that_are_held_stay() -> None:
     assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_parameter_more_must_earn_its_place() -> None:
     cells = data.data_of(table(go.Lambert((0.3, 0.2, 0.1))))
     plain, more = fit(cells, "lambert"), fit(cells, "lambert+ggx")

@@ -36,6 +36,7 @@ def test_a_table_keeps_the_laws(suffix: str, files: dict[str, str]) -> None:
     assert found.passed, str(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".binary", ".bsdf"])
 def test_a_table_is_recorded_as_it_is_computed(suffix: str, files: dict[str, str]) -> None:
     model = go.Measured(files[suffix])

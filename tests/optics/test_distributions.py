@@ -36,6 +36,7 @@ def test_discovery_finds_every_distribution() -> None:
         distribution("beckman")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("alpha", WIDTHS, ids=str)
 @pytest.mark.parametrize("name", NAMES)
 def test_projected_density_integrates_to_one(name: str, alpha: tuple[float, float]) -> None:
@@ -43,6 +44,7 @@ def test_projected_density_integrates_to_one(name: str, alpha: tuple[float, floa
     assert (d * DIRECTIONS[:, 2]) @ WEIGHTS == pytest.approx(1.0, abs=1e-8)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 55.0, 80.0, 88.0])
 @pytest.mark.parametrize("alpha", WIDTHS, ids=str)
 @pytest.mark.parametrize("name", NAMES)
@@ -100,6 +102,7 @@ def _chi_square(pdf: Any, normals: np.ndarray) -> float:
     ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.5, 0.5), (1.0, 1.0), (0.1, 0.5)], ids=str)
 @pytest.mark.parametrize("name", NAMES)
 def test_sampled_normals_follow_the_density(name: str, alpha: tuple[float, float]) -> None:
@@ -109,6 +112,7 @@ def test_sampled_normals_follow_the_density(name: str, alpha: tuple[float, float
     assert _chi_square(lambda m: ndf.pdf(m, widths), normals) > SIGNIFICANCE
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("degrees", [0.0, 45.0, 85.0])
 @pytest.mark.parametrize("alpha", [(0.1, 0.1), (1.0, 1.0), (0.1, 0.5)], ids=str)
 @pytest.mark.parametrize("name", OWN_VISIBLE)
@@ -144,6 +148,7 @@ def test_beckmanns_visible_slopes_invert_their_distribution_function(degrees: fl
     np.testing.assert_allclose(c(x) / c(1 / tan), u1, atol=1e-7)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("degrees", [10.0, 60.0, 85.0])
 @pytest.mark.parametrize("alpha", [(0.3, 0.3), (1.0, 1.0), (0.1, 0.6)], ids=str)
 def test_bounded_visible_normals_fail_less_often_and_lose_no_reflection(alpha: tuple, degrees: float) -> None:

@@ -74,6 +74,7 @@ def registered() -> Iterator[None]:
         go.NDF.family.remove(name)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.3, 0.3), (1.0, 1.0), (0.1, 0.6)], ids=str)
 @pytest.mark.parametrize("name", ["ggx", "beckmann", "student-t"])
 def test_lambda_is_that_of_the_closed_form(name: str, alpha: tuple[float, float]) -> None:
@@ -84,6 +85,7 @@ def test_lambda_is_that_of_the_closed_form(name: str, alpha: tuple[float, float]
     assert np.abs(found - closed)[upper].max() < 3e-5
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("degrees", [0.0, 60.0, 85.0])
 @pytest.mark.parametrize(("gamma", "alpha"), [(1.5, 0.2), (4.0, 0.5), (1.3, 0.95)])
 def test_masked_visible_area_is_the_projected_area(gamma: float, alpha: float, degrees: float) -> None:
@@ -93,6 +95,7 @@ def test_masked_visible_area_is_the_projected_area(gamma: float, alpha: float, d
     assert ndf.G1(vector(v), widths).numpy()[0] * visible == pytest.approx(v[2], rel=1e-4)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("name", "alpha"),
     [("ggx", (0.15, 0.6)), ("beckmann", (0.3, 0.3)), ("slopes", (0.15, 0.6)), ("gtr", (0.3, 0.3))],

@@ -126,6 +126,7 @@ def test_its_facets_add_up_to_the_surface_that_a_direction_sees(strangers: Any, 
     assert ndf.G1(vector(v), alpha).numpy()[0] * visible == pytest.approx(v[2], rel=1e-4)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "chosen",
     [{"ndf": "student-t-4"}, {"ndf": "flat"}, {"masking": "grooves"}, {"fresnel": "games"}, NAMES],

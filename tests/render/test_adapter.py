@@ -112,6 +112,7 @@ def test_plugin_answers_as_the_model_does(name: str) -> None:
     np.testing.assert_allclose(wi[drawn], s.wi[drawn], atol=1e-4)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", PAIRS)
 def test_plugin_keeps_mitsubas_contract(name: str) -> None:
     """eval, pdf and their fused forms agree; flags tell of the lobes; inactive lanes are dark."""
@@ -318,7 +319,7 @@ NATIVE = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("integrator", ["direct", "path"])
 @pytest.mark.parametrize("name", NATIVE)
 def test_pictures_are_those_of_the_native_plugins(name: str, integrator: str) -> None:
@@ -332,7 +333,6 @@ def test_pictures_are_those_of_the_native_plugins(name: str, integrator: str) ->
     assert native.min() > 0
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("plugin, key", [
     ({"type": "gonio_conductor", "alpha": 0.3, **GOLD}, "floor.bsdf.alpha"),
     ({"type": "gonio_oren_nayar", "albedo": {"type": "rgb", "value": [0.3, 0.5, 0.7]}}, "floor.bsdf.albedo"),
@@ -409,6 +409,7 @@ class Dyed(go.BSDF):
         return white if self.plain.dye == 0.0 else white * (1.0 - self.dye)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("made", "key", "first", "then"),
     [
@@ -488,11 +489,13 @@ for kind, (rgb, spectral, again) in means.items():
 """
 
 
+@pytest.mark.slow
 def test_spectral_variant_shows_the_same_colours_and_variants_can_be_switched() -> None:
     got = subprocess.run([sys.executable, "-c", SPECTRAL], capture_output=True, text=True, timeout=300)
     assert got.returncode == 0, got.stdout + got.stderr[-2000:]
 
 
+@pytest.mark.slow
 def test_import_keeps_the_variant_that_is_set() -> None:
     code = (
         "import mitsuba as mi; mi.set_variant('llvm_ad_mono'); "

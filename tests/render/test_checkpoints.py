@@ -62,6 +62,7 @@ def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options
         passes.run(prepared.render, prepared.spp, 24 * 16, report=after)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("options", [{}, {"integrator": "path"}, {"denoise": True}, {"integrator": "normal"}])
 def test_a_render_that_goes_on_has_the_same_bits(scene: Path, tmp_path: Path, options: dict[str, object]) -> None:
     whole = go.render(scene, spp=7, seed=3, **options)  # type: ignore[arg-type]

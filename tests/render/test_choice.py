@@ -6,6 +6,7 @@ from gonio.bridge import engine
 from gonio.transport.lights import sky
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("count", [2, sky.SHORT, 256])
 def test_a_number_falls_between_the_sums_around_it(count):
     mi, rng = engine.load(), np.random.default_rng(count)

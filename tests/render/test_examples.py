@@ -20,6 +20,7 @@ BY_PATH_ALL_THE_SAME = {"diamond/scene.json", "fibre/scene.json", "rainbow/scene
 EIGHT_KERNELS = "openpbr-layers/scene.json"  # one for each combination of layers
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == EIGHT_KERNELS else []) for name in SCENES]
 )
@@ -35,6 +36,7 @@ def test_every_example_renders(name: str) -> None:
     assert np.isfinite(picture).all() and picture.min() >= lowest and picture.max() > 0
 
 
+@pytest.mark.slow
 def test_the_compensated_row_is_the_brighter_the_rougher() -> None:
     picture = go.render(EXAMPLES / "shading-balls", size=(256, 106), spp=32)
     ratios = []
@@ -47,6 +49,7 @@ def test_the_compensated_row_is_the_brighter_the_rougher() -> None:
     assert ratios[4] > ratios[3] > ratios[2]
 
 
+@pytest.mark.slow
 def test_the_compensated_row_vanishes_in_a_white_furnace() -> None:
     picture = go.render(EXAMPLES / "white-furnace", size=(256, 106), spp=64) / 0.5
     upper, lower = picture[:52], picture[54:]

@@ -57,6 +57,7 @@ def blocks(drawn: Any, integrator: str, spp: int) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lights", SCENES)
 @pytest.mark.parametrize("integrator", ["path", "direct"])
 def test_pictures_are_the_same_without_the_acceleration(

@@ -65,6 +65,7 @@ def rays(mi, seed=1):
     return mi.Ray3f(mi.Point3f(start), dr.normalize(mi.Vector3f(end - start)))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_rays_meet_what_mitsubas_meet(kind):
     mi, scene = loaded(kind)

@@ -117,6 +117,7 @@ def test_direct_agrees_with_mitsuba(lamp: str) -> None:
     agree(scene, {"type": "direct"}, integrator="direct")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("light", [{"type": "constant"}, {"type": "directional", "direction": [0.2, -1.0, 0.1]}])
 def test_what_mitsuba_merges_stands_in_the_way_of_light(light: dict) -> None:
     """Two sheets of one material are one mesh, which the scene's box leaves out: without it light ends at 2 metres."""
@@ -201,6 +202,7 @@ def test_mirror_and_glass_vanish_in_a_white_furnace(bsdf: dict) -> None:
     assert furnace(bsdf, integrator="path", max_depth=50) == pytest.approx(1, rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "whitted", "directSampleBSDF", "normal"])
 def test_passes_of_any_size_give_the_same_bits(name: str) -> None:
     scene = mi.load_dict(scene_dict(ball={"type": "dielectric"}, lamp=LAMPS["point and constant and area"]))
@@ -232,6 +234,7 @@ def test_max_depth_1_shows_lights_only_and_2_is_direct() -> None:
     assert np.array_equal(picture(scene, 16, max_depth=2), picture(scene, 16, integrator="direct"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["path", "direct", "directSampleLight"])
 @pytest.mark.parametrize("kind, behind", [("gonio_area", True), ("area", False)])
 def test_the_back_of_a_two_sided_lamp_lights_the_floor(name: str, kind: str, behind: bool) -> None:
@@ -392,6 +395,7 @@ def test_the_recompilation_test_would_see_a_new_kernel() -> None:
     assert launched(work) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["directSampleLight", "path"])
 def test_ambient_light_adds_its_radiance_times_the_materials_coefficient(name: str) -> None:
     import gonio.mitsuba  # noqa: F401  (registers gonio_phong)
@@ -408,6 +412,7 @@ def test_ambient_light_changes_nothing_where_no_material_takes_it() -> None:
     assert np.array_equal(picture(scene, 4), picture(scene, 4, ambient=(1.0, 1.0, 1.0)))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", ["area", "two areas"])
 def test_a_spectral_scene_has_the_colours_of_mitsubas(lamp: str) -> None:
     try:

@@ -61,6 +61,7 @@ def plate(eta: float, inner: float, lost: float) -> float:
     return float((1.0 - r) ** 2 * t / (1.0 - (r * t) ** 2))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("spectral", [False, True])
 def test_a_plate_absorbs_by_beer_and_lambert(tmp_path: Path, spectral: bool) -> None:
     absorption = 0.35 if spectral else [0.1, 0.35, 2.0]
@@ -137,7 +138,7 @@ def test_light_that_is_sampled_inside_a_medium_is_dimmed_on_its_way(tmp_path: Pa
     assert found[1] == pytest.approx(found[0], rel=0.02) and found[2] == pytest.approx(found[0], rel=0.02)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("eye", [6.0, 0.0])
 def test_water_that_reaches_into_its_glass_is_as_if_it_touched(tmp_path: Path, eye: float) -> None:
     """Glass from -2 to -1, water above it up to 1: modelled as water that begins inside the glass. From inside too."""
@@ -151,6 +152,7 @@ def test_water_that_reaches_into_its_glass_is_as_if_it_touched(tmp_path: Path, e
     assert np.all(np.abs(seen / single - 1.0) < 0.02), "reflections inside add a percent"
 
 
+@pytest.mark.slow
 def test_nested_media_disperse(tmp_path: Path) -> None:
     """By wavelength each surface has the ratio of two curves; flat on they let through what their middles do."""
     shapes = [slab(-2, -1, eta="sf11", priority=2), slab(-1.4, 1, eta="water", absorption=0.1, priority=1)]

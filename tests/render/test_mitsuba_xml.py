@@ -230,6 +230,7 @@ def test_the_longest_name_of_a_parameter_counts_and_its_value_is_no_name(tmp_pat
     assert '<string name="x" value="211.21c\\$a">' in mitsuba_xml.read(scene(tmp_path / "scene", content), {}).text
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("count", "last", "message"),
     [

@@ -19,7 +19,7 @@ from gonio.render.request import Request
 from gonio.scene import mitsuba_scene
 from gonio.verify import targets
 
-from conftest import SCENE
+from ball_scene import SCENE
 
 XML = """<scene version="3.0.0"><integrator type="path"/>
 <sensor type="perspective"><film type="hdrfilm"/></sensor>
@@ -116,6 +116,7 @@ def test_a_folder_that_the_user_names_gives_plugins(tmp_path: Path, monkeypatch:
     assert plugin_search.trusted() == [plugin_search.package(), tmp_path]
 
 
+@pytest.mark.slow
 def test_any_scene_renders_in_a_folder_with_plugins_named_as_mitsubas(tmp_path: Path) -> None:
     """In a process of its own: Mitsuba remembers the folder in which it was imported, and plugins once loaded."""
     for name in ("sphere", "spot", "path", "perspective", "hdrfilm", "independent", "srgb", "diffuse", "merge"):

@@ -111,6 +111,7 @@ def truth(wo: np.ndarray, wi: np.ndarray, eta: Any, k: Any = 0.0) -> np.ndarray:
 # ---------------------------------------------------------------------- against Mitsuba
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
 def test_a_rough_metal_has_mitsubas_matrices(mode: str) -> None:
     transport = getattr(mi.TransportMode, mode)
@@ -121,6 +122,7 @@ def test_a_rough_metal_has_mitsubas_matrices(mode: str) -> None:
     assert apart(got, right).max() < BAR and right[..., 1, 2].any()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
 def test_a_polished_metal_has_mitsubas_matrices(mode: str) -> None:
     transport = getattr(mi.TransportMode, mode)
@@ -130,6 +132,7 @@ def test_a_polished_metal_has_mitsubas_matrices(mode: str) -> None:
     assert apart(got, right).max() < BAR and right[..., 3, 2].any()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
 def test_smooth_glass_has_mitsubas_matrices(mode: str) -> None:
     """But where Mitsuba's own are off the equations in 64 bits, by up to 3e-4: at grazing angles from inside."""
@@ -148,6 +151,7 @@ def test_smooth_glass_has_mitsubas_matrices(mode: str) -> None:
 # ---------------------------------------------------------------------- against the equations
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])
 def test_rough_glass_polarizes_as_its_facets_do(alpha: float) -> None:
     """Mitsuba's depolarizes."""
@@ -163,18 +167,21 @@ def test_rough_glass_polarizes_as_its_facets_do(alpha: float) -> None:
         assert np.quantile(off, 0.99) < BAR and off.max() < 1e-3
 
 
+@pytest.mark.sample(1)
 def test_a_rough_metal_polarizes_as_its_facets_do() -> None:
     got = evaluated(mi.load_dict({**METAL, **INDEX}), np.abs(WO), np.abs(WI), mi.TransportMode.Radiance)
     exact = truth(np.abs(WO), np.abs(WI), ETA, K)
     assert apart(got[0], exact * got[0, :, :1, :1]).max() < BAR
 
 
+@pytest.mark.sample(1)
 def test_a_mirror_is_a_perfect_conductor() -> None:
     wi, got = sampled(mi.load_dict({"type": "gonio_mirror"}), np.abs(WO), mi.TransportMode.Radiance)
     near = truth(np.abs(WO), wi, 1e-9, 1e10)  # an index without end: r_s = -1, r_p = 1
     assert apart(got[0], near).max() < BAR
 
 
+@pytest.mark.sample(1)
 def test_a_pane_has_the_matrices_of_all_its_bounces() -> None:
     wi, got = sampled(mi.load_dict({"type": "gonio_thin_dielectric", "eta": 1.5}), WO, mi.TransportMode.Radiance)
     cos = np.abs(WO[:, 2].astype(np.float64))
@@ -230,6 +237,7 @@ def test_a_film_polarizes_as_its_layers_do() -> None:
 # ---------------------------------------------------------------------- materials of materials
 
 
+@pytest.mark.sample(1)
 def test_what_is_not_specular_depolarizes() -> None:
     for plugin in ("lambert", "oren_nayar", "phong", "metal"):
         got = evaluated(mi.load_dict({"type": f"gonio_{plugin}"}), WO, WI, mi.TransportMode.Radiance)
@@ -238,6 +246,7 @@ def test_what_is_not_specular_depolarizes() -> None:
         assert not got.any()
 
 
+@pytest.mark.sample(1)
 def test_of_a_compensated_metal_the_light_scattered_once_is_polarized() -> None:
     base = {**METAL, **INDEX, "alpha": 0.8}
     wo, wi = np.abs(WO), np.abs(WI)
@@ -249,6 +258,7 @@ def test_of_a_compensated_metal_the_light_scattered_once_is_polarized() -> None:
         assert apart(got, single).max() < BAR
 
 
+@pytest.mark.sample(1)
 def test_a_mix_has_the_matrices_of_both() -> None:
     a, b = {**METAL, **INDEX}, {"type": "gonio_dielectric", "alpha": 0.5, "eta": 1.7}
     mixed = {"type": "gonio_mix", "a": a, "b": b, "weight": 0.25}
@@ -256,6 +266,7 @@ def test_a_mix_has_the_matrices_of_both() -> None:
     assert apart(got, 0.75 * first + 0.25 * second).max() < BAR
 
 
+@pytest.mark.sample(1)
 def test_both_sides_of_a_two_sided_metal_polarize_alike() -> None:
     """Mirrored at the surface: the sense in which light turns is then the other one."""
     plugin = mi.load_dict({**METAL, **INDEX, "two_sided": True})
@@ -265,6 +276,7 @@ def test_both_sides_of_a_two_sided_metal_polarize_alike() -> None:
     assert apart(got[0], exact * got[0, :, :1, :1]).max() < BAR
 
 
+@pytest.mark.sample(1)
 def test_samples_weigh_what_eval_says() -> None:
     for plugin in ({**METAL, **INDEX}, {"type": "gonio_kulla_conty", "base": {**METAL, **INDEX}}):
         bsdf, ctx = mi.load_dict(plugin), mi.BSDFContext()

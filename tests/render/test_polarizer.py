@@ -80,7 +80,7 @@ def expected(degrees: float, roll: float) -> np.ndarray:
     return found
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0])
 @pytest.mark.parametrize("roll", [0.0, 25.0])
 def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(
@@ -100,6 +100,7 @@ def test_at_brewsters_angle_the_reflection_goes_out(tmp_path: Path) -> None:
     assert across < 0.01 * through
 
 
+@pytest.mark.slow
 def test_light_that_is_not_polarized_loses_a_half(tmp_path: Path) -> None:
     matte = {"type": "gonio-lambert", "albedo": 0.5}
     for degrees in (0, 77):

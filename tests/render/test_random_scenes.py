@@ -156,6 +156,7 @@ def test_path_makes_mitsubas_picture(seed: int) -> None:
     agree(scene.pictures("path", 256), scene.pictures("Mitsuba's path", 512))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_caustics_make_the_picture_of_paths(seed: int) -> None:
     scene = Scene(100 + seed, ROUGH + SMOOTH, SURFACES)

@@ -244,6 +244,12 @@ def test_an_unknown_integrator_gets_a_suggestion(scene: Path) -> None:
     assert (caught.value.where, caught.value.hint) == ("--integrator", "did you mean 'path'?")
 
 
+def test_a_depth_is_refused_where_it_has_no_effect(scene: Path) -> None:
+    with pytest.raises(InputError, match="integrator 'normal' has no maximum depth") as caught:
+        prepare(Request(scene, integrator="normal", max_depth=3))
+    assert caught.value.where == "--max-depth" and "path" in caught.value.hint
+
+
 def test_a_timeout_keeps_the_picture_and_says_so(scene: Path, tmp_path: Path) -> None:
     result = render_to_file(Request(scene, tmp_path / "a.npz", spp=2**29, timeout=0.3))
     metadata = images.read(result.output).metadata
@@ -389,6 +395,7 @@ def test_a_signal_keeps_the_picture_so_far(endless: Path, tmp_path: Path, number
     assert images.read(output).metadata["stopped"] == "interrupt"
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_ends_at_once_and_leaves_no_part_of_a_picture(endless: Path, tmp_path: Path) -> None:
     output = tmp_path / "out" / "a.exr"
     output.parent.mkdir()

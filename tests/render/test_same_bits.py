@@ -52,6 +52,7 @@ def drawn(seed: int, examples: int, scenes: int) -> dict[str, str]:
     return dict(line.split() for line in done.stdout.splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "processes, examples, scenes", [(2, 3, 2), pytest.param(PROCESSES, 99, 60, marks=pytest.mark.slow)]
 )

@@ -445,6 +445,7 @@ def test_two_lamps_that_are_alike_are_two_lamps(build):
     assert len(build([{"type": "sphere", "center": [0, 0, 0], "radius": 1}], [lamp, other]).emitters()) == 2
 
 
+@pytest.mark.slow
 def test_shapes_and_lights_come_in_the_same_order_every_time() -> None:
     """Mitsuba merges meshes, and hands them on in the order of their addresses: with it went that of the lights."""
     material = go.Lambert()

@@ -184,6 +184,13 @@ WRONG = [
         "0, -1, 0",
     ),
     (SHAPE + "/type", "spere", None, "unknown type 'spere'", "did you mean 'sphere'"),
+    (
+        "/scene/lights/0/type",
+        "pointLight",
+        None,
+        "unknown type 'pointLight'",
+        "write 'spotLight', which shines equally",
+    ),
     (SHAPE + "/center", [0, 0], None, "expected 3 numbers", "x, y, z"),
     (SHAPE + "/transform/scale", [1, 0, 1], None, "flattens", "other than 0"),
     (SHAPE + "/transform/rotate/axis", [0, 0, 0], None, "length 0", "direction"),
@@ -428,7 +435,7 @@ def test_override_path_that_leads_nowhere(tmp_path, path, what, hint):
 # ---------------------------------------------------------------------- the schema
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_exported_schema_accepts_what_the_reader_accepts():
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(json.dumps(scene.json_schema()))
@@ -477,7 +484,7 @@ def places(data: Any, steps: tuple = ()) -> list[tuple]:
 
 @pytest.mark.long
 @settings(
-    max_examples=400, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(st.data())
 def test_mutated_scene_reads_or_is_refused_but_nothing_else(tmp_path, data):
@@ -540,7 +547,7 @@ def test_the_course_s_scenes_read_and_build_unmodified(shared):
         assert len(scene.build(description, engine.load()).shapes()) >= len(description.shapes)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_project_s_own_examples_read_and_are_small():
     files = sorted((REPOSITORY / "examples").glob("*/scene.json"))
     for file in files:

@@ -82,6 +82,7 @@ def _refracted(name: str, wavelengths: list[float], sin: float, ctx: Any = None)
     return np.abs(np.array(found)[0])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["bk7", "diamond", "water", "cauchy(1.5, 0.01)"])
 def test_each_wavelength_refracts_by_its_own_index(name: str) -> None:
     wavelengths = [380.5, 434.2, 486.1, 589.3, 656.27, 759.9]
@@ -140,6 +141,7 @@ def test_without_dispersion_a_spectral_picture_is_as_quiet_as_ever(tmp_path: Pat
         assert render._integrator.disperses is separates, eta
 
 
+@pytest.mark.slow
 def test_a_normal_map_on_dispersing_glass_lets_it_disperse(tmp_path: Path) -> None:
     from PIL import Image
 
@@ -167,10 +169,12 @@ def test_a_prism_turns_each_line_as_snell_and_sellmeier_have_it() -> None:
     assert np.abs(_benchmark().prism()).max() < 0.005, "degrees"
 
 
+@pytest.mark.slow
 def test_snells_window_ends_at_the_critical_angle() -> None:
     assert abs(_benchmark().window(spp=16)) < 1.0, "pixels"
 
 
+@pytest.mark.slow
 def test_the_bows_of_water_are_where_descartes_has_them() -> None:
     assert np.abs(_benchmark().bow(rays=100_000)).max() < 0.05, "degrees"
 
@@ -178,6 +182,7 @@ def test_the_bows_of_water_are_where_descartes_has_them() -> None:
 # ---------------------------------------------------------------------- lamps
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "light",
     [
@@ -267,6 +272,7 @@ def test_a_spectral_render_leaves_the_variant_as_it_was(tmp_path: Path) -> None:
     assert mi.variant() == "llvm_ad_rgb"
 
 
+@pytest.mark.slow
 def test_a_render_leaves_the_variant_of_a_program_as_it_was() -> None:
     mi.set_variant("llvm_ad_spectral")
     try:

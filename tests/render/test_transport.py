@@ -137,6 +137,7 @@ def test_particles_behind_a_thin_lens_are_not_seen() -> None:
     agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("clip", [{"near_clip": 3.6}, {"far_clip": 4.0}])
 def test_particles_are_seen_between_the_clips_of_the_camera(clip: dict[str, float]) -> None:
     film = {"type": "hdrfilm", "width": 20, "height": 20, "rfilter": {"type": "box"}}
@@ -382,7 +383,7 @@ def test_the_retrace_takes_nothing_and_adds_nothing(name: str) -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "pane"])
 def test_light_from_a_mirror_is_seen_through_a_rough_surface(name: str) -> None:
     """Particles come to the side of it that is turned away from the camera."""

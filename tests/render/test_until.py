@@ -48,6 +48,7 @@ def finish(render: until.Until, size: int = 7) -> np.ndarray:
     return render.image()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("adapts", [False, True])
 def test_the_error_is_what_was_promised(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, adapts: bool
@@ -230,6 +231,7 @@ def test_a_checkpoint_keeps_the_error_that_was_asked_for(scene: Path, tmp_path: 
         go.render(scene, until_error=1e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_pixels_samples_do_not_follow_its_own_values(scene: Path, tmp_path: Path, shared_out: None) -> None:
     """The mean of many pictures is the picture: shares that are chosen by samples which count too have no bias."""
     truth = go.render(scene, spp=16384, size=(16, 12), integrator="direct", seed=99)
@@ -264,6 +266,7 @@ def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> N
         go.render(scene, spp=4, until_error=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("integrator", ["caustics", "light", "normal"])
 def test_every_integrator_of_gonios_goes_on_until_an_error(scene: Path, tmp_path: Path, integrator: str) -> None:
     render = drawing(scene, 0.02, tmp_path, integrator=integrator, denoise=False, max_depth=None)

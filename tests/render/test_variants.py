@@ -117,7 +117,7 @@ def _answers(bsdf: Any) -> tuple[np.ndarray, ...]:
     return value, np.array(pdf), weight, np.array(bs.wo), np.array(bs.pdf)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", PAIRS)
 def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
     if name == "measured metal" and not mi.is_spectral:
@@ -134,6 +134,7 @@ def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
         assert native[0].max() > 0.1, "both would be black"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("polarized", [name for name in LLVM if name.endswith("polarized")])
 def test_pictures_of_unpolarized_light_are_those_of_the_plain_variant(polarized: str) -> None:
     pictures = []
@@ -185,6 +186,7 @@ def _reflectance(eta: np.ndarray, k: np.ndarray) -> np.ndarray:
     return ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("by", ["preset", "numbers"])
 def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values(by: str) -> None:
     """Mitsuba would turn numbers into a reflectance, of 1 at most."""
@@ -251,7 +253,7 @@ class Ward(BSDF):
 """
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [
     "import gonio.mitsuba; go.BSDF.family.add(Ward)",
     "go.BSDF.family.add(Ward); import gonio.mitsuba",

@@ -17,6 +17,7 @@ def _tables(*shape: int, channels: int, numbers: int = 4) -> Baked:
     return Baked({"ltc_inverse": np.ones((*shape, numbers)), "ltc_norm": np.ones((*shape, channels))}, {})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("baked", "head"),
     [

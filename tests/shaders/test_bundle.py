@@ -44,7 +44,7 @@ def address(tmp_path: Path) -> Iterator[str]:
         yield f"{root}program.html"
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lang", ["glsl", "wgsl"])
 @pytest.mark.parametrize("name", ["oren-nayar", "mix", "kulla-conty-turned", "kulla-conty-glass"])
 def test_a_bundle_is_enough_to_draw_with(name: str, lang: str, chromium: Any, address: str, tmp_path: Path) -> None:
@@ -102,6 +102,7 @@ def test_the_page_of_three_js_draws_what_gonio_says(chromium: Any, tmp_path: Pat
         assert np.abs(drawn[int(y), int(x)] - np.clip(shown, 0.0, 1.0)).max() < 2.5 / 255.0
 
 
+@pytest.mark.slow
 def test_fields_lie_in_a_buffer_as_the_language_has_it() -> None:
     types = ["float", "vec3", "vec2", "vec2", "float", "float", "vec3"]
     known = languages()

@@ -109,7 +109,7 @@ def _glslang(text: str, folder: Path) -> str:
 QUICK = set(SHAPES) - set(materials.COMPOSED) | {"openpbr"}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", materials.each(EVERY, QUICK))
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = written(name, "hlsl").text
@@ -124,7 +124,7 @@ def test_the_hlsl_compiler_refuses_what_is_wrong(tmp_path: Path) -> None:
     assert "unknown variable" in _glslang("float f() { return missing; }", tmp_path)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
 def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
     for name in FEW:
@@ -134,6 +134,7 @@ def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
                 assert len(body) <= 60, f"{name}: {body[0]}"
 
 
+@pytest.mark.slow
 def test_random_walks_cannot_be_written_and_say_so() -> None:
     with pytest.raises(go.InputError, match="RandomWalk is estimated by random walks"):
         go.emit(go.RandomWalk(go.Conductor()))

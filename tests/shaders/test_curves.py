@@ -33,6 +33,7 @@ def test_the_fit_of_an_albedo_has_the_stated_error() -> None:
         assert np.max(np.abs(value - exact)) < 1.5 * curve.error
 
 
+@pytest.mark.slow
 def test_the_split_sum_is_fitted_within_its_bound() -> None:
     (curve,) = fits.fit(fits.sample(GOLD, ("dfg",)), "4", ("dfg",))
     table = go.bake("ggx", lut=["dfg"], resolution=16).arrays
@@ -54,6 +55,7 @@ def test_an_order_is_checked(order: str) -> None:
         curves.fitted(go.Lambert(), order, "glsl")
 
 
+@pytest.mark.slow
 def test_fits_and_split_sums_compile(tmp_path: Path) -> None:
     texts = [curves.fitted(GOLD, "2", "hlsl")[0].text, tiers.split_sum(GOLD, "hlsl")[0].text]
     if GLSLANG is None:
@@ -70,6 +72,7 @@ def test_a_budget_chooses_the_most_exact_form() -> None:
     assert str(found[0]) in made.text.replace("\n// ", " ")
 
 
+@pytest.mark.slow
 def test_a_budget_chooses_cheaper_terms_of_a_material() -> None:
     model, found = tiers.cheapest(GOLD, 150)
     assert model.fresnel == "schlick" and found[0].cost == 140 and 0.0 < found[0].mean < 0.01

@@ -41,8 +41,7 @@ def test_inner_materials_have_switches_too() -> None:
     assert "b_varnish" in go.emit(mixed, functions=["eval"], lean=True)
 
 
-@pytest.mark.long
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("material", "share"),
     [
@@ -63,7 +62,7 @@ def _whole(cls: type[go.BSDF]) -> str:
     return go.emit(cls())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_lean_mirrorless_surface_is_isotropic_and_opaque() -> None:
     manifest = bundle(go.OpenPBR(), lean=True).manifest
     assert manifest["isotropic"] and not manifest["transmits"]
@@ -71,6 +70,7 @@ def test_a_lean_mirrorless_surface_is_isotropic_and_opaque() -> None:
     assert not whole["isotropic"] and whole["transmits"]
 
 
+@pytest.mark.slow
 def test_a_weight_of_zero_leaves_no_samples_to_its_lobe() -> None:
     """The whole OpenPBR without transmission sampled the lower side: its pdf differed from Python's for all pairs."""
     go.set_precision("float64")  # until the end of the test

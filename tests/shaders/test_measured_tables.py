@@ -63,7 +63,7 @@ def _check(page: Any, lang: str, material: go.BSDF) -> None:
             )
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["angles", "half-difference"])
 def test_a_table_gives_its_values_in_glsl(page: Any, kind: str, tmp_path: Path) -> None:
     def value(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:

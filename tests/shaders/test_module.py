@@ -36,7 +36,7 @@ def test_bundles_with_prefixes_share_no_name(lang: str) -> None:
     assert not a & b and all(name.startswith("a_") for name in a)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "wgsl"])
 def test_a_module_declares_each_name_once(lang: str) -> None:
     made = bundle(SEVERAL, lang, constants=True)
@@ -60,6 +60,7 @@ def test_a_module_of_one_model_twice_shares_its_functions() -> None:
     assert text.count("vec3 Conductor_eval(") == 1 and "Conductor_values_2 = Conductor(" in text
 
 
+@pytest.mark.slow
 def test_a_module_compiles_as_hlsl(tmp_path: Path) -> None:
     text = go.emit(SEVERAL, "hlsl", prefix="g_", constants=True, group=1, first_binding=3)
     assert "register(t3, space1)" in text

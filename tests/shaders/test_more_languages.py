@@ -46,6 +46,7 @@ def test_slang_and_hlsl_compile_in_slang() -> None:
     assert logs == [""] * len(texts) and "missing" in wrong
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SOME)
 def test_hlsl_needs_no_select(name: str) -> None:
     text = go.emit(SOME[name], "hlsl", prefix="g_")
@@ -58,6 +59,7 @@ def test_several_materials_share_the_helper() -> None:
     assert text.count("float3 choose(bool3") == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SOME)
 def test_metal_is_one_struct(name: str) -> None:
     lines = go.emit(SOME[name], "msl", prefix="g_").splitlines()
@@ -67,6 +69,7 @@ def test_metal_is_one_struct(name: str) -> None:
     assert sum(line.count("{") for line in code) == sum(line.count("}") for line in code)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SOME)
 def test_godot_is_glsl_with_hints_of_textures(name: str, tmp_path: Path) -> None:
     text = go.emit(SOME[name], "godot", constants=True)

@@ -66,13 +66,12 @@ def _check(page: Any, lang: str, name: str, side: int, lean: bool = False) -> No
 SPARED = {"film-on-glass", "kulla-conty", "blinn-phong", "modified-phong", "glass-ggx-smith-correlated"}
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", materials.each(FEW, set(FEW) - set(ALIKE) - SPARED))
 def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
     _check(page, "glsl", name, 64)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])
 def test_wgsl_gives_the_values_of_python(page: Any, name: str) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):

@@ -87,7 +87,7 @@ def _check(name: str, language: str, number: Any) -> None:
             assert wrong.mean() <= 1e-2, (method, place, wrong.mean(), np.nanmax(np.abs(value - truth)))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", materials.each(EVERY, SOME))
 def test_numpy_says_what_gonio_says(name: str) -> None:
     _check(name, "numpy", np.asarray)

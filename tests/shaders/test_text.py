@@ -43,7 +43,7 @@ def test_code_whose_values_may_tell_x_from_y_is_not_isotropic(name: str) -> None
     assert not bundle(name, "glsl").manifest["isotropic"]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_manifest_tells_what_tables_were_found_from() -> None:
     fixed = {p["path"] for p in bundle("coat", "glsl").manifest["parameters"] if p["fixed"]}
     assert "base.alpha" in fixed and "depth" not in fixed
@@ -56,7 +56,7 @@ def test_functions_that_differ_in_a_number_alone_are_one() -> None:
         assert not copies, (name, copies)
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", FEW)
 def test_nothing_is_defined_and_not_used(name: str) -> None:
     shader = written(name)
@@ -87,6 +87,7 @@ def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) 
     assert "lookup_missing" in derive and not any("lookup_missing" in body for body in functions.values())
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lang", LANGS)
 def test_manifest_tells_what_a_program_must_know(lang: str) -> None:
     made = bundle(go.KullaConty(go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.5)), lang)
@@ -207,6 +208,7 @@ def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.C
     assert not (tmp_path / "half").exists()  # neither of both, where one cannot be
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
 @pytest.mark.parametrize("name", ["oren-nayar", "kulla-conty", "mix-of-mixes"])
 def test_the_manifest_names_functions_of_its_own_struct(name: str, lang: str) -> None:
@@ -217,6 +219,7 @@ def test_the_manifest_names_functions_of_its_own_struct(name: str, lang: str) ->
         assert re.search(rf"\b{function} ?\({first}", made.text), f"{function} of {struct}"
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FEW)
 def test_locals_have_names_of_the_source_and_a_digit_is_a_power(name: str) -> None:
     """Two values of one name are x, x_2: x2 is the square of x. None is named for its operation."""
@@ -248,6 +251,7 @@ def test_values_made_by_small_functions_of_the_source_bear_their_names() -> None
     assert "bool above = wo.z > 0.0 && wi.z > 0.0;" in _functions(go.emit(GOLD))["Conductor_sample"]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("lang", LANGS)
 def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: str) -> None:
     text = go.emit(go.KullaConty(GOLD), lang)

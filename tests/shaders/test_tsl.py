@@ -62,6 +62,7 @@ def _run(model: go.BSDF, folder: Path, numbers: bool) -> tuple[object, np.ndarra
     return json.loads(done.stdout), wo, wi
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SOME)
 def test_the_module_says_what_gonio_says(name: str, tmp_path: Path) -> None:
     rows, wo, wi = _run(SOME[name], tmp_path, numbers=True)

@@ -71,6 +71,7 @@ CASES = {
 }
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("text", CASES)
 def test_shader_equals_its_closed_form(text: str) -> None:
     np.testing.assert_allclose(value(text), CASES[text](X), rtol=1e-6)
@@ -101,6 +102,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("what", REFUSED)
 def test_construct_without_meaning_is_refused_by_name_and_line(what: str) -> None:
     with pytest.raises(InputError) as error:

@@ -35,7 +35,8 @@ def _try(data: bytes) -> bool:
     return True
 
 
-def test_mutated_module_ends_in_an_error_or_a_value() -> None:
+@pytest.mark.parametrize("count", [400, pytest.param(3000, marks=pytest.mark.slow)])
+def test_mutated_module_ends_in_an_error_or_a_value(count: int) -> None:
     try:
         compiler()
     except Exception as error:
@@ -44,7 +45,7 @@ def test_mutated_module_ends_in_an_error_or_a_value() -> None:
     assert _try(whole.tobytes())
     rng = np.random.default_rng(7)
     slowest, ran = 0.0, 0
-    for _ in range(3000):
+    for _ in range(count):
         words = whole.copy()
         for _ in range(rng.integers(1, 4)):
             at = rng.integers(5, len(words))
@@ -56,4 +57,4 @@ def test_mutated_module_ends_in_an_error_or_a_value() -> None:
         ran += _try(data)
         slowest = max(slowest, time.process_time() - start)
     assert slowest < 5.0
-    assert ran > 100
+    assert ran > count // 30

@@ -34,6 +34,7 @@ def _reported() -> list[tuple[str, int, str, str]]:
     ]
 
 
+@pytest.mark.slow
 def test_a_program_that_uses_everything_is_clean_in_strict_mode():
     assert [one for one in _reported() if one[0] != "mistakes.py"] == []
 

@@ -38,6 +38,7 @@ def test_a_scan_finds_where_something_begins() -> None:
     assert box.jumps(subject.of(go.Lambert(0.5)), box.axes(subject.of(go.Lambert(0.5))), 1) == []
 
 
+@pytest.mark.slow
 def test_a_mistake_in_a_corner_of_the_ranges_is_caught_and_placed() -> None:
     verdict = verify(BrightCoat(), quick=True, law="energy")["energy"]
     assert verdict.failed and verdict.why[0].startswith("at ") and "coat = " in verdict.why[0]

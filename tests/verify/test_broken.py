@@ -49,7 +49,7 @@ def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> No
     assert verdict.why and verdict.command and verdict.meaning
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "control",
     # rough glass is judged whole among the models too, and takes longest

@@ -73,6 +73,7 @@ def test_a_declared_fact_is_held_to() -> None:
     assert any("`transmits` says that none is" in line for line in why), why
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("material", [go.Lambert(), go.Dielectric(alpha=0.2), go.Conductor(alpha=0.01), go.Mirror()])
 def test_sound_materials_pass(material: go.BSDF) -> None:
     assert verify(material, quick=True, law="calls")["calls"].status == "pass"
@@ -100,6 +101,7 @@ class RedAboveBlueBelow(go.BSDF):
         return color * ops.where(wo.z * wi.z > 0.0, ops.abs(wi.z) * ops.inv_pi, 0.0)
 
 
+@pytest.mark.slow
 def test_a_surface_may_declare_another_color_on_its_back() -> None:
     assert verify(RedAboveBlueBelow(), quick=True, law=["calls"]).passed
     undeclared = type("Undeclared", (RedAboveBlueBelow,), {"back_differs": False})

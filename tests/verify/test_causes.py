@@ -199,7 +199,7 @@ class NarrowPdf(RightFacets):
         return s._replace(pdf=where(s.pdf > 0.0, self.pdf(wo, s.wi), 0.0))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
@@ -264,6 +264,7 @@ def test_what_the_examiners_named_is_named() -> None:
         assert words in verify(cls(), quick=True, law=law)[law].cause, cls
 
 
+@pytest.mark.slow
 def test_light_that_meets_a_pigment_twice_is_no_mistake_and_a_colour_that_is_squared_is() -> None:
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from mutants.fourth.sound import BouncingLacquer
@@ -305,6 +306,7 @@ class OneSided(Weighed):
         return super().eval(wo, wi, mode) * (1.0 + 0.2 * (wo.x * wi.y - wo.y * wi.x))
 
 
+@pytest.mark.slow
 def test_a_lobe_to_one_side_is_not_called_anisotropic() -> None:
     cause = verify(OneSided(), quick=True, law="isotropy")["isotropy"].cause
     assert "mirrored" in cause and "`isotropic`" not in cause

@@ -113,7 +113,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
     return verify(f"{file}:{name}", quick=True, law=["reciprocity", "weight", "isotropy"], **more)  # type: ignore[arg-type]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -147,16 +147,19 @@ def test_what_is_printed_is_counted_and_does_not_disturb_json(file: Path) -> Non
     assert "it printed" in card["notes"][0] and int(card["notes"][0].split()[2]) > 10_000
 
 
+@pytest.mark.slow
 def test_an_answer_that_changes_is_a_failure_that_says_so(file: Path) -> None:
     report = verify(f"{file}:Changes", quick=True, law="calls")
     assert "asked twice: " in report["calls"].why[0] and "stochastic = True" in report["calls"].why[0]
 
 
+@pytest.mark.slow
 def test_a_fact_that_raises_fails_the_laws_that_ask_for_it(file: Path) -> None:
     report = judged(file, "RaisesAside")
     assert "ValueError: which side? (hostile.py:" in report["reciprocity"].why[0]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("line", "words"), [("os._exit(3)", "exit code 3"), ("raise SystemExit", "SystemExit")])
 def test_a_file_that_cannot_even_be_loaded_is_bad_input(tmp_path: Path, line: str, words: str) -> None:
     (tmp_path / "bad.py").write_text(f"import os\n{line}\n")
@@ -186,11 +189,13 @@ def test_the_report_is_the_same_in_one_process_in_another_and_in_several(file: P
     assert here == plain(verify(names, quick=True, law=laws, workers=3))
 
 
+@pytest.mark.slow
 def test_a_crash_in_one_setting_leaves_the_others_as_they_are(file: Path) -> None:
     report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], workers=2)
     assert [card.passed for card in report.cards] == [True, False, True]
 
 
+@pytest.mark.slow
 def test_a_material_that_python_holds_can_be_judged_apart() -> None:
     gold = go.Conductor.preset("Au", alpha=0.3)
     assert plain(verify(gold, quick=True, law="weight", isolated=True)) == plain(verify(gold, quick=True, law="weight"))
@@ -202,6 +207,7 @@ def test_a_material_that_python_holds_can_be_judged_apart() -> None:
         verify(Local(0.5), quick=True, law="weight", isolated=True)
 
 
+@pytest.mark.slow
 def test_the_order_of_sets_does_not_matter(file: Path) -> None:
     command = [sys.executable, "-m", "gonio.cli", "verify", f"{file}:Good", "--quick", "--law", "pdf", "--json"]
     found = []

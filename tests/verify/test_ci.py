@@ -126,6 +126,7 @@ def test_what_is_no_baseline_is_refused(tmp_path: Path, text: str) -> None:
         baseline.read(tmp_path / "known.json")
 
 
+@pytest.mark.slow
 def test_the_schema_describes_every_report(report: Report) -> None:
     described = json.loads(schema.text())
     jsonschema.Draft202012Validator.check_schema(described)
@@ -140,6 +141,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
     return int(ended.value.code or 0), out, err
 
 
+@pytest.mark.slow
 def test_the_command_line_fails_on_what_is_new_only(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

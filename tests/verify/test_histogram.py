@@ -21,6 +21,7 @@ def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -
     return [histogram.compare(expected, counts, row) for row in range(len(wo))]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("alpha", [0.005, 0.1, 1.0])
 def test_a_right_model_is_not_rejected_at_any_width(alpha: float) -> None:
     lowest = min(min(o) for o in outcomes(go.Conductor.preset("Au", alpha=alpha), 20, 4))
@@ -71,6 +72,7 @@ def test_rounding_of_directions_counts_for_nothing_in_cells_of_their_steps() -> 
     assert verify(narrow, law="pdf", seed=1).passed
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("place", [0.03, 0.97])
 def test_a_step_beside_the_edges_of_a_ring_of_cells_is_found(place: float) -> None:
     """The density of half of all directions is twice the others'; where it changes no cell's nodes lie beyond."""

@@ -22,7 +22,7 @@ TEXTS = {
 LIMITED = [name for name, model in models().items() if model.limits and name not in ("openpbr", "disney2015")]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LIMITED)
 def test_what_a_model_switches_off_changes_nothing(name: str) -> None:
     verdict = verify(go.material(TEXTS.get(name, name)), quick=True, law="limits")["limits"]

@@ -23,7 +23,7 @@ def test_every_model_is_in_the_list() -> None:
     assert set(go.models()) <= listed
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FEW)
 def test_a_model_passes_every_law(name: str) -> None:
     report = verify(MODELS[name], quick=True, seed=2013)

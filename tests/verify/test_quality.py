@@ -56,6 +56,7 @@ def test_what_cannot_be_sampled_or_is_black_has_none() -> None:
     assert quality.of(of(Fails(0.5))) is None and quality.of(of(go.Lambert(0.0))) is None
 
 
+@pytest.mark.slow
 def test_cards_and_the_command_line_show_it(capsys: pytest.CaptureFixture[str]) -> None:
     report = verify(go.Phong(), quick=True, law="shader")
     assert "% of the ideal" in str(report) and report.as_dict()["cards"][0]["quality"]["ideal"] > 0.9  # type: ignore[index]

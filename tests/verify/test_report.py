@@ -70,6 +70,7 @@ def test_a_declared_breach_is_no_failure_unless_it_is_larger_or_absent() -> None
     assert verdict(both, declared).status == "fail"
 
 
+@pytest.mark.slow
 def test_the_threshold_is_corrected_over_the_whole_report() -> None:
     one = verify(go.Lambert(0.5), quick=True, law=["pdf"])
     two = verify([go.Lambert(0.5), go.Lambert(0.6)], quick=True, law=["pdf"])

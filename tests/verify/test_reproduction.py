@@ -16,6 +16,7 @@ def failed(target: str, law: str) -> Verdict:
     return verdict
 
 
+@pytest.mark.slow
 def test_it_holds_the_plugin_and_the_figure() -> None:
     program = failed("mitsuba:principled", "energy").reproduction
     ast.parse(program)

@@ -67,7 +67,7 @@ def test_views_are_shares_of_the_hemisphere() -> None:
         assert mass @ np.abs(wo[:, 2]) == pytest.approx(2.0 / 3.0, abs=5e-3)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sound", [RightDiffuse, RightFacets, RightLobes, go.Mirror, go.TwoSided])
 def test_a_sound_material_has_no_bias(sound: type) -> None:
     material = sound(go.Lambert()) if sound is go.TwoSided else sound()
@@ -181,6 +181,7 @@ def test_what_is_held_is_judged_alone() -> None:
     assert verdict.failed and verdict.grade is Grade.INNER and "around a sound one it holds" in verdict.cause
 
 
+@pytest.mark.slow
 def test_a_tilted_frame_breaks_isotropy_by_nature() -> None:
     verdict = verify("mitsuba:bumpmap", quick=True, law=["isotropy"])["isotropy"]
     assert verdict.failed and verdict.grade is Grade.BY_NATURE and "tilted" in verdict.cause

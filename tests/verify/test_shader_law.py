@@ -21,6 +21,7 @@ class Own(go.BSDF):
         return go.ops.where((wo.z > 0) & (wi.z > 0), self.albedo * wi.z * go.ops.sqrt(wo.z) / 3.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_users_material_is_judged_without_a_browser() -> None:
     found = verify(Own(), quick=True, law="shader")["shader"]
     assert found.status == "pass"

@@ -58,18 +58,20 @@ def test_a_sweep_gives_a_subject_a_value() -> None:
     assert [c.model.alpha for c in targets.resolve("conductor", [], "alpha=0.2,0.4")] == [0.2, 0.4]
 
 
+@pytest.mark.slow
 def test_a_users_own_class(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = file(tmp_path, GOOD)
     code, out, _ = run(capsys, f"{path}:Good", "--quick", "--law", "reciprocity", "--law", "weight")
     assert code == 0 and "reciprocity and weight hold" in out
 
 
+@pytest.mark.slow
 def test_a_users_class_that_is_no_bsdf_but_has_eval(tmp_path: Path) -> None:
     path = file(tmp_path, GOOD.replace("(go.BSDF)", "").replace(', mode="radiance"', ""))
     assert verify(f"{path}:Good", quick=True, law=["reciprocity", "weight", "pdf"]).passed
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -88,7 +90,7 @@ def test_a_file_that_cannot_be_used_is_an_error_with_code_2(
     assert code == 2 and words in err
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -106,6 +108,7 @@ def test_a_wrong_answer_fails_the_law_with_its_place(
     assert code == 1 and words in " ".join(out.split())
 
 
+@pytest.mark.slow
 def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "LIMIT", 1.0)
     text = GOOD + "    def pdf(self, wo, wi):\n        return wi.z\n"
@@ -114,7 +117,7 @@ def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pyt
     assert "no end after 1 s" in found["weight"].why[0] and "no end after 1 s" in found["shader"].why[0]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -151,6 +154,7 @@ def test_one_pair_is_printed_both_ways(capsys: pytest.CaptureFixture[str]) -> No
     assert pair["float64, wo -> wi"]["f"] == pytest.approx(pair["float64, wi -> wo"]["f"], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_exit_code_tells_of_a_broken_law(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = GOOD.replace("wi.z * inv_pi", "inv_pi")
     code, out, _ = run(capsys, f"{file(tmp_path, text)}:Good", "--quick", "--json")
@@ -159,6 +163,7 @@ def test_the_exit_code_tells_of_a_broken_law(tmp_path: Path, capsys: pytest.Capt
     assert {v["law"]: v["status"] for v in report["cards"][0]["verdicts"]}["reciprocity"] == "fail"
 
 
+@pytest.mark.slow
 def test_mitsubas_plugins_and_descriptions(tmp_path: Path) -> None:
     assert verify("mitsuba:diffuse", quick=True, law=["energy", "reciprocity", "weight"]).passed
     assert verify('{"type": "diffuse"}', quick=True, law=["energy"]).passed

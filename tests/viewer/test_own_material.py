@@ -111,6 +111,7 @@ def test_its_sliders_choices_and_inner_materials_do_what_python_says(opened: tup
     assert page.problems == []
 
 
+@pytest.mark.slow
 def test_its_presets_set_values_and_choices(opened: tuple[stage.Stage, Page]) -> None:
     what, page = opened
     page.reset()
@@ -125,6 +126,7 @@ def test_its_presets_set_values_and_choices(opened: tuple[stage.Stage, Page]) ->
     assert preset.input_value() == ""
 
 
+@pytest.mark.slow
 def test_a_preset_of_what_the_balls_differ_in_sets_them_all(opened: tuple[stage.Stage, Page]) -> None:
     _, page = opened
     page.reset()

@@ -272,6 +272,7 @@ def test_a_scene_without_light_gets_the_pages_and_a_note(tmp_path: Path) -> None
     assert any("no light" in note for note in what.notes)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["shading-balls", "conductor-ggx", "textured", "white-furnace", "rough-dielectric"])
 def test_the_examples_can_be_viewed(name: str) -> None:
     data = page.page_data(lab_scene.stage(EXAMPLES / name))
@@ -331,6 +332,7 @@ def test_a_missing_bundle_is_a_clear_error(monkeypatch: pytest.MonkeyPatch, tmp_
         page._script.cache_clear()
 
 
+@pytest.mark.slow
 def test_the_export_opens_from_disk_and_asks_for_nothing(tmp_path: Path) -> None:
     path = page.export(stage.homework(), tmp_path / "page.html")
     with browser.chromium() as chromium:

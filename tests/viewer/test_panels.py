@@ -132,7 +132,7 @@ def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: 
     assert messages == []
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "said"),
     [

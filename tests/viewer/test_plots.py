@@ -30,7 +30,7 @@ QUICK |= {(name, kind) for name in ("lambert", "conductor", "dielectric", "mix",
 QUICK = QUICK - {("disney2015", "lobe")} | {("disney2015", "slice")}  # nine seconds of one shape more
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -107,6 +107,7 @@ def test_materials_are_laid_over_each_other(kind: str, tmp_path: Path) -> None:
     assert drawing._repr_png_().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
     import matplotlib
 
@@ -147,6 +148,7 @@ def test_what_cannot_be_plotted_is_one_clear_error(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("index", [{"eta": 1.5}, {"eta": 0.7}, {"eta": 2.7, "k": 3.0}, {"metal": "Au"}, {}])
 def test_fresnel_is_drawn_with_the_angles_that_have_names(index: dict[str, Any], tmp_path: Path) -> None:
     path = go.plot("fresnel", output=tmp_path / "a.svg", **index).path

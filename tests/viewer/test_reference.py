@@ -81,6 +81,7 @@ def test_a_lambert_ball_under_a_directional_light_is_the_closed_form() -> None:
     assert found[..., :3].sum() == pytest.approx(expected.sum(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_homeworks_balls_are_their_models_eval() -> None:
     """What a shader has to draw: eval at every point of every ball, averaged over the pixel."""
     what, size, fine = stage.homework(), (96, 54), 16
@@ -203,6 +204,7 @@ def test_under_a_black_environment_a_ball_is_black_and_not_gone() -> None:
     assert np.array_equal(dark[..., 3], lit[..., 3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "light",
     [pytest.param("directional", marks=pytest.mark.slow), pytest.param("area", marks=pytest.mark.slow), "environment"],

@@ -74,6 +74,7 @@ def slope(what: Stage) -> float:
 # --------------------------------------------------------------------------- the files
 
 
+@pytest.mark.slow
 def test_a_file_of_the_same_size_saved_at_once_is_loaded_anew(file: Path) -> None:
     code = shown(file).code
     for value in ("0.4", "0.5", "0.6"):
@@ -82,6 +83,7 @@ def test_a_file_of_the_same_size_saved_at_once_is_loaded_anew(file: Path) -> Non
     assert not list(file.parent.glob("__pycache__"))
 
 
+@pytest.mark.slow
 def test_what_it_imports_from_its_folder_is_followed(file: Path) -> None:
     (file.parent / "lobes").mkdir()
     (file.parent / "lobes" / "__init__.py").write_text("from . import wide\n")
@@ -102,6 +104,7 @@ def test_what_it_imports_from_its_folder_is_followed(file: Path) -> None:
     assert slope(what.code.run()) == 0.7
 
 
+@pytest.mark.slow
 def test_old_classes_go(file: Path) -> None:
     code = shown(file).code
     made = []
@@ -114,6 +117,7 @@ def test_old_classes_go(file: Path) -> None:
     assert sum(cls() is not None for cls in made) <= 1
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", list(BROKEN))
 def test_an_error_names_file_line_and_remedy(file: Path, name: str) -> None:
     before, after, where, what, hint = BROKEN[name]
@@ -216,6 +220,7 @@ def live(what: Stage) -> Iterator[tuple[server.Server, Any]]:
         thread.join(20)
 
 
+@pytest.mark.slow
 def test_saving_redraws_and_an_error_stands_over_the_last_good_picture(file: Path) -> None:
     problems: list[str] = []
 

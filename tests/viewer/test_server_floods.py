@@ -64,6 +64,7 @@ def test_connections_that_say_nothing_are_ended(monkeypatch: pytest.MonkeyPatch)
         assert get(one)[0] == 200
 
 
+@pytest.mark.slow
 def test_200_sessions_that_never_read_leave_a_good_page_served(one: server.Server) -> None:
     async def flood() -> int:
         """How many of 200 sessions with the right token are open at the end."""
@@ -123,6 +124,7 @@ def test_a_page_that_sends_and_never_reads_is_let_go(one: server.Server, monkeyp
     assert get(one)[0] == 200
 
 
+@pytest.mark.slow
 def test_a_flood_of_messages_leaves_a_good_page_served(one: server.Server) -> None:
     def flood(client: socket.socket, frames: bytes) -> None:
         with contextlib.suppress(OSError):  # until it is closed

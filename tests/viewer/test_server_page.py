@@ -113,6 +113,7 @@ def test_the_picture_is_the_path_traced_one(live: Live) -> None:
     assert live.problems == []
 
 
+@pytest.mark.slow
 def test_the_reference_follows_the_sliders(live: Live) -> None:
     live.wait("gonio.live.status.samples > 0")
     before = live.tab.evaluate("gonio.live.status.samples")

@@ -31,6 +31,7 @@ def lean(what: stage.Stage, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_long_materials_and_those_with_tables_of_their_own_are_lit(chrome: Any, tmp_path: Path) -> None:
     """Two lamps on materials that are called in no loop, and coats over bases of two widths."""
     coats = [{"base.alpha": [0.05, 0.05]}, {"base.alpha": [0.6, 0.6]}]

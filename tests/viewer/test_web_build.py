@@ -50,6 +50,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return web
 
 
+@pytest.mark.slow
 def test_committed_files_equal_a_rebuild(copy: Path) -> None:
     npm("run", "build", folder=copy)
     built = copy.parent / "src" / "gonio" / "viewer" / "static"
@@ -58,6 +59,7 @@ def test_committed_files_equal_a_rebuild(copy: Path) -> None:
         assert (built / name).read_bytes() == (STATIC / name).read_bytes(), f"{name}: run `npm run build` in web/"
 
 
+@pytest.mark.slow
 def test_types_hold(copy: Path) -> None:
     npm("run", "check", folder=copy)
 

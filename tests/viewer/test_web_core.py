@@ -20,6 +20,7 @@ from web_page import COARSE, PHONE, WIDE, Page, rows_of_balls
 # --------------------------------------------------------------------------- the file
 
 
+@pytest.mark.slow
 def test_one_file_is_all_it_needs(chrome: Any, homework_file: Path) -> None:
     assert homework_file.stat().st_size <= 1_500_000
     context = chrome.new_context(viewport=WIDE, device_scale_factor=COARSE, offline=True)
@@ -44,6 +45,7 @@ def test_no_formula_of_a_material_is_typed_in_the_page() -> None:
 # --------------------------------------------------------------------------- controls
 
 
+@pytest.mark.slow
 def test_roughness_slider_moves_the_selected_ball_in_both_rows(page: Page) -> None:
     before = page.picture(4)
     page.control("roughness").locator("input[type=number]").fill("0.2")
@@ -68,6 +70,7 @@ def test_a_click_selects_the_ball_and_its_point(page: Page) -> None:
     assert np.linalg.norm(wo) == pytest.approx(1) and wo[2] > 0.7
 
 
+@pytest.mark.slow
 def test_preset_goes_to_both_rows(page: Page) -> None:
     page.control("Preset").locator("select").select_option(label="gold")
     means = rows_of_balls(page.picture(16))
@@ -75,6 +78,7 @@ def test_preset_goes_to_both_rows(page: Page) -> None:
     assert page.state("slots[0].values['base.eta']") == page.state("slots[1].values.eta")
 
 
+@pytest.mark.slow
 def test_every_light_is_listed_and_can_be_added_and_removed(page: Page) -> None:
     lights = page.tab.locator(".lil-gui.light")
     assert lights.count() == len(page.state("lights")) == 1
@@ -100,6 +104,7 @@ def test_keys_turn_the_camera_and_reset_it(page: Page) -> None:
     assert page.state("camera") == first
 
 
+@pytest.mark.slow
 def test_keys_act_after_a_control_was_used(page: Page) -> None:
     """The furnace is one key away, also where a slider, a tick or a list was the last thing touched."""
     page.control("roughness").locator("input[type=range]").click()
@@ -123,6 +128,7 @@ def test_preset_shows_its_linear_reflectance(page: Page) -> None:
     assert shown == "F0 " + " ".join(f"{v:.2f}".lstrip("0") for v in f0)
 
 
+@pytest.mark.slow
 def test_dragging_turns_the_camera(page: Page) -> None:
     box = page.tab.locator("canvas.picture").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -133,6 +139,7 @@ def test_dragging_turns_the_camera(page: Page) -> None:
     assert page.state("camera.azimuth") < -0.1 and page.state("camera.elevation") > 0.05
 
 
+@pytest.mark.slow
 def test_solo_shows_one_row(page: Page) -> None:
     page.tab.get_by_title("Show row B alone").click()
     assert page.state("solo") == 1
@@ -152,6 +159,7 @@ def test_a_row_alone_is_the_one_that_is_edited(page: Page) -> None:
 # --------------------------------------------------------------------------- link, theme, files
 
 
+@pytest.mark.slow
 def test_the_link_holds_the_whole_state(page: Page, chrome: Any) -> None:
     page.set(
         "s.camera.azimuth = 0.5; s.slots[0].values = { 'base.albedo': [1, .5, .2] }; s.view.term = 'single';"
@@ -172,7 +180,7 @@ def test_the_link_holds_the_whole_state(page: Page, chrome: Any) -> None:
     tab.close()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "patch",
     [
@@ -308,7 +316,7 @@ def gltf(uri: str = "") -> bytes:
     ).encode()
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
@@ -332,6 +340,7 @@ def test_a_bad_file_gets_one_clear_line(page: Page, name: str, content: bytes, s
 QUAD = b"v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\n"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "content"), [("quad.obj", QUAD), ("triangle.gltf", gltf())])
 def test_dropped_mesh_takes_the_place_of_the_balls(page: Page, name: str, content: bytes) -> None:
     before = page.picture(2)[..., 3].sum()
@@ -360,6 +369,7 @@ USED = """async ([name, text]) => {
 }"""
 
 
+@pytest.mark.slow
 def test_a_dropped_gltf_dresses_the_selected_ball_by_its_numbers(page: Page) -> None:
     """The page's model is a conductor: its index without loss that reflects the base colour from above."""
     file = json.loads(gltf())
@@ -389,7 +399,7 @@ def test_a_page_without_a_fitting_model_says_so(page: Page) -> None:
     assert 'no model for its material "Chalk"' in said and page.state("view.mesh") == "file"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", ["torus", "shaderball"])
 def test_built_in_shapes_are_shaded(page: Page, mesh: str) -> None:
     page.set(f"s.view.mesh = '{mesh}'")
@@ -407,6 +417,7 @@ def test_built_in_shapes_are_shaded(page: Page, mesh: str) -> None:
 # --------------------------------------------------------------------------- other sizes
 
 
+@pytest.mark.slow
 def test_usable_on_a_phone(chrome: Any, homework_file: Path) -> None:
     context = chrome.new_context(viewport=PHONE, device_scale_factor=COARSE, has_touch=True, is_mobile=True)
     page = Page(context.new_page(), homework_file)
@@ -472,6 +483,7 @@ def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
     tab.close()
 
 
+@pytest.mark.slow
 def test_what_is_not_shown_is_told_at_once(chrome: Any, tmp_path: Path) -> None:
     what = dataclasses.replace(stage.of_models([go.Lambert()]), notes=["the texture of albedo is not shown"])
     tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)

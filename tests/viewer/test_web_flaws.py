@@ -76,6 +76,7 @@ def line(page: Page, seconds: float = 30.0) -> str:
     return str(text)
 
 
+@pytest.mark.slow
 def test_values_that_are_no_numbers_are_a_pattern_and_count_as_such(opened: Any, tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text(BROKEN)
     page = opened(stage.of_targets([f"{tmp_path / 'broken.py'}:Broken"]).materials["m0"].bsdf)

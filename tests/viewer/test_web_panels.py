@@ -78,7 +78,6 @@ def step(w: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.nextafter(w32, w32 + rng.choice(np.float32([-1, 1]), w.shape), dtype=np.float32).astype(float)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("slot", range(len(MODELS)))
 def test_evaluator_agrees_with_python(opened: Opened, slot: int) -> None:
     rng = np.random.default_rng(1)
@@ -149,6 +148,7 @@ def test_albedo_curve_is_the_albedo(opened: Opened, slot: int) -> None:
     assert np.all(np.abs(value - exact.value) < 4 * (error + exact.error) + 2e-5)
 
 
+@pytest.mark.slow
 def test_flip_is_pythons(opened: Opened) -> None:
     rng = np.random.default_rng(4)
     y, x = np.mgrid[0:40, 0:56]
@@ -173,6 +173,7 @@ def balls(width: int, height: int, light: float, soft: float = 3.0) -> np.ndarra
     return rgba.astype(np.float32)
 
 
+@pytest.mark.slow
 def test_figures_are_pythons(opened: Opened) -> None:
     test, reference = balls(80, 40, 1.1), balls(80, 40, 1.0)
     rng = np.random.default_rng(5)
@@ -453,6 +454,7 @@ def test_a_reference_of_what_was_shown_before_is_not_measured(fresh: Opened) -> 
     assert "Waiting for the reference" in body.locator(".p-note").text_content()
 
 
+@pytest.mark.slow
 def test_page_without_a_server_says_so(fresh: Opened) -> None:
     body = open_panel(fresh, "compare")
     fresh.tab.wait_for_function(

@@ -72,6 +72,7 @@ def light_parts(light: dict[str, Any], surface: np.ndarray) -> Iterator[tuple[np
 POINT = {"type": "point", "position": [3.0, 4.0, 5.0], "intensity": [120.0, 90.0, 60.0]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "light",
     [pytest.param(stage.SUN, id="directional"), pytest.param(POINT, id="point", marks=pytest.mark.slow)],
@@ -99,6 +100,7 @@ AREA = {
 }
 
 
+@pytest.mark.slow
 def test_area_light_is_summed_over_its_surface(page: Page) -> None:
     """Means over the balls, rough ones, since cells stand for the light in Python."""
     lower = dataclasses.replace(stage.homework(), rows=stage.homework().rows[1:])
@@ -122,6 +124,7 @@ def test_upper_row_is_brighter_the_more_so_the_rougher(page: Page) -> None:
     assert gain[0] < 1.05 and 1.5 < gain[4] < 3.5
 
 
+@pytest.mark.slow
 def test_white_furnace_hides_the_compensated_row(page: Page) -> None:
     """At F = 1 the upper row may differ from the radiance around it by one step of a screen; the lower is darker."""
     page.tab.keyboard.press("f")
@@ -141,6 +144,7 @@ def test_white_furnace_hides_the_compensated_row(page: Page) -> None:
     assert page.state("furnace") is False
 
 
+@pytest.mark.slow
 def test_single_and_multi_make_the_whole(page: Page) -> None:
     pictures = {}
     for term in ("full", "single", "multi", "compensated", "difference"):
@@ -154,6 +158,7 @@ def test_single_and_multi_make_the_whole(page: Page) -> None:
     assert pictures["multi"].max() > 0.1
 
 
+@pytest.mark.slow
 def test_rows_are_subtracted_in_place(page: Page) -> None:
     alone = []
     for row in (0, 1):
@@ -166,6 +171,7 @@ def test_rows_are_subtracted_in_place(page: Page) -> None:
     assert picture[..., 1].max() > 0.1
 
 
+@pytest.mark.slow
 def test_masking_toggle_takes_the_other_shader(page: Page) -> None:
     before = rows_of_balls(page.picture(16))
     page.control("masking").locator("select").select_option("schlick-direct")

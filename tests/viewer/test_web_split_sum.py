@@ -112,6 +112,7 @@ def test_the_split_sum_is_what_gonio_bakes(lit: Page) -> None:
         np.testing.assert_allclose(found, expected, rtol=0.04, atol=0.01)
 
 
+@pytest.mark.slow
 def test_under_even_light_the_split_sum_is_exact(lit: Page) -> None:
     lit.set("for (const light of s.lights) Object.assign(light, { image: null, constant: [.5, .5, .5] })")
     full = of_term(lit, "full", 32)
@@ -166,6 +167,7 @@ def test_the_early_picture_is_nearer_the_truth_at_every_number_of_samples(lit: P
     canvas(lit, 64, True)
 
 
+@pytest.mark.slow
 def test_what_is_read_of_the_picture_is_sampled_alone(lit: Page) -> None:
     lit.picture(64)  # the tables of the split sum are there afterwards
     canvas(lit, 4, True)
@@ -174,5 +176,6 @@ def test_what_is_read_of_the_picture_is_sampled_alone(lit: Page) -> None:
     np.testing.assert_array_equal(lit.picture(4), with_it)
 
 
+@pytest.mark.slow
 def test_the_page_stays_small(lit_page: Page) -> None:
     assert Path(lit_page.path).stat().st_size <= 1_500_000

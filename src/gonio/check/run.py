@@ -6,7 +6,9 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypedDict, Unpack
 
+from ..arguments import takes_fields
 from ..catalog import notation, operands, outside, shaders, texts
 from ..errors import InputError
 from ..files import check_file, write_whole
@@ -23,12 +25,12 @@ class Work:
 
     target: str | Path | BSDF
     against: str | BSDF | None = None
-    scene: Path | None = None
+    scene: str | Path | None = None
     up: str = "z"
     tolerance: float | None = None
+    function: str = ""
     allow_outside: bool = False
     allow_code: bool = False
-    function: str = ""
 
     @property
     def path(self) -> Path:
@@ -65,6 +67,17 @@ class Work:
         return notation.named(self.against)[0]
 
 
+class WorkKeywords(TypedDict, total=False):
+    """The types of `Work` as keywords, but for what is judged by what."""
+
+    scene: str | Path | None
+    up: str
+    tolerance: float | None
+    function: str
+    allow_outside: bool
+    allow_code: bool
+
+
 def _class(work: Work) -> Finding:
     given = work.target if isinstance(work.target, BSDF) else _named(work)
     name = type(given).name if isinstance(work.target, BSDF) else notation.split(work.text)[0]
@@ -86,7 +99,7 @@ def _rows(work: Work) -> Finding:
 
 def _picture(work: Work) -> Finding:
     assert work.scene is not None
-    return pictures.check(work.path, work.scene, work.allow_outside, work.allow_code)
+    return pictures.check(work.path, Path(work.scene), work.allow_outside, work.allow_code)
 
 
 def _table(work: Work) -> Finding:
@@ -107,19 +120,15 @@ JUDGES: tuple[tuple[Callable[[Work], bool], Callable[[Work], Finding]], ...] = (
 
 
 @public
+@takes_fields(Work, WorkKeywords)
 def check(
     target: str | Path | BSDF,
     against: str | BSDF | None = None,
     *,
-    scene: str | Path | None = None,
     sheet: str | None = None,
-    up: str = "z",
-    tolerance: float | None = None,
     hide_solution: bool = False,
     junit: str | Path | None = None,
-    function: str = "",
-    allow_outside: bool = False,
-    allow_code: bool = False,
+    **work: Unpack[WorkKeywords],
 ) -> Finding | Report:
     """Judge a student's own work, and name the probable mistake.
 
@@ -143,8 +152,7 @@ def check(
     """
     if junit is not None:
         check_file(junit)
-    place = None if scene is None else Path(scene)
-    result = _judge(Work(target, against, place, up, tolerance, allow_outside, allow_code, function), sheet)
+    result = _judge(Work(target, against, **work), sheet)
     if hide_solution:
         result = result.without_solution()
     if junit is not None:
@@ -158,7 +166,7 @@ def _judge(work: Work, tasks: str | None) -> Finding | Report:
             raise InputError(
                 f"'{work.target}' is a folder", "TARGET", f"name its sheet: --sheet {' or '.join(sheet.SHEETS)}"
             )
-        return sheet.check(work.path, tasks, work.scene, work.up)
+        return sheet.check(work.path, tasks, None if work.scene is None else Path(work.scene), work.up)
     if tasks:
         raise InputError(f"'{work.target}' is no folder", "--sheet", "give the folder of a submission, or of several")
     judge = next((judge for accepts, judge in JUDGES if accepts(work)), None)

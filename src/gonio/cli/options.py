@@ -76,6 +76,13 @@ class Options:
         vars(self).update(values)
 
 
+class Trust(Options):
+    """What a scene or a material's file may do."""
+
+    allow_outside: Outside = False
+    allow_code: Code = False
+
+
 class Material(Options):
     """Parameters and preset of the materials that are named on the command line."""
 

@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import files, garbage
 from .. import scene as scenes
-from ..arguments import renamed
+from ..arguments import renamed, takes_fields
 from ..bridge import engine
 from ..bridge.types import BSDFPlugin
 from ..catalog import notation
@@ -107,8 +107,30 @@ class PictureFit:
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
 
+@dataclass(frozen=True)
+class Fitting:
+    """How pictures are rendered during a fit; the fields are arguments of `fit_picture`."""
+
+    spp: int = SPP
+    seed: int | None = None
+    device: str = "cpu"
+    allow_outside: bool = False
+    allow_code: bool = False
+
+
+class FittingKeywords(TypedDict, total=False):
+    """The types of `Fitting` as keywords."""
+
+    spp: int
+    seed: int | None
+    device: str
+    allow_outside: bool
+    allow_code: bool
+
+
 @renamed(fixed="param", scene_file="scene")
 @public
+@takes_fields(Fitting, FittingKeywords)
 def fit_picture(
     picture: str | Path,
     scene: str | Path,
@@ -116,13 +138,9 @@ def fit_picture(
     *,
     model: str | BSDF | None = None,
     param: Mapping[str, object] | None = None,
-    spp: int = SPP,
     steps: int = STEPS,
-    seed: int | None = None,
-    device: str = "cpu",
-    allow_outside: bool = False,
-    allow_code: bool = False,
     progress: Callable[[int, float], None] = lambda step, loss: None,
+    **rendering: Unpack[FittingKeywords],
 ) -> PictureFit:
     """Fit parameters of a scene's materials to a picture of the scene.
 
@@ -141,7 +159,8 @@ def fit_picture(
     """
     started = time.perf_counter()
     wanted = images.read(picture).pixels
-    mi = engine.load(device)
+    how = Fitting(**rendering)
+    mi = engine.load(how.device)
     if not str(mi.variant()).endswith("ad_rgb"):
         raise InputError(
             f"variant {mi.variant()} is set", "device", "a fit to a picture needs llvm_ad_rgb or cuda_ad_rgb"
@@ -150,14 +169,17 @@ def fit_picture(
     if model is not None:
         overrides[place_of(free[0], "free")[0]] = moving_of(model)[0]
     description = scenes.read(
-        scene, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides, names_output=False
+        scene,
+        allow_outside=how.allow_outside,
+        allow_code=how.allow_code,
+        overrides=overrides,
+        names_output=False,
     )
     _check_picture(wanted, description, str(picture))
     with garbage.paused():
         built = scenes.built(description, mi)
-        problem = Problem(
-            mi, built, _targets(description, built, free), _depth(description), wanted, spp, 1 if seed is None else seed
-        )
+        targets, seed = _targets(description, built, free), 1 if how.seed is None else how.seed
+        problem = Problem(mi, built, targets, _depth(description), wanted, how.spp, seed)
         start = problem.start()
         losses = [problem.loss(start)]
         progress(0, losses[0])

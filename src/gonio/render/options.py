@@ -7,14 +7,10 @@ reads it.
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, ParamSpec, TypedDict, TypeVar
+from typing import Annotated, Literal, NamedTuple, TypedDict
 
-P = ParamSpec("P")
-R = TypeVar("R")
+from ..arguments import takes_fields
 
 
 class Shown(NamedTuple):
@@ -61,16 +57,4 @@ class RenderKeywords(TypedDict, total=False):
     allow_code: bool
 
 
-def takes_render_options(call: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function with `**options`: expand its signature to the options and their defaults, for `help`,
-    notebooks and `checked`."""
-    signature = inspect.signature(call)
-    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-    types = {name: getattr(one, "__forward_arg__", one) for name, one in RenderKeywords.__annotations__.items()}
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    shared = [
-        inspect.Parameter(field.name, keyword, default=field.default, annotation=types[field.name])
-        for field in dataclasses.fields(RenderOptions)
-    ]
-    call.__signature__ = signature.replace(parameters=[*own, *shared])  # type: ignore[attr-defined]
-    return call
+takes_render_options = takes_fields(RenderOptions, RenderKeywords)

@@ -180,9 +180,14 @@ def _settings(scene: Settings, request: Request) -> Settings:
         Integrator.family.get(request.integrator, "--integrator")
     if request.sampler is not None:
         check_sampler(request.sampler, "--sampler")
+    integrator = request.integrator or scene.integrator
+    if request.max_depth is not None and not (family := Integrator.family).get(integrator).takes_depth:
+        deep = ", ".join(name for name, member in family.all().items() if member.takes_depth)
+        what = f"integrator '{integrator}' has no maximum depth"
+        raise InputError(what, "--max-depth", f"leave it out, or choose one of {deep}")
     return replace(
         scene,
-        integrator=request.integrator or scene.integrator,
+        integrator=integrator,
         max_depth=request.max_depth or scene.max_depth,
         sampler=request.sampler or scene.sampler,
         seed=scene.seed if request.seed is None else request.seed,

@@ -23,6 +23,7 @@ from ..arguments import renamed
 from ..catalog import library, notation, operands, outside, texts
 from ..catalog.material import MaterialLike, material
 from ..catalog.operands import Kind
+from ..energy.albedo.monte_carlo import Sampling
 from ..energy.tables import bake as baking
 from ..energy.tables import ltc, ltc_anisotropic, prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
@@ -98,13 +99,25 @@ def bake(
         _check_default({**axes, **sampling, **picture}, "an environment takes --ndf, --levels and --masking")
         return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
     _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
+    return _of_material(_target(target), folder, lut, {"masking": masking, **axes, **sampling}, picture)
+
+
+def _of_material(
+    target: str | BSDF,
+    folder: Path | None,
+    lut: Sequence[str] | None,
+    options: Mapping[str, Any],
+    picture: Mapping[str, Any],
+) -> Baked:
+    """The tables of a distribution or a material, written if a folder is given."""
+    resolution = options["resolution"]
     if lut and "ltc" in lut:
-        _check_ltc(lut, {**axes, "resolution": None, **sampling, **picture})
-        return _cosines(_target(target), folder, resolution, masking)
-    options = {"masking": masking, **axes, "resolution": 128 if resolution is None else resolution, **sampling}
-    if layout == "homework":
-        return _homework(_target(target), folder, lut, options, picture)
-    return _written(_baked(_target(target), lut, options), folder)
+        _check_ltc(lut, {**options, **picture, "resolution": None, "masking": None})
+        return _cosines(target, folder, resolution, options["masking"])
+    options = {**options, "resolution": 128 if resolution is None else resolution}
+    if options["layout"] == "homework":
+        return _homework(target, folder, lut, options, picture)
+    return _written(_baked(target, lut, options), folder)
 
 
 def _written(baked: Baked, folder: Path | None) -> Baked:
@@ -115,9 +128,10 @@ def _written(baked: Baked, folder: Path | None) -> Baked:
 
 def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, Any]) -> Baked:
     """The tables, by the options of `bake`."""
-    names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy.tables.bake`
-    given = {names.get(name, name): value for name, value in options.items()}
-    return baking.cached(target, lut=tuple(lut) if lut else None, **{**given, "seed": given["seed"] or 0})
+    names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy`
+    given = {names.get(name, name): value for name, value in options.items()} | {"seed": options["seed"] or 0}
+    sampling = Sampling(**{name: given.pop(name) for name in Sampling._fields})
+    return baking.cached(target, lut=tuple(lut) if lut else None, sampling=sampling, **given)
 
 
 LANGUAGES = ("glsl", "wgsl", "hlsl")  # of the code that comes with linearly transformed cosines

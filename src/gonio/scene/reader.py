@@ -185,6 +185,13 @@ def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 
+# what other programs' types are called here, where the name that is most alike says too little
+ELSEWHERE = {
+    "pointLight": "write 'spotLight', which shines equally in all directions",
+    "point": "write 'spotLight', which shines equally in all directions",
+}
+
+
 def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     """Pointer, problem and hint for one of pydantic's errors."""
     kind, context = detail["type"], detail.get("ctx", {})
@@ -207,7 +214,8 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     elif kind == "union_tag_invalid":
         tag = str(context["tag"])
         known = [name for item in context["expected_tags"].split(",") if (name := item.strip(" '")) != OWN]
-        what, hint, more = f"unknown type '{tag}'", did_you_mean(tag, known), ("type",)
+        hint = ELSEWHERE[tag] if tag in ELSEWHERE else did_you_mean(tag, known)
+        what, more = f"unknown type '{tag}'", ("type",)
     elif kind == "union_tag_not_found":
         what, hint = "key 'type' is missing", 'add "type": it says what this object is'
     elif kind == "literal_error":

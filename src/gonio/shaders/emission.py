@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
+from ..arguments import takes_fields
 from ..catalog.material import MaterialLike, material
 from ..errors import InputError
 from ..owner import public
 from . import curves, tiers
 from .bundle import Bundle, bundle
-from .placement import Placement
+from .placement import Placement, PlacementKeywords
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Choice:
 
 
 @public
+@takes_fields(Placement, PlacementKeywords)
 def emit(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
@@ -48,12 +51,10 @@ def emit(
     *,
     lean: bool = False,
     constants: bool = False,
-    prefix: str = "",
-    group: int = 0,
-    first_binding: int = 0,
     fit: str = "",
     ibl: bool = False,
     budget: int = 0,
+    **placement: Unpack[PlacementKeywords],
 ) -> str:
     """A material as shader code: eval, pdf, sample and the functions that they need.
 
@@ -78,7 +79,7 @@ def emit(
     `budget` exclude each other.
     """
     given = Choice(functions, lean, constants, fit, ibl, budget)
-    return shader(model, lang, given, Placement(prefix, group, first_binding))[0].text
+    return shader(model, lang, given, Placement(**placement))[0].text
 
 
 def shader(

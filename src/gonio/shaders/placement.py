@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TypedDict
 
 from ..errors import InputError
 from .languages import Language
 
 LOCATION = "emit"
+
+
+class PlacementKeywords(TypedDict, total=False):
+    """The types of `Placement` as keywords."""
+
+    prefix: str
+    group: int
+    first_binding: int
 
 
 @dataclass(frozen=True)

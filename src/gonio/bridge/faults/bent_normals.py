@@ -1,7 +1,7 @@
 """Mitsuba 3.9: `normalmap` and `bumpmap` shade with a frame of their own that no method of a BSDF returns.
 
-    bumpy = mi.load_dict({"type": "bumpmap", ...})
-    si.bsdf(ray), si.sh_frame                              # the plugin, and the frame of the surface, not of the plugin
+    bumpy = mi.load_dict({"type": "bumpmap", "texture": {"type": "checkerboard"}, "bsdf": {"type": "diffuse"}})
+    [name for name in dir(bumpy) if "frame" in name or "normal" in name]       # []
 
 Veach's correction of particles at shading normals (Veach1997, sec. 5.3) needs the cosines in the shading frame.
 

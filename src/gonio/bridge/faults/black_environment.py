@@ -1,7 +1,9 @@
 """Mitsuba 3.9: a completely black environment map has the sampling density 0 / 0.
 
     envmap = mi.load_dict({"type": "envmap", "bitmap": mi.Bitmap(np.zeros((4, 8, 3), np.float32))})
-    envmap.pdf_direction(it, ds)                    # nan
+    point, ds = dr.zeros(mi.SurfaceInteraction3f), dr.zeros(mi.DirectionSample3f)
+    ds.d = mi.Vector3f(0, 0, 1)
+    envmap.pdf_direction(point, ds)                        # nan
 
 Workaround: exclude black environments from the lights that are sampled.
 """

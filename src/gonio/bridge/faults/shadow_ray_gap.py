@@ -1,6 +1,7 @@
 """Mitsuba 3.9: rays of `spawn_ray_to` end a thousandth of the distance before the point.
 
-    si.spawn_ray_to(si.p + mi.Vector3f(0, 0, 1)).maxt      # 0.999: 1 - ShadowEpsilon
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.spawn_ray_to(mi.Point3f(0, 0, 1)).maxt              # 0.999: 1 - ShadowEpsilon
 
 An occluder in that gap before a lamp does not cast a shadow.
 

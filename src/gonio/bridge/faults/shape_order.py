@@ -1,6 +1,8 @@
 """Mitsuba 3.9: a scene with merged meshes returns its shapes and lights in a random order.
 
-    [shape.id() for shape in mi.load_dict({"type": "merge", ...})]       # another order in another process
+    kinds = [mi.load_dict({"type": "diffuse"}) for _ in range(3)]
+    walls = {f"s{k}": {"type": "rectangle", "bsdf": kinds[k // 3]} for k in range(9)}
+    [kinds.index(mesh.bsdf()) for mesh in mi.load_dict({"type": "merge", **walls})]     # [2, 1, 0], by address
 
 Meshes of equal material are merged in the order of the material's address. The order of the shapes determines that of
 the lights, the kernels, and the last bits of every picture.

@@ -1,6 +1,7 @@
 """Mitsuba 3.9: the thin lens camera has a negative importance for points behind it.
 
-    lens = mi.load_dict({"type": "thinlens", "aperture_radius": 0.1, "focus_distance": 4})
+    lens = mi.load_dict({"type": "thinlens", "aperture_radius": 0.1, "focus_distance": 4.0})
+    si = dr.zeros(mi.SurfaceInteraction3f)
     si.p = mi.Point3f(0, 0, -1)                            # behind the camera, which looks along +z
     lens.sample_direction(si, mi.Point2f(0.5))[1]          # below 0, 0 expected
 

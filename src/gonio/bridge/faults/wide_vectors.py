@@ -1,9 +1,11 @@
 """Dr.Jit 1.5: on processors with AVX-512 all kernels work on 16 lanes, which for 64-bit values are two registers each.
 
-    dr.eval(dr.grad(model.eval(wo, wi)))     # OpenPBR, 64 bits, 76,000 operations: 122 s to compile, 19 s for 8 lanes
+    x = dr.arange(mi.Float64, 16)
+    dr.eval(x * x)                                         # a register has 8
 
-LLVM then needs several times as long to assign registers, and the kernel runs no faster. No public function of Python
-sets the number; libdrjit-core exports one.
+The derivatives of OpenPBR in 64 bits, 76,000 operations, take 122 s to compile, and 19 s for 8 lanes: LLVM needs
+several times as long to assign registers, and the kernel runs no faster. No public function of Python sets the number;
+libdrjit-core exports one.
 
 Workaround: `narrow` compiles with 8 lanes inside a `with` block, for large kernels of 64-bit values that run once.
 """

@@ -10,7 +10,7 @@ from typer import Argument, Exit, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Code, Json, Material, Options, Outside
+from ..options import Json, Material, Options, Trust
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
@@ -65,8 +65,7 @@ def check(
             help="Write right values there: of f at 200 pairs for WORK, a material, or all of the courses.",
         ),
     ] = None,
-    allow_outside: Outside = False,
-    allow_code: Code = False,
+    trust: Trust,
     as_json: Json = False,
 ) -> None:
     """Judge a student's own work: right or wrong, how far off, and the probable mistake.
@@ -94,7 +93,7 @@ def check(
         _write_reference(reference, target, made, as_json)
         return
     work, right = _with_parameters(target, model, against, made)
-    result = judge(work, right, allow_outside=allow_outside, allow_code=allow_code, **vars(how))
+    result = judge(work, right, **vars(how), **vars(trust))
     _print(result, as_json)
     if result.exit_code:
         raise Exit(result.exit_code)

@@ -47,27 +47,31 @@ class Content(Options):
     ] = 0
 
 
+Models = Annotated[
+    list[str],
+    Argument(
+        metavar="MODEL",
+        help="A material; several share one module and the options.",
+        autocompletion=completion.materials,
+    ),
+]
+Language = Annotated[
+    str,
+    Option(
+        "--lang",
+        "--language",
+        metavar="NAME",
+        help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl; numpy, torch, jax: a Python file.",
+        autocompletion=completion.languages,
+    ),
+]
+
+
 @verb(MATERIALS, place=3)
 def emit(
-    model: Annotated[
-        list[str],
-        Argument(
-            metavar="MODEL",
-            help="A material; several share one module and the options.",
-            autocompletion=completion.materials,
-        ),
-    ],
+    model: Models,
     *,
-    lang: Annotated[
-        str,
-        Option(
-            "--lang",
-            "--language",
-            metavar="NAME",
-            help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl; numpy, torch, jax: a Python file.",
-            autocompletion=completion.languages,
-        ),
-    ] = "glsl",
+    lang: Language = "glsl",
     content: Content,
     made: Material,
     output: Annotated[

@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Code, Device, Json, Material, Options, Outside
+from ..options import Device, Json, Material, Options, Trust
 from ..output import print_warnings
 from .base import PICTURES, verb
 
@@ -48,8 +48,7 @@ def view(
         bool, Option("--homework", help="The two rows of homework 4 by the terms of its text, under one light.")
     ] = False,
     device: Device = "cpu",
-    allow_outside: Outside = False,
-    allow_code: Code = False,
+    trust: Trust,
     as_json: Json = False,
 ) -> None:
     """Show materials live on shading balls, in a browser, next to a path-traced reference.
@@ -67,7 +66,7 @@ def view(
       gonio view examples/shading-balls
       gonio view -o page.html
     """
-    stage = _homework(target, made) if homework else _stage(target or (), made, allow_outside, allow_code)
+    stage = _homework(target, made) if homework else _stage(target or (), made, trust)
     print_warnings(stage.notes)
     if output is not None:
         from ...viewer import page
@@ -91,7 +90,7 @@ def _homework(target: Sequence[str] | None, made: Material) -> Stage:
     return stage.homework_text()
 
 
-def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_code: bool) -> Stage:
+def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
     """The balls of a scene, of materials, or of the homework if nothing is named."""
     from ...catalog import operands
     from ...viewer import stage
@@ -104,7 +103,7 @@ def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_cod
 
         if settings:
             raise InputError("a scene takes no parameters here", "--param", "change the scene, or name a model")
-        return lab_scene.stage(Path(target[0]), allow_outside, allow_code)
+        return lab_scene.stage(Path(target[0]), trust.allow_outside, trust.allow_code)
     if target:
         return stage.of_targets(target, settings)
     if settings:

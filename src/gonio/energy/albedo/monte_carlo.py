@@ -48,25 +48,31 @@ def methods(ndf: str) -> tuple[str, ...]:
     return ("cosine", ndf, "visible")
 
 
-def estimate(
-    ndf: str,
-    masking_name: str,
-    at: Points,
-    method: str,
-    spp: int = 1024,
-    points: str = "hammersley",
-    seed: int = 0,
-    precision: Precision = "float32",
-    floor: float = 0.0,
-) -> Estimate:
-    """E at each point from `spp` samples.
+class Sampling(NamedTuple):
+    """How E is estimated from random samples.
 
+    method  "cosine", the distribution's name or "visible"; of a table also "quadrature", without samples
+    spp     samples per point, 1 or more
     points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each;
             "stratified": new ones for each, one in each cell of a square grid; `spp` must be a square
+    seed    of the points, where they are random
     floor   lower bound of the denominator of D by method "cosine", as the homework's program has it: D is then at most
             alpha_x alpha_y / floor; 0 is none
+    """
+
+    method: str
+    spp: int = 1024
+    points: str = "hammersley"
+    seed: int = 0
+    floor: float = 0.0
+
+
+def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precision: Precision = "float32") -> Estimate:
+    """E at each point from random samples.
+
     Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
     """
+    method, spp, points, seed, floor = sampling
     known_masking(masking_name)
     _check(ndf, method, points, spp)
     dr = backend.drjit()

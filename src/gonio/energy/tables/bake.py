@@ -26,6 +26,7 @@ from ...work import parts
 from .. import cache
 from ..albedo import albedo, monte_carlo, quadrature
 from ..albedo.directional import check_uniform
+from ..albedo.monte_carlo import Sampling
 from ..cache import content_hash
 from . import baked
 from .axes import LAYOUTS, Axes
@@ -45,39 +46,35 @@ LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
 MAX_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) for eta = 5
 SCHEMA = 2
+QUADRATURE = Sampling("quadrature")
 
 
 def bake(
     target: str | BSDF,
     lut: tuple[str, ...] | list[str] | None = None,
     size: int = 128,
-    method: str = "quadrature",
     masking: str | None = None,
-    spp: int = 1024,
-    points: str = "hammersley",
-    seed: int = 0,
     layout: str = "linear",
     aspect: float | None = None,
     azimuths: int = AZIMUTHS,
-    floor: float = 0.0,
+    sampling: Sampling = QUADRATURE,
 ) -> Baked:
     """Tables of a distribution by name (F = 1), or of a material.
 
     target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis; a Dielectric from outside.
              For any other material E[mu] and E_avg with its own parameters
     lut      the tables; None is E and Eavg, and dfg of a distribution
-    method   "quadrature", "cosine", the distribution's name or "visible"; E_avg of a sampled table is integrated from
-             its rows
     masking  for a distribution, by default smith-correlated; a material has its own
     aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1 it adds the axis phi, a
              quarter turn from x. A material has its own, the ratio of its two widths; its rotation is ignored
-    floor    lower bound of the denominator of D by method "cosine", as in the homework's program
+    sampling by quadrature, or from samples; E_avg of a sampled table is integrated from its rows
     Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and tables that the target does not have.
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
-    _check(lut, size, spp, points, layout)
-    _check_options(method, floor, {"masking": masking, "aspect": aspect} if material else {})
+    method = sampling.method
+    _check(lut, size, layout, sampling)
+    _check_options(sampling, {"masking": masking, "aspect": aspect} if material else {})
     if isinstance(target, BSDF) and target.microsurface is None:
         return _any_material(target, lut, size, method, layout)
     asked, axes = _resolved(target, masking, layout, size, aspect, azimuths)
@@ -86,7 +83,7 @@ def bake(
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
     if {"E", "dfg"} & set(lut) or ("Eavg" in lut and method != "quadrature"):
-        tables, figures = _directional(asked, axes, method, spp, points, seed, floor)
+        tables, figures = _directional(asked, axes, sampling)
         arrays.update({k: v for k, v in tables.items() if k in lut})
         errors.update({k: v for k, v in figures.items() if k in lut})
         if "E" in arrays and size > 1:
@@ -103,28 +100,27 @@ def bake(
         arrays.update(glass)
         errors.update(figures)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
-    options = {"spp": spp, "points": points, "seed": seed, **({"floor": floor} if floor else {})}
-    sampling = {} if method == "quadrature" else options
-    manifest = {"target": describe(target), **_described(asked, axes, method, sampling), "axes": text}
+    manifest = {"target": describe(target), **_described(asked, axes, sampling), "axes": text}
     return _sealed(arrays, nodes, dims, errors, manifest)
 
 
-def _check_options(method: str, floor: float, of_material: Mapping[str, object]) -> None:
+def _check_options(sampling: Sampling, of_material: Mapping[str, object]) -> None:
     for name, given in of_material.items():
         if given is not None:
             raise InputError(f"{name} given for a material", f"--{name}", "the parameters of the material define it")
+    floor, method = sampling.floor, sampling.method
     if floor < 0.0 or (floor > 0.0 and method != "cosine"):
         hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
         raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
 
 
-def _described(asked: Target, axes: Axes, method: str, sampling: dict[str, object]) -> dict[str, object]:
+def _described(asked: Target, axes: Axes, sampling: Sampling) -> dict[str, object]:
     """The manifest's account of the target, the method and the axes."""
+    options = {name: value for name, value in sampling._asdict().items() if name != "floor" or value}
     return {
         "ndf": asked.ndf,
         "masking": asked.masking,
-        "method": method,
-        **sampling,
+        **({"method": sampling.method} if sampling.method == "quadrature" else options),
         "size": axes.size,
         "layout": axes.layout,
         "alpha": "roughness^2" + (", the larger of both" if axes.azimuths else ""),
@@ -179,7 +175,7 @@ def _sealed(
     return Baked(everything, {"schema": SCHEMA, **manifest, **more})
 
 
-def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, layout: str) -> None:
+def _check(lut: tuple[str, ...] | list[str], size: int, layout: str, sampling: Sampling) -> None:
     """Raise InputError for options that no target supports."""
     for name in lut:
         if name not in LUTS:
@@ -188,9 +184,9 @@ def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, l
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
     if not 1 <= size <= MAX_SIZE:
         raise InputError(f"a table of {size} x {size} asked for", "--resolution", f"give 1 to {MAX_SIZE}")
-    if spp < 1:
-        raise InputError(f"{spp} samples asked for", "--samples", "give 1 or more")
-    if points not in monte_carlo.POINTS:
+    if sampling.spp < 1:
+        raise InputError(f"{sampling.spp} samples asked for", "--samples", "give 1 or more")
+    if (points := sampling.points) not in monte_carlo.POINTS:
         raise InputError(f"unknown points '{points}'", "--sampler", did_you_mean(points, list(monte_carlo.POINTS)))
 
 
@@ -241,10 +237,10 @@ def _figures(difference: np.ndarray) -> dict[str, float]:
 
 
 def _directional(
-    asked: Target, axes: Axes, method: str, spp: int, points: str, seed: int, floor: float
+    asked: Target, axes: Axes, sampling: Sampling
 ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
     exact = asked.exact(axes.nodes())
-    if method == "quadrature":
+    if sampling.method == "quadrature":
         # compared at the most difficult columns, next to grazing and next to the normal, and at every fourth
         n = axes.size
         some = np.unique(np.concatenate([np.arange(min(4, n)), np.arange(0, n, 4), [n - 1]]))
@@ -253,7 +249,7 @@ def _directional(
         judge = asked.exact(axes.at(*here), fine=True)
         return exact, {name: _figures(exact[name][here] - judge[name]) for name in exact}
     at = axes.nodes()
-    estimate = monte_carlo.estimate(axes.ndf, axes.masking, at, method, spp, points, seed, floor=floor).value
+    estimate = monte_carlo.estimate(axes.ndf, axes.masking, at, sampling).value
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 

@@ -137,17 +137,18 @@ def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[
     muted = _values(_in_blocks(subject, [*changed, blocks[-1]]), blocks, wo, wi)
     cases: list[_Case] = []
     for n, limit in enumerate(limits):
-        one = box.per_ray_of(subject, blocks[n])
-        cases += _against_model(limit, one, values[n], wo, wi)
+        one = _Side(box.per_ray_of(subject, blocks[n]), values[n])
+        cases += _against_model(limit, one, wo, wi)
         # every fourth pair has the given values of the other parameters
         given = np.arange(count) % 4 == 0
-        plain = np.where(given[:, None], subject.replace(**limit.values).eval(wo, wi), values[n])
+        limited = subject.replace(**limit.values)
+        plain = np.where(given[:, None], limited.eval(wo, wi), values[n])
         text = "as a number it has other values than in an array"
-        cases.append(_case(limit, text, one, subject.replace(**limit.values), values[n], plain, wo, wi, True))
+        cases.append(_case(limit, text, one, _Side(limited, plain), wo, wi, number=True))
         names = [path for path in changed[n] if changed[n][path] is not blocks[n][path]]
         if names:
-            other = box.per_ray_of(subject, changed[n])
-            case = _case(limit, f"{', '.join(names)} changes values", one, other, values[n], muted[n], wo, wi)
+            other = _Side(box.per_ray_of(subject, changed[n]), muted[n])
+            case = _case(limit, f"{', '.join(names)} changes values", one, other, wo, wi)
             cases += _named(case, subject, blocks, n, changed[n], names, wo, wi)
     return cases
 
@@ -171,8 +172,8 @@ def _named(
         moved = {**blocks[number], name: changed[name]}
         all_ = [moved if n == number else block for n, block in enumerate(blocks)]
         other = _values(_in_blocks(subject, all_), blocks, wo, wi)[number]
-        part = box.per_ray_of(subject, moved)
-        cases.append(_case(case.limit, f"{name} changes values", case.one, part, values, other, wo, wi))
+        part = _Side(box.per_ray_of(subject, moved), other)
+        cases.append(_case(case.limit, f"{name} changes values", _Side(case.one, values), part, wo, wi))
     failed = [one for one in cases if one.size > TOLERANCE]
     return failed or [case]
 
@@ -187,47 +188,49 @@ def _at_one(
 ) -> list[_Case]:
     """The comparisons at a limit of a material whose parameters must not vary from ray to ray."""
     limited = subject.replace(**limit.values)
-    values = limited.eval(wo, wi)
-    cases = _against_model(limit, limited, values, wo, wi)
+    one = _Side(limited, limited.eval(wo, wi))
+    cases = _against_model(limit, one, wo, wi)
     for path, axis in axes.items():
         if path not in limit.values and any(fnmatchcase(path, pattern) for pattern in limit.mutes):
             value = _draw(axis, rng, 1)[0]
             other = limited.replace(**{path: tuple(value.tolist()) if np.ndim(value) else float(value)})
-            cases.append(_case(limit, f"{path} changes values", limited, other, values, other.eval(wo, wi), wo, wi))
+            side = _Side(other, other.eval(wo, wi))
+            cases.append(_case(limit, f"{path} changes values", one, side, wo, wi))
     return cases
 
 
-def _against_model(limit: Limit, one: Subject, values: np.ndarray, wo: np.ndarray, wi: np.ndarray) -> list[_Case]:
+def _against_model(limit: Limit, one: _Side, wo: np.ndarray, wi: np.ndarray) -> list[_Case]:
     """The comparison with the model without what is switched off."""
     if limit.equals is None:
         return []
-    other = of(limit.equals(one.model))
-    return [_case(limit, "it differs from the model without it", one, other, values, other.eval(wo, wi), wo, wi)]
+    other = of(limit.equals(one.subject.model))
+    side = _Side(other, other.eval(wo, wi))
+    return [_case(limit, "it differs from the model without it", one, side, wo, wi)]
+
+
+class _Side(NamedTuple):
+    """One side of a comparison: a subject, and its values of eval, (N, channels)."""
+
+    subject: Subject
+    values: np.ndarray
 
 
 def _case(
-    limit: Limit,
-    text: str,
-    one: Subject,
-    other: Subject,
-    a: np.ndarray,
-    b: np.ndarray,
-    wo: np.ndarray,
-    wi: np.ndarray,
-    number: bool = False,
+    limit: Limit, text: str, one: _Side, other: _Side, wo: np.ndarray, wi: np.ndarray, number: bool = False
 ) -> _Case:
-    """The comparison of values a and b of two subjects; narrow lobes magnify the rounding of the directions."""
+    """The comparison of two sides; narrow lobes magnify the rounding of the directions."""
+    a, b = one.values, other.values
     floor = np.percentile(np.abs(b).max(1), 90.0)
     error = relative(a, b, 0.0, floor)
     over = np.flatnonzero(error.max(1) > TOLERANCE)
     if 0 < len(over) < len(error):
 
         def repeated(o: np.ndarray, i: np.ndarray) -> np.ndarray:
-            return _part(one, np.tile(over, len(o) // len(over)), len(error)).eval(o, i)
+            return _part(one.subject, np.tile(over, len(o) // len(over)), len(error)).eval(o, i)
 
         noise = rounding(repeated, wo[over], wi[over])
         error[over] = relative(a[over], b[over], noise * (DOUBLE / SINGLE), floor)
-    return _Case(limit, text, one, other, number, error)
+    return _Case(limit, text, one.subject, other.subject, number, error)
 
 
 # --------------------------------------------------------------------------- values of parameters
