@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t
 
 from ..arguments import renamed
 from ..catalog import notation
@@ -37,6 +36,7 @@ SOLVED = 8  # starting points that are refined with the metric itself on few val
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs from which two solutions count as distinct
 NORMAL_95 = 1.96
+MANY = 1e6  # degrees of freedom from which the distribution is normal
 COLUMNS = ("value", "error", "low", "high")  # of a fit as a table
 TIED = 0.98  # correlation from which two parameters are reported
 
@@ -80,8 +80,10 @@ class Fit:
     @property
     def half_widths(self) -> Floats:
         """Half widths of the 95 % intervals, (K,): by Student's t distribution where few runs determine a number."""
-        degrees = np.full(len(self.errors), np.inf) if self.degrees is None else self.degrees
-        return np.asarray(t.ppf(0.975, degrees) * self.errors)
+        from scipy import special  # imported late: not every run fits
+
+        degrees = MANY if self.degrees is None else np.minimum(self.degrees, MANY)
+        return np.asarray(special.stdtrit(degrees, 0.975) * self.errors)
 
     @property
     def interval(self) -> Floats:

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, t
+from scipy import special
 
 from ...errors import InputError
 from .calibration import Floats
@@ -84,14 +84,14 @@ def estimated(ratios: Sequence[Ratio], seconds: Sequence[float], stated: float) 
     if stated <= 0.0:
         degrees = int(np.linalg.matrix_rank(differences)) if len(ratios) else 0
         told = float(gradient @ errors)  # chi-square of all errors being 0
-        if not degrees or chi2.sf(told, degrees) > SIGNIFICANT:
+        if not degrees or special.chdtrc(degrees, told) > SIGNIFICANT:
             return Shutter(dict.fromkeys(settings, 0.0), np.zeros((count, count)))
         # noise of the ratios adds to the scatter of the settings
         noise = float(np.trace(np.linalg.pinv(information, rcond=1e-12, hermitian=True)))
         spread = float(np.sqrt(max(errors @ errors - noise, 0.0) / degrees))
         if spread <= 0.0:
             return Shutter(dict.fromkeys(settings, 0.0), np.zeros((count, count)))
-        inflation = float(t.ppf(0.975, degrees)) / NORMAL_95
+        inflation = float(special.stdtrit(degrees, 0.975)) / NORMAL_95
     covariance = np.linalg.inv(information + np.eye(count) / spread**2)
     return Shutter(
         dict(zip(settings, map(float, covariance @ gradient), strict=True)), np.asarray(covariance * inflation**2)
