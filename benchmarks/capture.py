@@ -1,11 +1,13 @@
 """A material from photographs of a ball: accuracy, how often intervals hold the truth, faults, and plans.
 
-    python benchmarks/capture.py [--only accuracy,coverage,series,faults,plan] [--trials 50]
+    python benchmarks/capture.py [--only accuracy,coverage,faults,plan] [--trials 50]
+    python benchmarks/capture.py --only series [--cameras usual] [--seed-range 1:101] [--jobs 16] [-o capture.json]
 
 accuracy  8 lights, 256 x 256, 1 % noise: how far albedo and alpha are off after the fit, of several materials; seconds
 coverage  the same with a calibration that is off as it says (lamps by 1 degree, ball by 1 % and a pixel, intensities by
           1 % each and .5 % together): how often the 95 % intervals hold the truth
-series    the same from series of three 16-bit exposures of four cameras, whose shutters are off by .5 % each
+series    the same from series of three 16-bit exposures of four cameras, whose shutters are off by .5 % each, as the
+          calibration says; the file holds what that of `intervals.py` holds
 faults    one fault at a time, and 8-bit photographs
 plan      4 planned photographs against 8 random ones, in pairs: root mean square error of the parameters, and what the
           fits state of it. True errors of a pair are all but one random number, so that it takes some 80 pairs
@@ -29,6 +31,8 @@ from gonio.instruments.capture.series import Noise
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 
+from intervals import Outcome, add_options, report, run, seeds_of
+
 MIDDLE, RADIUS, AWAY = np.array([0.0, 0.0, 500.0]), 50.0, 400.0
 ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # between lamp and camera, of the eight
 PAINT = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick"))
@@ -40,6 +44,7 @@ CAMERAS = {  # read noise, photons of full scale, relative noise
 }
 TIMES = (0.02, 0.08, 0.32)  # seconds of a series
 STATED = {"light": 1.0, "radius": 0.01, "center": 1.0, "intensity": 0.01, "scale": 0.005}
+SHUTTER = 0.005  # relative error of an exposure time
 
 
 def rig(lamps: np.ndarray, bits: int | None = None) -> dict[str, Any]:
@@ -123,7 +128,7 @@ def measured(
             read, photons, relative = CAMERAS[camera]
             noise = Noise(np.full(3, read**2), np.full(3, 1.0 / photons), np.full(3, relative**2))
             bits, told = 16, in_series(told, np.array(TIMES))
-            true = in_series(true, TIMES * np.exp(0.005 * rng.normal(size=len(TIMES))))
+            true = in_series(true, TIMES * np.exp(SHUTTER * rng.normal(size=len(TIMES))))
         at = rehearsal.take(true, material, Path(folder) / "p", noise=noise, bits=bits, seed=seed, stated=told)
         start = time.perf_counter()
         found = capture(at, model)
@@ -144,15 +149,24 @@ def trials(
     stated: dict[str, float],
     count: int,
     bits: int | None = None,
-    camera: str = "",
 ) -> None:
     errors, inside, took = [], [], []
     for seed in range(1, count + 1):
-        found, known, seconds = measured(material, model, eight(), stated, seed, bits, camera)
+        found, known, seconds = measured(material, model, eight(), stated, seed, bits)
         errors.append(np.abs(found.fit.values - known) / known)
         inside.append((found.fit.interval[:, 0] <= known) & (known <= found.fit.interval[:, 1]))
         took.append(seconds)
     show(title, found.fit.names, np.array(errors), np.array(inside), max(took))
+
+
+def from_series(job: tuple[str, int]) -> list[Outcome]:
+    """One capture from series with every fault at once."""
+    camera, seed = job
+    found, known, _ = measured(PAINT, "lambert+ggx", eight(), {**STATED, "seconds": SHUTTER}, seed, camera=camera)
+    fit = found.fit
+    held = (fit.interval[:, 0] <= known) & (known <= fit.interval[:, 1])
+    rows = zip(fit.names, (fit.values - known) / fit.errors, held, np.abs(fit.values / known - 1.0), strict=True)
+    return [Outcome(camera, name, seed, float(z), bool(h), float(off)) for name, z, h, off in rows]
 
 
 def accuracy() -> None:
@@ -211,21 +225,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="accuracy,coverage,series,faults,plan")
     parser.add_argument("--trials", type=int, default=50)
+    parser.add_argument("--cameras", default="", help="cameras of the series, by name")
+    add_options(parser, "1:13")
     options = parser.parse_args()
     if "accuracy" in options.only:
         accuracy()
     if "coverage" in options.only:
         trials("paint, every fault at once", PAINT, "lambert+ggx", STATED, options.trials)
     if "series" in options.only:
-        for camera in CAMERAS:
-            trials(
-                f"series, every fault at once, {camera}",
-                PAINT,
-                "lambert+ggx",
-                STATED,
-                options.trials // 4,
-                camera=camera,
-            )
+        cameras = [name for name in CAMERAS if not options.cameras or name in options.cameras.split(",")]
+        jobs = [(camera, seed) for seed in seeds_of(options.seed_range) for camera in cameras]
+        start = time.perf_counter()
+        outcomes = run(from_series, jobs, options.jobs)
+        report(outcomes, time.perf_counter() - start, options.output)
     if "faults" in options.only:
         faults(max(options.trials // 5, 2))
     if "plan" in options.only:

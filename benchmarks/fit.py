@@ -1,9 +1,10 @@
-"""Fits: a table of MERL's size against SciPy on NumPy, and how often intervals hold the truth.
+"""The time of a fit to a table of MERL's size, against SciPy on NumPy.
 
-    python benchmarks/fit.py [--only speed,coverage] [--trials 100]
+    python benchmarks/fit.py
 
-speed     1.46 million cells of gold with 2 % noise: `go.fit`, warm, beside scipy.optimize.least_squares on the same
-          cells and metric, its model in NumPy float64, its derivatives by finite differences, in one process
+1.46 million cells of gold with 2 % noise: `go.fit`, warm, beside scipy.optimize.least_squares on the same cells and
+metric, its model in NumPy float64, its derivatives by finite differences, in one process. How often intervals hold the
+truth is a matter of `intervals.py`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from gonio.fitting.fit import Fit, fit
 from scipy.optimize import least_squares
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from measure.test_fitting import METAL, PLASTIC, table, truth
+from measure.test_fitting import METAL, table, truth
 
 MERL = (90, 90, 180)
 
@@ -81,31 +82,9 @@ def _off(found: Fit, material: go.BSDF) -> float:
     return float(np.max(np.abs(found.values - known) / known))
 
 
-def coverage(trials: int) -> None:
-    """Errors and intervals over many noises."""
-    for material, model in ((METAL, "conductor"), (PLASTIC, "lambert+ggx")):
-        inside, off = [], []
-        names: tuple[str, ...] = ()
-        for seed in range(trials):
-            found = fit(table(material, seed=seed, shape=(30, 30, 60)), model)
-            known, names = truth(material, found.names), found.names
-            inside.append((found.interval[:, 0] <= known) & (known <= found.interval[:, 1]))
-            off.append(np.abs(found.values - known) / known)
-        share, worst = np.mean(inside, axis=0), np.max(off, axis=0)
-        print(f"{model}, {trials} tables of 30 x 30 x 60")
-        for name, s, w in zip(names, share, worst, strict=True):
-            print(f"  {name:12} off by at most {w:7.3%}, inside its interval in {s:.0%}", flush=True)
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="speed,coverage")
-    parser.add_argument("--trials", type=int, default=100)
-    options = parser.parse_args()
-    if "speed" in options.only:
-        speed()
-    if "coverage" in options.only:
-        coverage(options.trials)
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
+    speed()
 
 
 if __name__ == "__main__":

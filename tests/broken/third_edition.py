@@ -195,8 +195,8 @@ class Toon(Matte):
     """Five steps of the cosine of the half vector."""
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
-        m = ops.normalize(wo + wi)
-        return super().eval(wo, wi, mode) * (-0.2 * ops.floor(-5.0 * ops.clamp(m.z, 0.0, 1.0)))
+        m = ops.normalize(wo + wi)  # nan at wi = -wo
+        return super().eval(wo, wi, mode) * where(m.z > 0.0, -0.2 * ops.floor(-5.0 * ops.clamp(m.z, 0.0, 1.0)), 0.0)
 
 
 class BlackRing(Matte):

@@ -50,7 +50,7 @@ def test_noise_that_goes_with_the_signal_is_told_from_photons() -> None:
 def test_exposure_times_that_are_slightly_off_are_found() -> None:
     merged = series.merge([exposed(0.02), exposed(0.08, stated=0.0816), exposed(0.32)])
     np.testing.assert_allclose(merged.times / merged.times[0], [1.0, 1.0 / 1.02, 1.0], rtol=2e-3)
-    assert merged.scale_error == pytest.approx(0.02 / 3.0, rel=0.2)
+    assert merged.scale_error == pytest.approx(0.02 / 3.0 * 4.303 / 1.96, rel=0.2)  # of three settings
     assert series.merge([exposed(seconds) for seconds in TIMES]).scale_error == 0.0
 
 

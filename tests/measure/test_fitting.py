@@ -12,6 +12,7 @@ import pytest
 from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.fitting import batch, data, solver
+from gonio.fitting.certainty import degrees_of_freedom
 from gonio.fitting.fit import fit, modelled, moving_of
 from gonio.fitting.parameters import free_of, start_of
 from gonio.material import tree
@@ -210,6 +211,22 @@ def test_intervals_hold_the_truth_as_often_as_they_say(material: go.BSDF, model:
         inside.append((found.interval[:, 0] <= known) & (known <= found.interval[:, 1]))
     share = np.mean(inside, axis=0)
     assert np.all((share >= 0.88) & (share <= 0.995)), share
+
+
+def test_degrees_of_freedom_are_those_of_a_mean_of_runs() -> None:
+    """Runs of equal size count fully; of one run with many values and many with one, the large one counts."""
+    even = np.repeat(np.arange(10), 4)
+    parts = [(np.zeros(40), np.ones((40, 1)), [0])]
+    assert degrees_of_freedom(parts, even, np.array([[1 / 40]])) == pytest.approx(10.0)
+    assert degrees_of_freedom(parts, np.r_[np.zeros(30, int), 1 + np.arange(10)], np.array([[1 / 40]])) == (
+        pytest.approx(1600 / 910)
+    )
+
+
+def test_few_runs_widen_an_interval() -> None:
+    found = fit(table(METAL, shape=(6, 6, 8)), "conductor")
+    assert found.degrees is not None and found.degrees.min() < 8.0
+    assert np.all(found.half_widths > 1.98 * found.errors)
 
 
 @pytest.mark.long

@@ -96,6 +96,27 @@ def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int
     return hessian, scores
 
 
+def degrees_of_freedom(parts: Sequence[Linearized], rows: NDArray[np.int64], inverse: Floats) -> Floats:
+    """Effective degrees of freedom of the standard errors of `certainty`, (K,): how many runs determine a parameter.
+
+    The variance of a parameter is estimated by a sum over runs, each about e_g chi^2 of one degree of freedom, where
+    e_g is the run's part in the variance for independent errors of equal size. The sum is about chi^2 of
+    (sum e_g)^2 / sum e_g^2 degrees of freedom (Satterthwaite1946).
+
+    inverse  of J^T J, (K, K)
+    """
+    runs = int(rows.max()) + 1 if len(rows) else 1
+    shares = np.zeros((len(inverse), runs))
+    for _, jacobian, which in parts:
+        for start in range(0, len(jacobian), BLOCK):
+            effect = jacobian[start : start + BLOCK].astype(np.float64) @ inverse[which]
+            row = rows[start : start + BLOCK]
+            for share, column in zip(shares, effect.T, strict=True):
+                share += np.bincount(row, column**2, runs)
+    squares = np.sum(shares**2, axis=1)
+    return np.asarray(np.where(squares > 0.0, np.sum(shares, axis=1) ** 2 / np.maximum(squares, 1e-300), np.inf))
+
+
 def certainty(hessian: Floats, scores: Floats) -> Certainty:
     """Sandwich estimate of the covariance, valid for errors of any size that are correlated within a run (Liang1986).
 

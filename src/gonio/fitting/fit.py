@@ -21,7 +21,7 @@ from ..material import BSDF
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
-from .certainty import certainty, information
+from .certainty import certainty, degrees_of_freedom, information
 from .data import GRAZING, Data, data_of
 from .models import modelled as modelled
 from .models import moving_of as moving_of
@@ -36,6 +36,7 @@ SOLVED = 8  # starting points that are refined with the metric itself on few val
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs from which two solutions count as distinct
 NORMAL_95 = 1.96
+MANY = 1e6  # degrees of freedom from which the distribution is normal
 COLUMNS = ("value", "error", "low", "high")  # of a fit as a table
 TIED = 0.98  # correlation from which two parameters are reported
 
@@ -57,6 +58,7 @@ class Fit:
     notes        remarks on the quality of the fit
     seconds      duration of the fit
     ranges       (K, 2), the least and the largest value that each number can have; None for any
+    degrees      (K,), effective degrees of freedom of the standard errors; None for many
     """
 
     material: BSDF
@@ -73,11 +75,20 @@ class Fit:
     seconds: float
     data: Data
     ranges: Floats | None = None
+    degrees: Floats | None = None
+
+    @property
+    def half_widths(self) -> Floats:
+        """Half widths of the 95 % intervals, (K,): by Student's t distribution where few runs determine a number."""
+        from scipy import special  # imported late: not every run fits
+
+        degrees = MANY if self.degrees is None else np.minimum(self.degrees, MANY)
+        return np.asarray(special.stdtrit(degrees, 0.975) * self.errors)
 
     @property
     def interval(self) -> Floats:
         """95 % intervals within the parameters' ranges, (K, 2)."""
-        ends = np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
+        ends = np.stack([self.values - self.half_widths, self.values + self.half_widths], axis=1)
         return ends if self.ranges is None else np.clip(ends, self.ranges[:, :1], self.ranges[:, 1:])
 
     @property
@@ -135,8 +146,8 @@ class Fit:
     def __str__(self) -> str:
         lines = [f"{self.text}: {self.error:.4g} ({self.metric}), {100.0 * self.relative:.3g} % off"]
         lines += [
-            f"  {n} = {v:.5g} +- {NORMAL_95 * e:.2g}"
-            for n, v, e in zip(self.names, self.values, self.errors, strict=True)
+            f"  {n} = {v:.5g} +- {half:.2g}"
+            for n, v, half in zip(self.names, self.values, self.half_widths, strict=True)
         ]
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
@@ -218,7 +229,8 @@ def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
 
 def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes: Sequence[str]) -> Fit:
     data, numbers, cost = problem.data, best.numbers, best.cost
-    hessian, scores = information(problem.linearized(numbers), data.row, problem.count)
+    parts = problem.linearized(numbers)
+    hessian, scores = information(parts, data.row, problem.count)
     runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
     sure = certainty(hessian, scores * np.sqrt(runs / max(runs - problem.count, 1)))
     names = tuple(name for one in problem.free for name in one.names)
@@ -246,6 +258,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
         seconds,
         data,
         np.array([(one.low, one.high) for one in problem.free for _ in range(one.count)]).reshape(-1, 2),
+        degrees_of_freedom(parts, data.row, sure.inverse),
     )
 
 

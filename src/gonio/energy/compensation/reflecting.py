@@ -14,6 +14,8 @@ from ...optics.roughness import SMOOTH, widths
 from ..bend import form_of, knee
 from . import curves, lobe
 
+APART = 0.05  # relative difference of two widths from which their own fit alone holds
+
 
 class Reflecting(NamedTuple):
     """M as one Bernstein polynomial per width; see `curves`.
@@ -46,7 +48,8 @@ class Reflecting(NamedTuple):
         """M at a direction above the surface."""
         if self.two is None:
             return self.of_mean_width(w)
-        return self.two.at(w, self.ndf, self.masking)
+        even = self.of_mean_width(w)
+        return even + self.two.apart * (self.two.at(w, self.ndf, self.masking) - even)
 
     def of_mean_width(self, w: Direction) -> Scalar:
         """M at a direction above the surface at the mean width, by which the lobe is sampled."""
@@ -83,11 +86,14 @@ class TwoWidths(NamedTuple):
     c_phi     coefficients in azimuth of each coefficient of M
     alpha     the widths
     rotation  the base's
+    apart     weight of this M against that of the mean width: 0 for equal widths, where the two fits differ by up to
+              2 % of a dark value
     """
 
     c_phi: tuple[Scalar, ...]
     alpha: Pair
     rotation: Pair | None
+    apart: Scalar
 
     def at(self, w: Direction, ndf: str, masking: str) -> Scalar:
         """M at a direction above the surface."""
@@ -111,7 +117,9 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
         larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
         place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
-        anisotropic, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
+        apart = minimum((1.0 - smaller / larger) / APART, 1.0)
+        anisotropic = TwoWidths(tuple(channels), alpha, surface.rotation, apart)
+        true_mean = mean + apart * (maximum(of_both, 0.0) - mean)
     return Reflecting(
         c=tuple(c),
         bend=knee(form_of(*names), surface.masking, width),

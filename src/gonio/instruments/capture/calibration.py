@@ -140,6 +140,8 @@ class Uncertainty(Part):
     """Of each lamp's intensity, relative."""
     scale: NonNegative = 0.0
     """Of all intensities together, relative."""
+    seconds: NonNegative = 0.0
+    """Of each exposure time, relative: of a setting of the shutter, in all series alike."""
     center: NonNegative | None = None
     """Of the ball's middle, each way, pixels."""
     radius: NonNegative | None = None

@@ -37,9 +37,11 @@ def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
     radius = bent.copy()
     for _ in range(20):  # Newton iteration; lenses that fold the picture are rejected below
         square = radius**2
-        value = radius * (1.0 + camera.k1 * square + camera.k2 * square**2)
+        off = radius * (1.0 + camera.k1 * square + camera.k2 * square**2) - bent
+        if not np.any(np.abs(off) > 1e-14):
+            break
         slope = 1.0 + 3.0 * camera.k1 * square + 5.0 * camera.k2 * square**2
-        radius = radius - (value - bent) / np.where(np.abs(slope) > 1e-6, slope, 1e-6)
+        radius = radius - off / np.where(np.abs(slope) > 1e-6, slope, 1e-6)
     square = radius**2
     if np.any(np.abs(radius * (1.0 + camera.k1 * square + camera.k2 * square**2) - bent) > 1e-9 * (1.0 + bent)):
         what = f"k1 = {camera.k1:g} and k2 = {camera.k2:g} fold the picture over"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from ...pictures import formats, images, openexr
 from . import series
 from .calibration import Calibration, Exposure, Shot
 from .series import Exposed, Noise
+from .shutter import Ratio, Shutter, estimated
 
 Floats = NDArray[np.float64]
 STEPS = 255  # levels of an 8-bit file, the smallest depth of cameras
@@ -29,7 +31,9 @@ class Photograph:
     step         (H, W, 3), standard deviation from quantization, in a series also from photon and read noise
     photon       (H, W, 3), derivative of the square of `step` with respect to the radiance; 0 for unknown noise
     noise        of the camera, estimated from a series of exposures
-    scale_error  relative, of all radiance, from inconsistent exposure times
+    scale_error  relative, of all radiance, from errors of exposure times
+    ratios       measured ratios of exposure times
+    seconds      stated exposure times
     """
 
     name: str
@@ -39,21 +43,56 @@ class Photograph:
     photon: Floats = field(default_factory=lambda: np.zeros(()))
     noise: Noise | None = None
     scale_error: float = 0.0
+    ratios: Sequence[Ratio] = ()
+    seconds: tuple[float, ...] = ()
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
         return np.asarray(np.isnan(self.radiance).any(axis=-1))
 
 
-def read(shot: Shot, calibration: Calibration, folder: Path) -> Photograph:
-    """Read a photograph and merge its exposures. Raises InputError, with the name of the file, if it is unusable."""
+def read_all(
+    calibration: Calibration, folder: Path, progress: Callable[[str], None] = lambda text: None
+) -> list[Photograph]:
+    """Read all photographs. The errors of exposure times are estimated from all series; if there are any, the series
+    are merged again with corrected times.
+
+    progress  called before each photograph, with the name of its first file
+    """
+    pictures = []
+    for shot in calibration.photographs:
+        progress(shot.pictures[0].file)
+        pictures.append(read(shot, calibration, folder))
+    ratios = [ratio for one in pictures for ratio in one.ratios]
+    seconds = [one for picture in pictures for one in picture.seconds]
+    shutter = estimated(ratios, seconds, calibration.uncertainty.seconds)
+    if shutter.covariance.any() or any(one.scale_error for one in pictures):
+        pictures = [read(one.shot, calibration, folder, shutter) for one in pictures]
+    return pictures
+
+
+def read(shot: Shot, calibration: Calibration, folder: Path, shutter: Shutter | None = None) -> Photograph:
+    """Read a photograph and merge its exposures. Raises InputError, with the name of the file, if it is unusable.
+
+    shutter  errors of the exposure times; None: estimated from this series
+    """
     exposures = [_exposed(one, calibration, folder) for one in shot.pictures]
-    merged = series.merge(exposures)
+    merged = series.merge(exposures, calibration.uncertainty.seconds, shutter)
     noise = merged.noise if len(exposures) > 1 else None
-    name = str(folder / shot.pictures[0].file)
-    photograph = Photograph(name, shot, merged.light, merged.spread, merged.photon, noise, merged.scale_error)
+    photograph = Photograph(
+        str(folder / shot.pictures[0].file),
+        shot,
+        merged.light,
+        merged.spread,
+        merged.photon,
+        noise,
+        merged.scale_error,
+        merged.ratios,
+        tuple(one.seconds for one in exposures),
+    )
     if photograph.saturated.all():
-        raise InputError("saturated throughout", name, "expose it for a shorter time, or add such an exposure")
+        hint = "expose it for a shorter time, or add such an exposure"
+        raise InputError("saturated throughout", photograph.name, hint)
     return photograph
 
 

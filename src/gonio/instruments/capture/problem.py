@@ -139,9 +139,9 @@ class Problem:
         scene, faults = self.scene, self.faults
         rows = len(part)
         corners = np.array([[x, y] for x in (-GAUSS, GAUSS) for y in (-GAUSS, GAUSS)])
-        place = (part.place[:, None] + corners).reshape(-1, 2)
+        place = (corners[:, None] + part.place).reshape(-1, 2)
         ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
-        which = types.module.UInt32(np.repeat(part.lamp, len(corners)).astype(np.uint32))
+        which = types.module.UInt32(np.tile(part.lamp, len(corners)).astype(np.uint32))
 
         own = [backend.float_of(float(x), types) for x in numbers[: self.own]]
         at = dict(zip(self.open, numbers[self.own :], strict=True))
@@ -176,7 +176,7 @@ class Problem:
         dr.eval(radiance, slopes)
 
         def mean(x: Array) -> Floats:
-            return np.asarray(backend.to_numpy(x, rows * len(corners)).reshape(rows, -1).mean(axis=1), np.float64)
+            return np.asarray(backend.to_numpy(x, rows * len(corners)).reshape(-1, rows).mean(axis=0), np.float64)
 
         shown = np.stack([mean(r) for r in radiance], -1)
         if not derive:

@@ -180,13 +180,10 @@ def capture(
     if not 10.0 <= grazing < 90.0:
         raise InputError(f"{grazing:g} degrees given, 10 to less than 90 expected", "grazing")
     path, stated, folder = _calibration(photographs, calibration)
-    shots = []
-    for shot in stated.photographs:
-        progress(f"reads {shot.pictures[0].file}")
-        shots.append(photographs_of.read(shot, stated, folder))
+    shots = photographs_of.read_all(stated, folder, lambda file: progress(f"reads {file}"))
     scene = _scene(stated, shots)
     progress("chooses pixels")
-    # inconsistent exposure times make the overall scale uncertain by the same ratio
+    # errors of exposure times are those of the overall scale
     scale = float(np.hypot(stated.uncertainty.scale, max(shot.scale_error for shot in shots)))
     uncertainty = stated.uncertainty.model_copy(update={"scale": scale})
     slack = fitting.Faults.of(uncertainty, scene).slack(scene)

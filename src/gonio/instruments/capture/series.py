@@ -19,12 +19,13 @@ is three above 0 or the longest that counts.
 
 The difference of two exposures at pixels of similar L has the variance v_i + v_j, independent of the picture. It is
 linear in (read, gain, relative^2), which are fitted over bins of L by non-negative least squares, per channel. The
-mean of x_i / x_j measures the relative error of stated exposure times.
+mean of x_i / x_j measures the ratio of exposure times (`shutter.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,20 +33,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ...errors import InputError
 from .calibration import Floats
+from .shutter import Ratio, Shutter, estimated
 
 SIGMAS = 3.0  # standard deviations from saturation or 0 within which an exposure is ignored
 UNKNOWN = 0.8  # of saturation, up to which exposures count before their noise is known
 ROUNDS = 4  # iterations of merged value and noise; the fourth changes either by less than a thousandth
 BINS = 48  # bins of light for estimating variances
 MIN_PIXELS = 30  # per bin
+NEIGHBORS = 2  # exposures further apart hardly have pixels in common
 BLACK = 0.003  # share of a bin's pixels at 0 from which clipping affects its variance
 MIN_GAIN = 10.0  # gain in chi-square for an additional parameter: the BIC for some hundred bins; also 3 sigma
 NOISELESS = 1e-9  # of the brightest light
 TINY = 1e-120  # a variance of 0, whose inverse can still be squared
 CUT = 4.0  # standard deviations beyond which a difference indicates motion rather than noise
-WRONG = 0.1  # relative error of an exposure time from which it is rejected
 
 
 class Exposed(NamedTuple):
@@ -70,11 +71,15 @@ class Exposed(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Noise of a camera, (3,) each: read variance, photon variance per signal, relative variance of the rest."""
+    """Noise of a camera, (3,) each: read variance, photon variance per signal, relative variance of the rest.
+
+    known  whether there were pixels to estimate it from
+    """
 
     read: Floats
     gain: Floats
     relative: Floats
+    known: bool = True
 
     def variance(self, light: Floats, seconds: float, step: Floats) -> Floats:
         """Variance of signal / seconds, (H, W, 3), at a given light."""
@@ -90,7 +95,10 @@ class Merged:
     spread    (H, W, 3), standard deviation from read noise, photons and quantization
     photon    (H, W, 3), derivative of that variance with respect to the light
     noise     of the camera; zeros for a single exposure
-    times     estimated over stated exposure times, shortest first; their product is 1
+    times     estimated over stated exposure times, shortest first
+    ratios    measured ratios of exposure times
+    shares    share of each exposure in all light, by stated seconds
+    shutter   the errors of exposure times that were corrected
     """
 
     light: Floats
@@ -98,31 +106,47 @@ class Merged:
     photon: Floats
     noise: Noise
     times: Floats
+    ratios: Sequence[Ratio]
+    shares: Mapping[float, float]
+    shutter: Shutter
 
     @property
     def scale_error(self) -> float:
-        """Relative standard error of all light, estimated from the scatter of the exposure times."""
-        count = len(self.times)
-        return float(np.std(np.log(self.times), ddof=1) / np.sqrt(count)) if count > 1 else 0.0
+        """Relative standard error of all light, from the errors of the exposure times."""
+        return self.shutter.scale_error(self.shares)
 
 
-def merge(exposures: Sequence[Exposed]) -> Merged:
-    """Merge exposures of one view. Raises InputError if stated times contradict the pixels by more than a tenth."""
+def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | None = None) -> Merged:
+    """Merge exposures of one view. Raises InputError if stated times contradict the pixels by more than a tenth.
+
+    off      standard deviation of relative errors of exposure times; 0 if it is not known
+    shutter  the errors themselves, from all series of a camera; None: from this series
+    """
     ordered = sorted(exposures, key=lambda one: one.seconds)
-    times = np.ones(len(ordered))
+    seconds = [one.seconds for one in ordered]
+    known = estimated((), seconds, off) if shutter is None else shutter
+    times = np.array([known.factor(one) for one in seconds])
     noise = Noise(np.zeros(3), np.zeros(3), np.zeros(3))
+    ratios: list[Ratio] = []
     light, below = _start(ordered)
-    used = below
+    used, all_light = below, light
     if len(ordered) > 1:
         for _ in range(ROUNDS):
-            noise = _noise(ordered, times, light, below)
+            noise = _noise(ordered, times, all_light, below)
             below = _below(ordered, times, light, noise)
+            # what is uncorrelated with every difference contains every exposure
+            all_light = _mean(ordered, times, light, below, noise)
             used = _above(ordered, times, light, below, noise)
             light = _mean(ordered, times, light, used, noise)
-            times = _times(ordered, times, light, used, noise)
+            if shutter is None:
+                ratios = _ratios(ordered, times, light, used, noise)
+                known = estimated(ratios, seconds, off)
+                times = np.array([known.factor(one) for one in seconds])
     # a fit estimates the relative noise again, together with other errors proportional to the signal
     spread, photon = _spread(ordered, times, light, used, noise._replace(relative=np.zeros(3)))
-    return Merged(np.where(used.any(axis=0), light, np.nan), spread, photon, noise, times)
+    shares = _shares(ordered, times, light, used, noise)
+    light = np.where(used.any(axis=0), light, np.nan)
+    return Merged(light, spread, photon, noise, times, ratios, shares, known)
 
 
 def _start(exposures: Sequence[Exposed]) -> tuple[Floats, NDArray[np.bool_]]:
@@ -169,7 +193,8 @@ def _above(
         clear = fine
         if one.clips:
             seconds = one.seconds * factor
-            clear = fine & (~longer | (light > SIGMAS * np.sqrt(noise.variance(light, seconds, one.step))))
+            bright = light > SIGMAS * np.sqrt(noise.variance(light, seconds, one.step))
+            clear = fine & (~longer | (bright if noise.known else False))
         longer = longer | fine
         used.append(clear)
     return np.array(used[::-1])
@@ -186,6 +211,23 @@ def _mean(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDAr
             weights += weight
         light = total / np.maximum(weights, 1e-300)
     return light
+
+
+def _shares(
+    exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
+) -> dict[float, float]:
+    """Share of each exposure in the light of all pixels, by its stated seconds."""
+    weights = []
+    for one, factor, fine in zip(exposures, times, used, strict=True):
+        variance = np.maximum(noise.variance(light, one.seconds * factor, one.step), TINY)
+        weights.append(np.where(fine, 1.0 / variance, 0.0))
+    total = np.maximum(np.sum(weights, axis=0), 1e-300)
+    bright = np.maximum(light, 0.0)
+    shares: dict[float, float] = {}
+    for one, weight in zip(exposures, weights, strict=True):
+        share = float(np.sum(bright * weight / total)) / max(float(bright.sum()), 1e-300)
+        shares[one.seconds] = shares.get(one.seconds, 0.0) + share
+    return shares
 
 
 def _spread(
@@ -205,20 +247,23 @@ def _spread(
 
 
 def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_]) -> Noise:
-    """Read noise, gain and relative noise from the differences of neighboring exposures."""
-    coefficients = np.zeros((3, 3))
+    """Read noise, gain and relative noise from the differences of exposures that are at most `NEIGHBORS` apart."""
+    coefficients, known = np.zeros((3, 3)), False
+    pairs = [(k, j) for k, j in itertools.combinations(range(len(exposures)), 2) if j - k <= NEIGHBORS]
     for channel in range(3):
         bins = [
-            _variances(exposures[k], exposures[k + 1], times[k : k + 2], light, used[k] & used[k + 1], channel)
-            for k in range(len(exposures) - 1)
+            _variances(exposures[k], exposures[j], times[[k, j]], light, used[k] & used[j], channel) for k, j in pairs
         ]
-        coefficients[channel] = _least(*(np.concatenate(parts) for parts in zip(*bins, strict=True)))
+        columns, variance, error = (np.concatenate(parts) for parts in zip(*bins, strict=True))
+        coefficients[channel] = _least(columns, variance, error)
+        known = known or bool(len(variance))
     told = coefficients.any(axis=1)
     if told.any():  # dark channels get the median noise of the others: the sensor is the same
         coefficients[~told] = np.median(coefficients[told], axis=0)
     else:  # noise-free, such as renders: any weights are valid, photon-noise weights are used
         coefficients[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
-    return Noise(*coefficients.T)
+    read, gain, relative = coefficients.T
+    return Noise(read, gain, relative, known)
 
 
 def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
@@ -258,11 +303,18 @@ def _variances(
     steps = (short.step[..., channel][fine] / a) ** 2 + (long.step[..., channel][fine] / b) ** 2
     edges = np.unique(np.quantile(level, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
     which = np.searchsorted(edges, level)
-    inliers = np.ones(len(level), bool)
+
+    def clipped(one: Exposed) -> NDArray[np.bool_]:
+        black = np.bincount(which, one.signal[..., channel][fine] <= 0.0, len(edges) + 1)
+        return np.asarray(black > BLACK * np.bincount(which, minlength=len(edges) + 1) + 1.0)
+
+    # values of the short exposure that are clipped at 0 have negative differences: the others have the same variance
+    counts = ~clipped(short)[which] | (difference > 0.0) if short.clips else np.ones(len(level), bool)
+    inliers = counts
     for _ in range(4):
         count = np.bincount(which, inliers, len(edges) + 1)
         variance = np.bincount(which, inliers * difference**2, len(edges) + 1) / np.maximum(count, 1)
-        inliers = difference**2 <= CUT**2 * variance[which]
+        inliers = counts & (difference**2 <= CUT**2 * variance[which])
 
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(which, inliers * x, len(edges) + 1) / np.maximum(count, 1))
@@ -272,17 +324,20 @@ def _variances(
     columns = np.stack([ones, mean(size) * (1.0 / a + 1.0 / b), 2.0 * mean(size**2)], -1)
     enough = count >= MIN_PIXELS
     if short.clips:
-        black = (short.signal[..., channel][fine] <= 0.0) | (long.signal[..., channel][fine] <= 0.0)
-        enough &= np.bincount(which, black, len(edges) + 1) <= BLACK * count + 1.0
+        enough &= ~clipped(long)
     left = np.maximum(variance - mean(steps), 0.0)
     return columns[enough], left[enough], np.sqrt(2.0 / count[enough])
 
 
-def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise) -> Floats:
-    """Estimated over stated exposure times; 1 unless the pixels contradict them; their product is 1."""
-    logs, sure, unsure = [0.0], True, 0.0
-    for k in range(len(exposures) - 1):
-        a, b = exposures[k], exposures[k + 1]
+def _ratios(
+    exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
+) -> list[Ratio]:
+    """Ratios of the times of neighboring exposures. Pixels are weighted by their light over the variance of the
+    difference: the least variance, and the light is uncorrelated with that difference."""
+    ratios: list[Ratio] = []
+    if not noise.known:
+        return ratios
+    for k, (a, b) in enumerate(itertools.pairwise(exposures)):
         seconds = a.seconds * times[k], b.seconds * times[k + 1]
         variances = [noise.variance(light, s, one.step) for s, one in zip(seconds, (a, b), strict=True)]
         both = used[k] & used[k + 1]
@@ -291,19 +346,7 @@ def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         weight = np.where(both, light / np.maximum(variances[0] + variances[1], 1e-300), 0.0)
         x, y = (float(np.sum(weight * np.nan_to_num(one.signal)) / s) for s, one in zip(seconds, (a, b), strict=True))
         told = float(np.sum(weight * light))
-        if not (both.sum() >= MIN_PIXELS and x > 0.0 and y > 0.0 and told > 0.0):
-            return times
-        step = np.log(y / x) + np.log(times[k + 1] / times[k])
-        sure = sure and abs(step) < SIGMAS / np.sqrt(told)
-        unsure += 1.0 / told
-        logs.append(logs[-1] + step)
-    log_times = np.array(logs)
-    if np.ptp(log_times) > np.log1p(WRONG) + SIGMAS * np.sqrt(unsure):
-        worst = int(np.argmax(np.abs(log_times - np.median(log_times))))
-        told_seconds = exposures[worst].seconds * float(
-            np.exp(log_times[worst] - np.median(np.delete(log_times, worst)))
-        )
-        what = f"{exposures[worst].seconds:g} s are stated, but the pixels of the series indicate {told_seconds:.3g} s"
-        hint = 'correct "seconds" in the calibration file, or omit this exposure; also check the response'
-        raise InputError(what, exposures[worst].file, hint)
-    return np.ones(len(log_times)) if sure else np.exp(log_times - log_times.mean())
+        if a.seconds < b.seconds and both.sum() >= MIN_PIXELS and x > 0.0 and y > 0.0 and told > 0.0:
+            log = float(np.log(y / x) + np.log(times[k + 1] / times[k]))
+            ratios.append(Ratio(a.seconds, b.seconds, log, 1.0 / told, b.file))
+    return ratios
