@@ -32,7 +32,10 @@ GROUPS = {
     "measured": "Measured",
 }
 # Layers that are off are left out of the first shader, so that the figure appears within a second in software WebGL.
-OPENINGS = {"openpbr": "openpbr(base_color=0.02,0.1,0.35,specular_roughness=0.3)"}
+OPENINGS = {
+    "disney2015": "disney2015(base_color=0.1,0.35,0.6,roughness=0.35)",
+    "openpbr": "openpbr(base_color=0.02,0.1,0.35,specular_roughness=0.3)",
+}
 BELOW = "The shader is the code below, run by your browser."
 WALKS = 256  # estimates in each cell of the table of a random model
 SYMBOLS = (
@@ -61,12 +64,12 @@ def live() -> dict[str, str | bytes]:
 def opening(name: str, folder: Path) -> stage.Stage:
     """What the live page of a model shows first: the material of the sheet of all models, in the studio.
 
-    A random model, which has no shader code, is shown by its mean, beside Kulla-Conty and single scattering.
+    A random model, which has no shader code, is shown by its mean, above Kulla-Conty.
     """
     shown = go.material(OPENINGS[name]) if name in OPENINGS else strips.all_models.material(name)
     rows = [shown]
     if shown.stochastic:
-        rows = [averaged(shown, folder), go.KullaConty(base=shown.base), shown.base]
+        rows = [averaged(shown, folder), go.KullaConty(base=shown.base)]
     return dataclasses.replace(stage.of_models(rows), lights=(stage.STUDIO,))
 
 
@@ -126,7 +129,7 @@ def _page(model: type[go.BSDF]) -> str:
     parts += [
         "## Live",
         "Turn the balls, open the lobe, move the sliders. "
-        + (f"{table_shown}; below it are Kulla-Conty and the base." if model.stochastic else BELOW),
+        + (f"{table_shown}; below it is Kulla-Conty." if model.stochastic else BELOW),
         f":::{{dropdown}} {name} in this page\n```{{raw}} html\n{frame}\n```\n:::",
     ]
     parts += ["## Use", _use(found), "## Laws", _laws(found)]
