@@ -98,8 +98,9 @@ def page(schema: dict[str, Any]) -> str:
     lines += [
         "## Materials",
         "A `type` of this list, with the parameters that `gonio explain NAME` prints and the keys below. A number or a",
-        'color may be an image. `{"file": ...}` is a material from a fit\'s `.json`, glTF, MaterialX, a table of',
-        "measurements or a shader, or with `--allow-code` from `FILE.py:CLASS`.",
+        'color may be an image. A material from a file is `{"type": TYPE, "file": ...}`: `json` for a fit that Gonio',
+        "wrote, `gltf` and `materialx` ([documents](documents.md)), `measured` ([tables](measured.md)), `shader`",
+        "([shaders](shaders.md)); with `--allow-code` also a class, as `FILE.py:CLASS`.",
         "",
         ", ".join(f"`{name}`" for name in named) + ".",
         "",

@@ -5,8 +5,11 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from gonio import files
+from gonio.cli import signals
 
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -39,6 +42,17 @@ def test_a_signal_while_it_loads_is_one_line(number: signal.Signals, module: str
     name = "Ctrl-C" if number == signal.SIGINT else number.name
     assert done.stderr == f"ended by {name}; nothing was written\n"
     assert (done.stdout, done.returncode) == ("", 128 + number)
+
+
+def test_what_a_command_has_written_is_told_when_it_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit, for example, is written before its sheet is drawn; a table of the cache is no result."""
+    monkeypatch.setattr(files, "written", [])
+    assert signals.Ended().line == "ended by Ctrl-C; nothing was written"
+    files.write_whole(tmp_path / "cached", b"", rescue=False)
+    assert signals.Ended().line == "ended by Ctrl-C; nothing was written"
+    files.write_whole(tmp_path / "gold.json", b"{}")
+    files.write_all(tmp_path / "tables", {"E.exr": b""})
+    assert signals.Ended().line == f"ended by Ctrl-C; written before: {tmp_path / 'gold.json'}, {tmp_path / 'tables'}"
 
 
 def test_nothing_is_imported_before_the_signals_are_handled() -> None:

@@ -107,6 +107,9 @@ def with_ending(path: Path, ending: str, start: str = "") -> Path:
     return path.with_name(start + os.fsdecode(name) + ending)
 
 
+written: list[Path] = []  # results of this process, which a command that is ended names
+
+
 def write_whole(
     path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True, durable: bool = True
 ) -> Path:
@@ -148,6 +151,8 @@ def write_whole(
         _rescue(failure, target, fill, elsewhere=error.errno in _FULL)
     finally:
         _remove(temporary)
+    if rescue:
+        written.append(target)
     return target
 
 
@@ -220,6 +225,7 @@ def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
         else:
             for name in files:
                 os.replace(part / name, folder / name)
+        written.append(folder)
     except OSError as error:
         _rescue(_failure(error, folder), folder, fill, elsewhere=error.errno in _FULL)
     finally:

@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import gonio as go
 import pytest
 from gonio import scene
 from gonio.errors import InputError
@@ -555,3 +556,21 @@ def test_the_project_s_own_examples_read_and_are_small():
     for folder in {file.parent for file in files}:
         sizes = {path.name: path.stat().st_size for path in folder.glob("**/*") if path.is_file()}
         assert sum(sizes.values()) < 4e5, sizes
+
+
+@pytest.fixture(name="scene_folder")
+def folder_of_a_scene(request: pytest.FixtureRequest) -> Path:
+    """The fixture `scene`, whose name is the module's here."""
+    return request.getfixturevalue("scene")
+
+
+@pytest.mark.parametrize(
+    ("file", "kind"), [("gold.json", "json"), ("a.MTLX", "materialx"), ("b.binary", "measured"), ("c.glsl", "shader")]
+)
+def test_a_material_of_a_file_without_a_type_is_told_the_one_it_needs(file: str, kind: str, scene_folder: Path) -> None:
+    described = json.loads((scene_folder / "scene.json").read_text())
+    described["scene"]["shapes"][0]["material"] = {"file": file}
+    (scene_folder / "scene.json").write_text(json.dumps(described))
+    with pytest.raises(go.InputError, match="key 'type' is missing") as refused:
+        go.render(scene_folder)
+    assert refused.value.hint == f'add "type": "{kind}"'

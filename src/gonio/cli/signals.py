@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from types import FrameType
 
@@ -32,7 +33,10 @@ class Ended:
 
     @property
     def line(self) -> str:
-        return f"ended by {words(self.number or signal.SIGINT)}; nothing was written"
+        files = sys.modules.get("gonio.files")  # what has not been imported has written nothing
+        written = ", ".join(str(path) for path in files.written) if files else ""
+        what = f"written before: {written}" if written else "nothing was written"
+        return f"ended by {words(self.number or signal.SIGINT)}; {what}"
 
     @property
     def code(self) -> int:

@@ -48,6 +48,8 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
     formats = by_suffix(path)
     if not formats:
         hint = did_you_mean(path.suffix, suffixes())
+        if path.suffix == ".json":
+            hint = 'a fit is `gold.json` on the command line and {"type": "json", "file": "gold.json"} in a scene'
         raise InputError(f"'{path.suffix}' is not a format of measurements", str(path), hint)
     return next((one for one in formats if data is not None and one.fits(data)), formats[0])
 

@@ -192,6 +192,17 @@ ELSEWHERE = {
 }
 
 
+def _type_of(file: str) -> str:
+    """The type of a material or shape that a file holds, by its suffix."""
+    from ..catalog import documents  # readers of files, which a scene without one does not need
+    from ..measure import names_table
+
+    for document in documents.Document.family.all().values():
+        if file.lower().endswith(document.suffixes):
+            return document.name
+    return "measured" if names_table(file) else {".obj": "mesh", ".ply": "mesh"}.get(Path(file).suffix, "shader")
+
+
 def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     """Pointer, problem and hint for one of pydantic's errors."""
     kind, context = detail["type"], detail.get("ctx", {})
@@ -218,6 +229,8 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
         what, more = f"unknown type '{tag}'", ("type",)
     elif kind == "union_tag_not_found":
         what, hint = "key 'type' is missing", 'add "type": it says what this object is'
+        if isinstance(value, dict) and isinstance(file := value.get("file"), str):
+            hint = f'add "type": "{_type_of(file)}"'
     elif kind == "literal_error":
         known = [item.strip(" '") for item in context["expected"].replace(" or ", ", ").split(",")]
         what = f"expected {context['expected']}, got {got}"
