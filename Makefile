@@ -29,7 +29,7 @@ demo: .venv/rendering
 	@mkdir -p out
 	$(BIN)/gonio bake ggx --lut E,Eavg,dfg -o out/tables
 	$(BIN)/gonio render examples/shading-balls/print.json --spp 32 --size 1024x424 $(DENOISE) -o out/shading-balls.png
-	$(BIN)/gonio render examples/white-furnace --spp 128 $(DENOISE) -o out/white-furnace.png
+	$(BIN)/gonio render examples/white-furnace --spp 128 --exposure 0.9 $(DENOISE) -o out/white-furnace.png
 	$(BIN)/gonio view --export out/shading-balls.html
 	@printf '%s\n' '' 'The pictures and the page are in out. Next, in this shell:' '    . .venv/bin/activate' '    gonio view'
 

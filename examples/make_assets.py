@@ -29,6 +29,19 @@ def checker(cells: int, dark: tuple[float, ...], bright: tuple[float, ...]) -> n
     return np.where(odd[..., None] == 1, dark, bright)
 
 
+def sphere(height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the unit sphere for the texels of a map, (height, 2 height, 3), and their azimuths."""
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
+    theta, phi = math.pi * v, 2.0 * math.pi * u
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1), phi
+
+
+def scattered(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Points anywhere on the unit sphere, (count, 3)."""
+    points = rng.standard_normal((count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
 def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.ndarray:
     """Normal map of round dents over a sphere, (height, 2 height, 3), as a hammer leaves them.
 
@@ -36,11 +49,8 @@ def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.nda
     bitangent = normal x tangent, which on a sphere points up (-v).
     """
     rng = np.random.default_rng(seed)
-    centers = rng.standard_normal((dents, 3))
-    centers /= np.linalg.norm(centers, axis=1, keepdims=True)
-    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
-    theta, phi = math.pi * v, 2.0 * math.pi * u
-    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    centers = scattered(rng, dents)
+    place, phi = sphere(height)
     nearest = centers[np.argmax(place @ centers.T, axis=-1)]
     away = place - nearest  # the slope of a bowl grows in proportion
     east = np.stack([-np.sin(phi), np.cos(phi), np.zeros_like(phi)], -1)
@@ -54,11 +64,8 @@ def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.nda
 def terrazzo(height: int, chips: int, seed: int) -> np.ndarray:
     """Albedo of a floor of colored stone chips in cream cement, (height, 2 height, 3), for a sphere or a tile."""
     rng = np.random.default_rng(seed)
-    centers = rng.standard_normal((chips, 3))
-    centers /= np.linalg.norm(centers, axis=1, keepdims=True)
-    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
-    theta, phi = math.pi * v, 2.0 * math.pi * u
-    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    centers = scattered(rng, chips)
+    place, _ = sphere(height)
     near = np.sort(place @ centers.T, axis=-1)[..., -2:]
     margin = np.arccos(np.clip(near[..., 0], -1, 1)) - np.arccos(np.clip(near[..., 1], -1, 1))
     which = np.argmax(place @ centers.T, axis=-1)
@@ -89,9 +96,7 @@ def worn(size: int) -> np.ndarray:
 def maria(height: int) -> np.ndarray:
     """Albedo of a moon, (height, 2 height, 3): dark plains in bright highlands, craters, rays about the youngest."""
     rng = np.random.default_rng(11)
-    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / height / 2, indexing="ij")
-    theta, phi = math.pi * v, 2.0 * math.pi * u
-    place = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    place, _ = sphere(height)
 
     def noise(rate: float, waves: int = 24) -> np.ndarray:
         ways = rng.standard_normal((waves, 3)) * rate
