@@ -122,7 +122,14 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def precision_restored() -> Iterator[None]:
-    """No test may leave another precision behind."""
+def as_found() -> Iterator[None]:
+    """No test may leave another precision behind, nor, which fails, another number of threads: with one, Mitsuba's next
+    OpenEXR hangs, in any test."""
+    dr = sys.modules.get("drjit")
+    threads = dr and dr.thread_count()
     yield
     ops.set_precision("float32")
+    if dr and dr.thread_count() != threads:
+        left = dr.thread_count()
+        dr.set_thread_count(threads)
+        pytest.fail(f"left Dr.Jit with {left} threads, found it with {threads}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import gonio as go
 import drjit as dr
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ picture = go.render(sys.argv[1], output="a.exr", spp=1)
 assert np.array_equal(images.read("a.exr").pixels, picture)
 np.save("picture.npy", picture)
 import drjit as dr
+import gonio as go
 assert dr.thread_count() == 1, dr.thread_count()
 xml = '''<scene version="3.0.0"><integrator type="direct"/>
 <sensor type="perspective"><film type="hdrfilm">
@@ -53,3 +55,9 @@ def test_one_thread_is_enough_for_exr(tmp_path: Path) -> None:
         assert dr.thread_count() == 1
     finally:
         dr.set_thread_count(threads)
+
+
+def test_a_render_leaves_the_number_of_threads_as_it_was() -> None:
+    threads = dr.thread_count()
+    go.render(go.Lambert(), spp=1, size=(4, 4), threads=1 if threads > 1 else 2)
+    assert dr.thread_count() == threads

@@ -87,9 +87,11 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
 
 
 @functools.lru_cache
-def _own(mi: ModuleType) -> None:
+def _own(mi: ModuleType) -> int:
     """Guard the variant, which is shared by all threads, against changes while another thread computes, and prevent
-    plugins from being loaded from the current folder."""
+    plugins from being loaded from the current folder. Returns the number of threads that Dr.Jit had at first."""
+    import drjit as dr
+
     plugin_search.confine(mi)
     change = mi.set_variant
 
@@ -99,6 +101,7 @@ def _own(mi: ModuleType) -> None:
             change(*names)
 
     vars(mi)["set_variant"] = set_variant
+    return int(dr.thread_count())
 
 
 @contextlib.contextmanager
@@ -120,14 +123,19 @@ def using(variant: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
-    """Restore the variant after the block. If none was set before, a spectral one becomes RGB on the same device: the
-    rest of a program expects three colors."""
+    """Restore the variant and the number of threads after the block. If no variant was set before, a spectral one
+    becomes RGB on the same device: the rest of a program expects three colors. If Dr.Jit was not loaded before, it keeps
+    its default of threads: with one, the rest of a program could read no OpenEXR by Mitsuba, see `faults.exr_threads`.
+    """
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
+    threads = None if loaded is None else sys.modules["drjit"].thread_count()
     try:
         yield
     finally:
         mi = sys.modules.get("mitsuba")
         now = mi and mi.variant()
+        if mi and now:
+            sys.modules["drjit"].set_thread_count(threads or _own(mi))
         if mi and now and now != before and (before or "spectral" in now):
             mi.set_variant(before or "_".join([*now.split("_")[:2], "rgb"]))
