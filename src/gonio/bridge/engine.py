@@ -124,9 +124,8 @@ def using(variant: str) -> Iterator[None]:
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
     """Restore the variant and the number of threads after the block. If no variant was set before, a spectral one
-    becomes RGB on the same device: the rest of a program expects three colors. If Dr.Jit was not loaded before, it keeps
-    its default of threads: with one, the rest of a program could read no OpenEXR by Mitsuba, see `faults.exr_threads`.
-    """
+    becomes RGB on the same device: the rest of a program expects three colors, and as many threads as Dr.Jit has by
+    itself: with one, Mitsuba can read no OpenEXR, see `faults.exr_threads`."""
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
     threads = None if loaded is None else sys.modules["drjit"].thread_count()
