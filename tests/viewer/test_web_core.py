@@ -491,3 +491,20 @@ def test_what_is_not_shown_is_told_at_once(chrome: Any, tmp_path: Path) -> None:
     tab.get_by_text("1 note").click()
     assert "the texture of albedo is not shown" in tab.locator("dialog[open]").text_content()
     tab.close()
+
+
+def test_a_figure_in_a_closed_part_of_a_document_has_its_picture_before_it_is_opened(
+    chrome: Any, homework_file: Path
+) -> None:
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
+    document = homework_file.with_name("document.html")
+    document.write_text(f"<details><summary>open</summary><iframe src='{homework_file.name}'></iframe></details>")
+    tab.goto(document.as_uri())
+    figure = tab.frames[1]
+    assert not tab.locator("iframe").is_visible()
+    figure.evaluate("() => gonio.ready")
+    drawn = figure.evaluate("() => gonio.frames")
+    assert drawn > 0
+    tab.locator("summary").click()
+    figure.evaluate("async n => { while (gonio.frames <= n) await new Promise(requestAnimationFrame); }", drawn)
+    tab.close()

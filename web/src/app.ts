@@ -19,6 +19,8 @@ import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
 const SLOT_COLORS = ["#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#0072b2"];
 /** Duration in ms for which a change counts as motion: slow machines draw coarser pictures meanwhile. */
 const MOTION = 160;
+/** Time in ms without a frame after which the page counts as not shown. */
+const UNSEEN = 50;
 const MAX_PIXELS = 2_400_000;
 
 /** What is wrong with the user's file, the location, and how to fix it. */
@@ -286,10 +288,17 @@ export class PageApp implements App {
   private schedule(): void {
     if (this.scheduled) return;
     this.scheduled = true;
-    requestAnimationFrame((now) => {
+    const draw = (now: number) => {
+      if (!this.scheduled) return; // the other was first
       this.scheduled = false;
+      cancelAnimationFrame(frame);
+      clearTimeout(timer);
       this.frame(now);
-    });
+    };
+    const frame = requestAnimationFrame(draw);
+    // A page that is not shown, such as a figure in a closed part of a document, has no frames. Its first picture, for
+    // which browsers compile shaders, is made nevertheless: it is there at once when the page is opened.
+    const timer = this.frames === 0 ? setTimeout(() => draw(performance.now()), UNSEEN) : 0;
   }
 
   /** Browsers report a resize late, under load after a picture of the new size was drawn, which is then kept. */
