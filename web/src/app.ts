@@ -20,7 +20,7 @@ const SLOT_COLORS = ["#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#00
 /** Duration in ms for which a change counts as motion: slow machines draw coarser pictures meanwhile. */
 const MOTION = 160;
 /** Time in ms without a frame after which the page counts as not shown. */
-const UNSEEN = 50;
+const UNSEEN = 20;
 const MAX_PIXELS = 2_400_000;
 
 /** What is wrong with the user's file, the location, and how to fix it. */

@@ -64,10 +64,11 @@ export class Programs {
     }
     const long = missing.filter((source) => source.long);
     if (long.length) this.onMaking([...new Set(long.map((source) => source.title))]);
+    const unseen = (this.gl.canvas as HTMLCanvasElement).clientWidth === 0; // nobody waits for the report
     for (const source of missing) {
       const frames = (this.announced.get(source.key) ?? 0) + 1;
       this.announced.set(source.key, frames);
-      if (!source.long || frames > FRAMES_TO_PAINT) this.start(source);
+      if (!source.long || unseen || frames > FRAMES_TO_PAINT) this.start(source);
     }
     return false;
   }
