@@ -82,9 +82,12 @@ def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str]
     levels = np.unique(np.round(centers[:, 1] / size / 2)) * size * 2
     if rows and len(rows) != len(levels):
         raise SystemExit(f"{len(rows)} names for {len(levels)} rows")
+    pitch = min(np.diff(levels), default=picture.height)
+    longest = max((font(size).getlength(name) for name in rows), default=1.0)
+    small = size * min(0.9, 0.65 * pitch / longest)  # so that two names do not read as one
     for name, level in zip(rows, levels, strict=False):
         turned = picture.rotate(-90, expand=True)  # so that the text reads upward
-        write(turned, (picture.height - level, 0.9 * size), name, 0.9 * size, "mm")
+        write(turned, (picture.height - level, 0.9 * size), name, small, "mm")
         picture = turned.rotate(90, expand=True)
     return picture
 

@@ -425,7 +425,7 @@ def main() -> None:
     obj("diamond/brilliant.obj", *brilliant())
     way = np.linspace(0.0, 1.0, 121)
     bend = np.stack([1.6 * np.cos(1.5 * math.pi * way), 0.25 + 0.9 * way, -1.6 * np.sin(1.5 * math.pi * way)], 1)
-    ply("fibre/fibre.ply", *tube(bend, 0.16, sides=32))
+    ply("fibre/fibre.ply", *tube(bend, 0.1, sides=48))
     ply("pool-caustic/water.ply", *waves(2, 70, 0.05))
     ply("velvet/cloth.ply", *draped(1.0, 1.1, 11))
     glass, wine = goblet()

@@ -22,7 +22,7 @@ def count(kind: str) -> int:
     return len(families.families()[kind][0].all())
 
 
-LAWS = count("law") - 1  # `shader` needs a browser and is judged only if it is named
+LAWS = count("law") - 1  # `shader` is judged only if it is named
 PHONG = len(re.findall(r"^## \d\.", (ROOT / "docs/phong-limits.md").read_text(encoding="utf-8"), re.MULTILINE))
 
 

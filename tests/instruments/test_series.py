@@ -34,6 +34,17 @@ def test_a_merged_series_is_neither_biased_nor_surer_than_it_is() -> None:
         assert np.mean(deviation**2) == pytest.approx(1.0, abs=0.15)
 
 
+def test_a_sensor_of_few_electrons_biases_neither_light_nor_exposure_times() -> None:
+    """A long exposure must not be left out where the short ones are high by chance."""
+    small = Noise(np.full(3, 4e-3**2), np.full(3, 1.0 / 1000.0), np.zeros(3))
+    merged = series.merge([exposed(seconds, small) for seconds in TIMES])
+    assert all(abs(ratio.log) < 3.0 * np.sqrt(ratio.variance) for ratio in merged.ratios)
+    np.testing.assert_array_equal(merged.times, 1.0)
+    off, variance = (merged.light - LIGHT).ravel(), (merged.spread**2).ravel()
+    for part in np.array_split(np.arange(LIGHT.size), 12)[2:]:  # darker ones are cut off at 0
+        assert abs(off[part].sum()) < 4.0 * np.sqrt(variance[part].sum())
+
+
 def test_gain_and_read_noise_are_found_from_the_series() -> None:
     noise = series.merge([exposed(seconds) for seconds in TIMES]).noise
     np.testing.assert_allclose(noise.gain, CAMERA.gain, rtol=0.15)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Pixels = NDArray[np.uint8]  # (H, W, 3)
 MAX_WIDTH = 3200  # pixels; the pictures of larger sheets are scaled down
+READABLE = 800  # pixels, the width at which a page shows a sheet: the type of wider ones grows with them
 GAP, MARGIN = 8, 20
 TITLE_HEIGHT, HEADING_HEIGHT, NAME_HEIGHT, LABEL_HEIGHT, BETWEEN = 62, 28, 20, 22, 14
 _DPI = 100
@@ -93,6 +94,7 @@ def _columns_of_a_row(count: int, aspect: float) -> int:
 class _Layout:
     """The measures of a sheet, pixels.
 
+    zoom     of the type and of the space that it takes
     left     of the first column of pictures
     cell     width and height of a picture
     pitch    distance between columns
@@ -101,6 +103,7 @@ class _Layout:
     """
 
     blocks: Sequence[_Block]
+    zoom: float
     left: int
     cell: tuple[int, int]
     pitch: int
@@ -118,15 +121,17 @@ class _Layout:
         measuring = Figure(dpi=_DPI)
         renderer = FigureCanvasAgg(measuring).get_renderer()
 
-        def width_of(text: str, size: float, weight: str = "normal") -> float:
-            label = Text(0, 0, text, fontsize=size, fontweight=weight, figure=measuring)
-            return label.get_window_extent(renderer).width
-
         height, width = blocks[0].pictures[0][0].shape[:2]
         columns = max(len(block.columns) for block in blocks)
+        zoom = max(1.0, min(MAX_WIDTH, columns * width) / READABLE)
+
+        def width_of(text: str, size: float, weight: str = "normal") -> float:
+            label = Text(0, 0, text, fontsize=zoom * size, fontweight=weight, figure=measuring)
+            return label.get_window_extent(renderer).width
+
         labels = max((width_of(row, 11) for block in blocks for row in block.rows), default=0)
         names = any(block.row_name for block in blocks)
-        left = MARGIN + (math.ceil(labels) + 10 if labels else 0) + (24 if names else 0)
+        left = MARGIN + (math.ceil(labels) + 10 if labels else 0) + (math.ceil(24 * zoom) if names else 0)
         scale = min(1.0, (MAX_WIDTH - left - MARGIN) / (columns * (width + GAP)))
         if max(width, height) < 160:  # tiny pictures are enlarged by an integer factor
             scale = float(max(1, 160 // max(width, height)))
@@ -136,16 +141,16 @@ class _Layout:
         pitch = max(cell[0], math.ceil(widest_label) + 4) + GAP
         heading_width = max(width_of(title, 15, "bold"), width_of(subtitle, 10))
         total_width = math.ceil(max(left + columns * pitch - GAP, MARGIN + heading_width) + MARGIN)
-        heights = [_height(block, cell[1]) for block in blocks]
-        total_height = TITLE_HEIGHT + sum(heights) + (len(blocks) - 1) * BETWEEN + MARGIN
-        return _Layout(blocks, left, cell, pitch, (total_width, total_height), heights)
+        heights = [_height(block, cell[1], zoom) for block in blocks]
+        total_height = zoom * TITLE_HEIGHT + sum(heights) + (len(blocks) - 1) * BETWEEN + MARGIN
+        return _Layout(blocks, zoom, left, cell, pitch, (total_width, total_height), heights)
 
 
-def _height(block: _Block, cell_height: int) -> float:
+def _height(block: _Block, cell_height: int, zoom: float) -> float:
     rows = len(block.pictures)
     extra = (HEADING_HEIGHT if block.heading else 0) + (NAME_HEIGHT if block.column_name else 0)
     extra += LABEL_HEIGHT if any(block.columns) else 0
-    return extra + rows * cell_height + (rows - 1) * GAP
+    return zoom * extra + rows * cell_height + (rows - 1) * GAP
 
 
 def _draw(layout: _Layout, title: str, subtitle: str) -> Figure:
@@ -156,40 +161,43 @@ def _draw(layout: _Layout, title: str, subtitle: str) -> Figure:
     width, height = layout.size
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     FigureCanvasAgg(figure)
-    _text(figure, layout.size, MARGIN, 30, title, fontsize=15, fontweight="bold", va="baseline")
-    _text(figure, layout.size, MARGIN, 49, subtitle, fontsize=10, color=figures.SOFT, va="baseline")
-    y = float(TITLE_HEIGHT)
+    _text(figure, layout, MARGIN, 30 * layout.zoom, title, fontsize=15, fontweight="bold", va="baseline")
+    _text(figure, layout, MARGIN, 49 * layout.zoom, subtitle, fontsize=10, color=figures.SOFT, va="baseline")
+    y = layout.zoom * TITLE_HEIGHT
     for block, block_height in zip(layout.blocks, layout.heights, strict=True):
         _draw_block(figure, layout, block, y, y + block_height)
         y += block_height + BETWEEN
     return figure
 
 
-def _text(figure: Figure, size: tuple[int, float], x: float, y: float, content: str, **style: Any) -> None:
-    """Text at a place in pixels from the upper left corner of a sheet of that size."""
-    figure.text(x / size[0], 1 - y / size[1], content, **style)
+def _text(figure: Figure, layout: _Layout, x: float, y: float, content: str, fontsize: float, **style: Any) -> None:
+    """Text at a place in pixels from the upper left corner of the sheet."""
+    width, height = layout.size
+    figure.text(x / width, 1 - y / height, content, fontsize=layout.zoom * fontsize, **style)
 
 
 def _draw_block(figure: Figure, layout: _Layout, block: _Block, y: float, bottom: float) -> None:
     """A block between two heights: its heading, names, labels and pictures."""
     left, pitch, (cell_width, cell_height), (width, height) = layout.left, layout.pitch, layout.cell, layout.size
 
-    def text(x: float, y: float, content: str, **style: Any) -> None:
-        _text(figure, layout.size, x, y, content, **style)
+    zoom = layout.zoom
+
+    def text(x: float, y: float, content: str, fontsize: float = 10, **style: Any) -> None:
+        _text(figure, layout, x, y, content, fontsize, **style)
 
     if block.heading:
-        text(MARGIN, y + 19, block.heading, fontsize=12, fontweight="bold", va="baseline")
-        y += HEADING_HEIGHT
+        text(MARGIN, y + 19 * zoom, block.heading, fontsize=12, fontweight="bold", va="baseline")
+        y += HEADING_HEIGHT * zoom
     if block.column_name:
         middle = left + (len(block.columns) * pitch - GAP) / 2
-        text(middle, y + 13, block.column_name, color=figures.SOFT, ha="center", va="baseline")
-        y += NAME_HEIGHT
+        text(middle, y + 13 * zoom, block.column_name, color=figures.SOFT, ha="center", va="baseline")
+        y += NAME_HEIGHT * zoom
     for index, label in enumerate(block.columns):
-        text(left + index * pitch + cell_width / 2, y + 14, label, fontsize=11, ha="center", va="baseline")
-    y += LABEL_HEIGHT if any(block.columns) else 0
+        text(left + index * pitch + cell_width / 2, y + 14 * zoom, label, fontsize=11, ha="center", va="baseline")
+    y += LABEL_HEIGHT * zoom if any(block.columns) else 0
     if block.row_name:
         middle = (y + bottom) / 2
-        text(MARGIN + 6, middle, block.row_name, color=figures.SOFT, rotation=90, ha="center", va="center")
+        text(MARGIN + 6 * zoom, middle, block.row_name, color=figures.SOFT, rotation=90, ha="center", va="center")
     for row, pictures in enumerate(block.pictures):
         if block.rows:
             text(left - 10, y + cell_height / 2, block.rows[row], fontsize=11, ha="right", va="center")
