@@ -34,6 +34,7 @@ class Photograph:
     scale_error  relative, of all radiance, from errors of exposure times
     ratios       measured ratios of exposure times
     seconds      stated exposure times
+    cut          whether noise below 0 was stored as 0, of a known standard deviation
     """
 
     name: str
@@ -45,6 +46,7 @@ class Photograph:
     scale_error: float = 0.0
     ratios: Sequence[Ratio] = ()
     seconds: tuple[float, ...] = ()
+    cut: bool = False
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -89,6 +91,7 @@ def read(shot: Shot, calibration: Calibration, folder: Path, shutter: Shutter | 
         merged.scale_error,
         merged.ratios,
         tuple(one.seconds for one in exposures),
+        noise is not None and noise.known and exposures[0].clips,
     )
     if photograph.saturated.all():
         hint = "expose it for a shorter time, or add such an exposure"

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from ...errors import InputError
 from ...measure.tables.half_difference import pair_at
@@ -21,6 +22,7 @@ from .photographs import Photograph
 
 GRAZING = 80.0  # degrees: beyond, errors of the outline shift the angles too far, and papers exclude them (Ngan2005)
 EDGE = 0.02  # share of a flat sample's edges excluded on all sides
+NEAR = 5.0  # standard deviations above 0 up to which values that are cut off there matter
 TILE = 8  # pixels: errors within a tile are correlated
 MIN_PIXELS = 50  # lit pixels of a sample
 CONTRAST = 3.0  # minimum brightness ratio of the lit sample to the background
@@ -75,6 +77,7 @@ class Pixels:
     value   (N, 3), radiance in the camera's unit
     step    (N, 3), standard deviation from quantization, in a series also from photon and read noise
     photon  (N, 3), derivative of the square of `step` with respect to the radiance
+    cut     (N,), whether noise below 0 was stored as 0
     """
 
     kind: Kind
@@ -84,6 +87,7 @@ class Pixels:
     value: Floats
     step: Floats
     photon: Floats
+    cut: NDArray[np.bool_]
 
     def variance(self, radiance: Floats) -> Floats:
         """Variance of `value` from `step` and `photon`, (N, 3), at a given radiance.
@@ -92,6 +96,21 @@ class Pixels:
         at `value` is an upper bound and positive.
         """
         return np.maximum(self.step**2 + self.photon * (np.abs(radiance) - np.maximum(self.value, 0.0)), 0.0)
+
+    def expected(self, radiance: Floats) -> tuple[Floats, Floats]:
+        """(mean of the stored values (N, 3), its derivative with respect to the radiance) at a given radiance.
+
+        Where noise below 0 is stored as 0, the mean of a normal variable of mean m and standard deviation s that is cut
+        off at 0 is m P(m / s) + s p(m / s), with the normal distribution P and its density p (Tobin1958).
+        """
+        mean, slope = radiance.copy(), np.ones_like(radiance)
+        spread = np.sqrt(self.variance(radiance))
+        near = self.cut[:, None] & (radiance < NEAR * spread)
+        m, s = radiance[near], spread[near]
+        above, density = special.ndtr(m / s), np.exp(-0.5 * (m / s) ** 2) / np.sqrt(2.0 * np.pi)
+        mean[near] = m * above + s * density
+        slope[near] = above + density * self.photon[near] / (2.0 * s)
+        return mean, slope
 
     def __len__(self) -> int:
         return len(self.place)
@@ -106,6 +125,7 @@ class Pixels:
             value=self.value[chosen],
             step=self.step[chosen],
             photon=self.photon[chosen],
+            cut=self.cut[chosen],
         )
 
 
@@ -199,6 +219,7 @@ def choose(
                 shot.radiance[row, column][used],
                 shot.step[row, column][used],
                 np.broadcast_to(shot.photon, shot.step.shape)[row, column][used],
+                np.full(int(used.sum()), shot.cut),
             )
         )
     parts = tuple(_joined(group) for group in gathered.values() if group)
@@ -225,6 +246,7 @@ def _joined(group: list[Pixels]) -> Pixels:
         np.concatenate([one.value for one in group]),
         np.concatenate([one.step for one in group]),
         np.concatenate([one.photon for one in group]),
+        np.concatenate([one.cut for one in group]),
     )
     return joined.at(np.argsort(joined.lamp, kind="stable"))
 

@@ -172,5 +172,6 @@ def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
         parts.append((some[lit], which[lit]))
     where, which = np.concatenate([p for p, _ in parts]), np.concatenate([w for _, w in parts])
     blank = np.zeros((len(where), 3))
-    part = Pixels(setting.kind, where, which, np.zeros(len(where), np.int64), blank, blank + setting.step, blank)
+    tile, cut = np.zeros(len(where), np.int64), np.zeros(len(where), bool)
+    part = Pixels(setting.kind, where, which, tile, blank, blank + setting.step, blank, cut)
     return part, len(place) / len(some)

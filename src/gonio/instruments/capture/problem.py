@@ -117,7 +117,7 @@ class Problem:
         return columns_of(self.material, self.moving)
 
     def of_row(self, lamp: int, channel: int) -> list[int]:
-        """Indices of the parameters of the derivatives, in the order of `_predicted`."""
+        """Indices of the parameters of the derivatives, in the order of `_radiance`."""
         shared = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
         names = [*BALL, "scale", *(f"{self.scene.names[lamp]}.{name}" for name in LAMP)]
         return shared + [self.own + self.open.index(name) for name in names if name in self.open]
@@ -125,16 +125,19 @@ class Problem:
     # ------------------------------------------------------------------ prediction
 
     def predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        """Radiance of pixels, (N, 3), averaged over four points per pixel, and its derivatives (N, 3, K)."""
+        """Expected values of pixels, (N, 3), averaged over four points per pixel, and their derivatives (N, 3, K)."""
         values, derivatives = [], []
         for start in range(0, len(part), CHUNK):
-            block = self._predicted(part.at(np.arange(start, min(start + CHUNK, len(part)))), numbers, derive)
-            values.append(block[0])
-            derivatives.append(block[1])
+            some = part.at(np.arange(start, min(start + CHUNK, len(part))))
+            radiance, slope = self._radiance(some, numbers, derive)
+            mean, gain = some.expected(radiance)
+            values.append(mean)
+            derivatives.append(None if slope is None else slope * gain[..., None])
         together = np.concatenate([d for d in derivatives if d is not None]) if derive else None
         return np.concatenate(values), together
 
-    def _predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
+    def _radiance(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
+        """Radiance of pixels, (N, 3), and its derivatives (N, 3, K)."""
         dr, types = backend.drjit(), backend.types("float32")
         scene, faults = self.scene, self.faults
         rows = len(part)
