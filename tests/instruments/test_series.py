@@ -82,15 +82,15 @@ def test_a_series_without_noise_is_merged_within_its_steps(bits: int) -> None:
 
 
 def test_what_is_cut_off_at_0_has_the_mean_of_what_is_left() -> None:
-    light = np.linspace(0.0, 0.1, 41)[:, None].repeat(3, axis=1)
+    light = np.linspace(0.0, 0.1, 401)[:, None].repeat(3, axis=1)
     blank, lamp = np.zeros(light.shape), np.zeros(len(light), int)
     read, gain = 4e-3, 1e-3
     part = Pixels("ball", blank[:, :2], lamp, lamp, blank, blank + read, blank + gain, np.ones(len(light), bool))
     spread = np.sqrt(read**2 + gain * light)
-    noise = special.ndtri((np.arange(20000) + 0.5) / 20000)[:, None, None]
+    noise = special.ndtri((np.arange(4000) + 0.5) / 4000)[:, None, None]
     mean, slope = part.expected(light)
-    np.testing.assert_allclose(mean, np.maximum(light + spread * noise, 0.0).mean(0), atol=1e-4 * spread.max())
-    np.testing.assert_allclose(np.gradient(mean[:, 0], light[:, 0])[1:-1], slope[1:-1, 0], atol=0.01)
+    np.testing.assert_allclose(mean, np.maximum(light + spread * noise, 0.0).mean(0), atol=3e-4 * spread.max())
+    np.testing.assert_allclose(np.gradient(mean[:, 0], light[:, 0])[1:-1], slope[1:-1, 0], atol=1e-3)
     whole = dataclasses.replace(part, cut=np.zeros(len(light), bool)).expected(light)
     np.testing.assert_array_equal(whole, (light, np.ones(light.shape)))
 
