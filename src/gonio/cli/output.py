@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, RenderableType
     from rich.table import Table
 
     from ..transport.passes import Progress
@@ -92,13 +92,15 @@ def print_intervals(names: Sequence[str], values: Iterable[float], intervals: It
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print with colors, in the width of the terminal; without a terminal nothing is truncated.
+    """Print with colors; brackets are text, never markup."""
+    console(markup=False).print(what)
 
-    Brackets are text, never markup.
-    """
+
+def console(markup: bool = True) -> Console:
+    """Standard output in the width of the terminal; without a terminal nothing is truncated or wrapped."""
     from rich.console import Console
 
-    Console(markup=False, emoji=False, width=None if sys.stdout.isatty() else 200).print(what)
+    return Console(markup=markup, emoji=False, width=None if sys.stdout.isatty() else 200)
 
 
 def print_tables(manifest: Mapping[str, Any], path: Path, as_json: bool) -> None:

@@ -13,7 +13,7 @@ from typer import Argument, Exit, Option
 
 from .. import completion
 from ..options import Executor, Json, Material, Options, Seed, output_option
-from ..output import Bar
+from ..output import Bar, console
 from .base import MATERIALS, verb
 
 if TYPE_CHECKING:
@@ -118,9 +118,7 @@ def verify(
     if as_json:
         print(json.dumps(report.as_dict()))
     else:
-        from rich.console import Console
-
-        report.show(Console(emoji=False))
+        report.show(console())
         if to.output is not None:
             print(to.output / "report.html")
     if not report.passed:
@@ -167,7 +165,6 @@ def _annotate(report: Report, wanted: bool, as_json: bool) -> None:
 
 def _show_pairs(target: Sequence[str], settings: Sequence[str], vary: str, at: str, as_json: bool) -> None:
     """Print what each target returns for one pair of directions, in both orders."""
-    from rich.console import Console
 
     from ...verify import targets, terminal
     from ...verify.directions import parse
@@ -176,4 +173,4 @@ def _show_pairs(target: Sequence[str], settings: Sequence[str], vary: str, at: s
         if as_json:
             print(json.dumps(terminal.pair(subject, *parse(at))))
         else:
-            terminal.show_pair(subject, *parse(at), Console(emoji=False))
+            terminal.show_pair(subject, *parse(at), console())

@@ -153,7 +153,7 @@ class Energy(Law):
         if gain > finding.figure:
             finding.figure = gain
             finding.worst = f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
-        lost = 1.0 - value.mean(1)
+        lost = np.round(1.0 - value.mean(1), 6) + 0.0  # not -0
         above = wo[:, 2] > 0.0
         order = np.argsort(wo[above, 2])
         mu, loss = wo[above, 2][order], lost[above][order]
@@ -161,7 +161,7 @@ class Energy(Law):
             float(np.trapezoid(2.0 * mu * loss, mu) / max(np.trapezoid(2.0 * mu, mu), 1e-9)) if len(mu) > 1 else 0.0
         )
         where = int(np.argmax(lost))
-        text = f"white furnace loses {average:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
+        text = f"white furnace loses {average + 0.0:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
         known = float(error.max())
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
