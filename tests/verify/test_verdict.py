@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import gonio as go
@@ -12,7 +13,7 @@ from gonio.verify.laws.pdf import Pdf
 from gonio.verify.lobe_checks import distinct
 from gonio.verify.run import decide
 from gonio.verify.subject import of
-from gonio.verify.verdict import Card, Finding
+from gonio.verify.verdict import FAIL, PASS, Card, Finding, Verdict
 
 
 class BrighterAtNormal(go.Dielectric):
@@ -66,3 +67,11 @@ def test_an_exception_that_several_laws_meet_is_reported_once() -> None:
 def test_a_card_is_judged_again_only_where_a_p_value_lies_between(threshold: float, same: bool) -> None:
     card = Card(of(go.Lambert()), [], p_values=[0.001, 0.02, 0.9], threshold=0.01)
     assert card.decided_by(threshold) == same
+
+
+def test_a_failure_without_a_known_cause_says_so() -> None:
+    verdict = Verdict(3, "energy", "albedo <= 1", FAIL, figure=1.2)
+    assert verdict.cause_in_words.startswith("not found")
+    assert dataclasses.replace(verdict, cause="the cosine twice").cause_in_words == "the cosine twice"
+    assert dataclasses.replace(verdict, figure=None).cause_in_words == ""  # an exception tells itself
+    assert dataclasses.replace(verdict, status=PASS).cause_in_words == ""

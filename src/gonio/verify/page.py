@@ -152,8 +152,8 @@ def _detail(v: Verdict, anchor: str) -> str:
         )
         if v.bias:
             rows.append(("means", html.escape(v.meaning)))
-    if v.cause:
-        rows.append(("cause", html.escape(v.cause)))
+    if v.cause_in_words:
+        rows.append(("cause", html.escape(v.cause_in_words)))
     if v.reproduction:
         program = f"<summary>a program that needs only Mitsuba</summary><pre>{html.escape(v.reproduction)}</pre>"
         rows.append(("without Gonio", f"<details>{program}</details>"))

@@ -83,7 +83,7 @@ def _explain(verdict: Verdict, console: Console) -> None:
     rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
     rows += [
         ("in a picture", verdict.bias.words if verdict.bias else ""),
-        ("cause", verdict.cause),
+        ("cause", verdict.cause_in_words),
         ("worst", verdict.worst),
         ("means", verdict.meaning),
         ("tolerance", verdict.reason),

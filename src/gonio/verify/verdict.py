@@ -117,6 +117,12 @@ class Verdict:
         return self.status == FAIL
 
     @property
+    def cause_in_words(self) -> str:
+        """The probable mistake of a failure, or that none is known."""
+        unknown = self.failed and self.figure is not None  # an exception tells itself
+        return self.cause or ("not found: it is none of the known mistakes" if unknown else "")
+
+    @property
     def excused(self) -> bool:
         """Whether it violates the law, and fails no report."""
         return self.status in (KNOWN, TOLERATED)
