@@ -97,3 +97,7 @@ def test_include_repeats_a_text_per_index_and_renames(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=words):
             compile_text(f"#include<lamp>{wrong}\n", "x.glsl", folders=[tmp_path])
+    (tmp_path / "bomb.js").write_text(f"const bomb = `{'{X}a' * 250_000}`;\n")
+    for more in ("[0..64]", f"(a,{'b' * 64})", f"[{'b' * 64}]"):
+        with pytest.raises(InputError, match="more than 4 MB"):
+            compile_text(f"#include<bomb>{more}\n", "x.glsl", folders=[tmp_path])

