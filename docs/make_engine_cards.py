@@ -3,6 +3,7 @@
     python docs/make_engine_cards.py PACKAGES [--only three,...]     measure, store cards.json, write pages and pictures
     python docs/make_engine_cards.py [--check]                       the pages again from cards.json; --check: compare
     python docs/make_engine_cards.py --pictures                      the pictures too
+    python docs/make_engine_cards.py PACKAGES --programs             run the programs without Gonio; store their output
 
 PACKAGES is a folder with one folder per release, each with its package.json, such as three-0.185.1 and three-0.187.0:
 
@@ -108,6 +109,17 @@ def _size(v: Verdict) -> str:
     return v.shown if v.bias is None else v.bias.words
 
 
+def run_programs(packages: list[shaders.Package]) -> None:
+    """Store what the programs without Gonio print for each release."""
+    from engine_programs import PROGRAMS, printed
+
+    for package in packages:
+        for program in engines()[package.name].programs:
+            path = PROGRAMS / f"{Path(program).stem}-{package.version}.txt"
+            path.write_text(printed(package, program), encoding="utf-8")
+            print(path.name, flush=True)
+
+
 # --------------------------------------------------------------------------- pages
 
 
@@ -121,7 +133,6 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
     """The page of an engine, from stored figures alone."""
     versions = list(results)
     last = results[versions[-1]]
-    stem = engine.package.rpartition("/")[2]
     shown = " and ".join(versions)
     lines = [
         f"# {engine.title}",
@@ -136,7 +147,7 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
         "The albedo of white materials, whose every factor is 1, at five roughnesses and six angles. 1 is meant: below",
         "it light is lost, above it gained.",
         "",
-        f"![White furnaces of {engine.title}]({stem}.png)",
+        f"![White furnaces of {engine.title}]({engine.page}.png)",
     ]
     for one in engine.furnaces:
         lines += ["", f"### {one.title}", "", *_furnace_table(one.title, results)]
@@ -145,7 +156,7 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
     lines += (
         ["", engine.sections({version: results[version]["trials"] for version in versions})] if engine.sections else []
     )
-    lines += ["", "## Failures", "", *_failures(engine, results), "", *_again(engine, versions[-1], stem)]
+    lines += ["", "## Failures", "", *_failures(engine, results), "", *_again(engine, versions[-1])]
     return "\n".join(lines).replace("\n\n\n", "\n\n") + "\n"
 
 
@@ -197,7 +208,8 @@ def _cell(one: dict[str, str]) -> str:
     return f"**fails**: {one['grade']}" if one["grade"] else "**fails**"
 
 
-def _again(engine: Engine, version: str, stem: str) -> list[str]:
+def _again(engine: Engine, version: str) -> list[str]:
+    stem = engine.page
     lines = [
         "## Again",
         "",
@@ -233,12 +245,11 @@ def overview(stored: dict[str, Any]) -> str:
     ]
     for name, results in stored.items():
         engine, last = engines()[name], list(results.values())[-1]
-        stem = name.rpartition("/")[2]
         metal = last["furnaces"][engine.furnaces[0].title][-1][-1]
         gain, title = max((max(map(max, rows)) - 1.0, title) for title, rows in last["furnaces"].items())
         failed = sorted({law for laws in last["laws"].values() for law, one in laws.items() if one["status"] == "fail"})
         lines.append(
-            f"| [{engine.title}]({stem}.md) | {', '.join(results)} | {metal:.3f} | "
+            f"| [{engine.title}]({engine.page}.md) | {', '.join(results)} | {metal:.3f} | "
             f"{max(gain, 0.0):.3f} ({title[:1].lower()}{title[1:]}) | {', '.join(failed) or 'none'} |"
         )
     return "\n".join(lines) + "\n"
@@ -280,7 +291,7 @@ def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
 
 def written(stored: dict[str, Any]) -> dict[Path, str]:
     """All pages by path."""
-    pages = {FOLDER / f"{name.rpartition('/')[2]}.md": page(engines()[name], one) for name, one in stored.items()}
+    pages = {FOLDER / f"{engines()[name].page}.md": page(engines()[name], one) for name, one in stored.items()}
     return {FOLDER / "README.md": overview(stored), **pages}
 
 
@@ -290,13 +301,19 @@ def main() -> int:
     parser.add_argument("packages", nargs="?", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--check", action="store_true")
+    parser.add_argument("--programs", action="store_true", help="run the programs without Gonio, in Chromium")
     parser.add_argument("--pictures", action="store_true", help="draw the stored figures again")
     options = parser.parse_args()
     stored: dict[str, Any] = json.loads(STORED.read_text(encoding="utf-8")) if STORED.is_file() else {}
+    only = set(filter(None, options.only.split(",")))
+    if options.programs:
+        for packages in releases(options.packages, only).values():
+            run_programs(packages)
+        return 0
     if options.packages is not None:
-        for name, packages in releases(options.packages, set(filter(None, options.only.split(",")))).items():
+        for name, packages in releases(options.packages, only).items():
             stored[name] = {one.version: measured(engines()[name], one) for one in packages}
-            picture(engines()[name], stored[name], FOLDER / f"{name.rpartition('/')[2]}.png")
+            picture(engines()[name], stored[name], FOLDER / f"{engines()[name].page}.png")
             print(f"{name}: {', '.join(stored[name])}", flush=True)
         stored = dict(sorted(stored.items()))
         STORED.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
@@ -306,7 +323,7 @@ def main() -> int:
         return int(bool(stale))
     if options.pictures:
         for name, results in stored.items():
-            picture(engines()[name], results, FOLDER / f"{name.rpartition('/')[2]}.png")
+            picture(engines()[name], results, FOLDER / f"{engines()[name].page}.png")
     for path, text in written(stored).items():
         path.write_text(text, encoding="utf-8")
     return 0

@@ -30,7 +30,9 @@ class Furnace(NamedTuple):
 class Engine(NamedTuple):
     """What is measured of an engine.
 
-    package    of npm; `title`, and `home`, the address of the repository
+    package    of npm
+    page       name of the page, its picture and its programs, without suffix
+    title      and `home`, the address of the repository
     intro      sentences above the tables
     materials  the shaders to verify
     furnaces   white furnaces, one table each; `remarks` on them, by title
@@ -41,6 +43,7 @@ class Engine(NamedTuple):
     """
 
     package: str
+    page: str
     title: str
     home: str
     intro: str

@@ -56,6 +56,7 @@ CAUSES = {
 
 ENGINE = Engine(
     package="@khronosgroup/gltf-viewer",
+    page="gltf-viewer",
     title="glTF-Sample-Viewer",
     home="https://github.com/KhronosGroup/glTF-Sample-Viewer",
     intro=INTRO,
@@ -74,5 +75,5 @@ ENGINE = Engine(
     trials=trials,
     sections=sections,
     causes=CAUSES,
-    programs=(),
+    programs=("gltf-viewer-furnace.html",),
 )

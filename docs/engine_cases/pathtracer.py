@@ -40,7 +40,7 @@ CAUSES = {
     ("pathtracer", "positivity"): "NaN where the light lies in the view's direction: `dielectricFresnel` takes the "
     "square root of 1 - cos^2, and dot(wo, wh) may exceed 1 by a rounding. Remedy: clamp the cosine, or max(0, ...) "
     "under the root.",
-    ("pathtracer", "weight"): "The same NaN.",
+    ("pathtracer", "weight"): "unexplained; it is of the size of roundings in 64 bits, at roughness 0 alone.",
     ("pathtracer", "pdf"): "`ggxDistribution` raises alpha^2 to 1e-6, while `ggxDirection` draws normals with the "
     "alpha given: below roughness 0.03 the density is wider than the samples.",
     ("pathtracer", "reciprocity"): "Two terms. `sheenColor` lacks the cosine of the light, which `diffuseEval` and "
@@ -53,7 +53,9 @@ CAUSES = {
     (
         "pathtracer",
         "energy",
-    ): "Gloss over a white base: `specularEval` reflects by Schlick's formula up to 1 at grazing "
+    ): "At color 0 and roughness 0 the density is wider than the samples (see *pdf*), so that a few samples hold much "
+    "of the light. At other values light is gained by gloss over a white base: `specularEval` reflects "
+    "by Schlick's formula up to 1 at grazing "
     "angles, while `diffuseEval` keeps 1 - F of the exact Fresnel equations, at the half vector of each light. With "
     "sheen the missing cosine adds light as well (see *reciprocity*).",
     ("pathtracer", "precision"): "`ggxShadowMaskG1` takes the tangent of the arc cosine of wo.z, which loses digits "
@@ -74,6 +76,7 @@ Remedy: multiply by wi.z, as in `specularEval`."""
 
 ENGINE = Engine(
     package="three-gpu-pathtracer",
+    page="three-gpu-pathtracer",
     title="three-gpu-pathtracer",
     home="https://github.com/gkjohnson/three-gpu-pathtracer",
     intro=INTRO,

@@ -83,6 +83,7 @@ CAUSES = {
 
 ENGINE = Engine(
     package="playcanvas",
+    page="playcanvas",
     title="PlayCanvas",
     home="https://github.com/playcanvas/engine",
     intro=INTRO,
@@ -110,5 +111,5 @@ ENGINE = Engine(
     trials=trials,
     sections=sections,
     causes=CAUSES,
-    programs=(),
+    programs=("playcanvas-furnace.html",),
 )

@@ -188,6 +188,7 @@ CAUSES = {
 
 ENGINE = Engine(
     package="three",
+    page="three",
     title="three.js",
     home="https://github.com/mrdoob/three.js",
     intro=INTRO,

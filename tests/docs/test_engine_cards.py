@@ -1,6 +1,7 @@
 """The cards of engines: the pages are those of the stored figures, which the engines' own renderers confirm."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -8,10 +9,16 @@ from pathlib import Path
 
 import pytest
 
+import browser
+
+sys.path.append(str(Path(__file__).parents[2] / "docs"))
+from engine_cases import engines
+
 DOCS = Path(__file__).parents[2] / "docs"
 FOLDER = DOCS / "report-cards" / "engines"
 CARDS = json.loads((FOLDER / "cards.json").read_text())
 ROUGHNESSES, COSINES = (0.1, 0.25, 0.5, 0.75, 1.0), (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
+PACKAGES = {engine.page: package for package, engine in engines().items()}
 ROW = re.compile(r"^(.*), roughness ([\d.]+), n\.v ([\d.]+): ([\d.]+)$", re.MULTILINE)
 
 
@@ -34,15 +41,46 @@ def test_table_of_the_same_size_from_edge_to_edge_mends_white_metal() -> None:
     assert abs(1.0 - figures["edges_16"]) < 0.05 * abs(1.0 - figures["own"])
 
 
+def _printed_by(output: Path) -> tuple[str, str]:
+    """Page and release of an output."""
+    page, _, version = output.stem.replace("-furnace-", " ").partition(" ")
+    return page, version
+
+
 @pytest.mark.parametrize("output", sorted((FOLDER / "programs").glob("*.txt")), ids=lambda path: path.stem)
 def test_renderer_of_the_engine_returns_our_figures(output: Path) -> None:
-    package, _, version = output.stem.removesuffix(".txt").replace("-furnace-", " ").partition(" ")
-    furnaces = CARDS[package][version]["furnaces"]
+    page, version = _printed_by(output)
+    furnaces = CARDS[PACKAGES[page]][version]["furnaces"]
     rows = ROW.findall(output.read_text())
     assert len(rows) >= 8
     for title, roughness, cosine, albedo in rows:
         ours = furnaces[title][ROUGHNESSES.index(float(roughness))][COSINES.index(float(cosine))]
         assert float(albedo) == pytest.approx(ours, abs=1e-3), (title, roughness, cosine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("output", sorted((FOLDER / "programs").glob("*.txt")), ids=lambda path: path.stem)
+def test_program_without_gonio_prints_what_is_stored(output: Path) -> None:
+    """With the packages of npm in the folder GONIO_ENGINES, laid out as `make_engine_cards.py` reads them."""
+    given = os.environ.get("GONIO_ENGINES")
+    if not given:
+        pytest.skip("NOT TRIED: GONIO_ENGINES names no folder with the packages of engines")
+    if browser.missing():
+        pytest.skip(browser.missing())
+    import engine_programs
+    import make_engine_cards
+
+    page, version = _printed_by(output)
+    package = PACKAGES[page]
+    found = make_engine_cards.releases(Path(given), {package}).get(package, [])
+    release = next((one for one in found if one.version == version), None)
+    if release is None:
+        pytest.skip(f"NOT TRIED: no {package} {version} in {given}")
+    text = engine_programs.printed(release, engines()[package].programs[0])
+    number = re.compile(r"(?<=: )-?\d+\.\d+|(?<= )\d\.\d{4}")
+    assert number.sub("#", text) == number.sub("#", output.read_text())
+    for now, stored in zip(number.findall(text), number.findall(output.read_text()), strict=True):
+        assert float(now) == pytest.approx(float(stored), abs=2e-3)
 
 
 def test_every_failure_has_a_size_and_a_cause() -> None:

@@ -49,6 +49,19 @@ def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     assert np.max(baked.arrays["ltc_error"][1:, :3]) < 0.03
 
 
+def test_less_light_goes_elsewhere_than_by_the_measure_of_the_paper() -> None:
+    mu = np.array([0.6, 0.3, 0.1, 0.03])
+    model = go.Conductor(alpha=0.36).lossless()
+    row = ltc._row(model, mu, None, True)
+    points = ltc.points_of(model, mu)
+    lobe = points.value.mean(-1) / row.norm[:, :1]
+    given = points.wi, points.weight, lobe
+    cubed, _ = ltc.fitted(ltc.PLANE, *given, row.inverse)
+    own, paper = (ltc.loss_of(ltc.PLANE, one, *given, 1.0) for one in (row.inverse, cubed))
+    assert np.all(own < 0.95 * paper) and np.all(own > 0.5 * paper)
+    assert 0.5 * own == pytest.approx(row.misplaced, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_a_distribution_has_the_two_albedos_of_the_split_sum() -> None:
     baked = go.bake("ggx", lut=["ltc"], resolution=3)

@@ -1,5 +1,7 @@
 """Packages of engines as materials. The packages here are short ones of our own, in the layout of the engine's."""
 
+import base64
+import io
 import json
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from gonio.catalog.shaders import engines
 from gonio.cli.app import app
 from gonio.errors import InputError
 from gonio.spirv.compiler import compiler
+from PIL import Image
 from typer.testing import CliRunner
 
 # a program with the names that ours assigns and includes, and a formula of our own: color (1 + table) cos / pi
@@ -106,6 +109,87 @@ def test_playcanvas_adds_its_lobes(tmp_path: Path) -> None:
     assert value("standard", metal=0.0) == pytest.approx(lamp * (0.5 + 0.5 * 0.8 * 0.04), rel=1e-6)
     assert value("anisotropic", metal=1.0, strength=0.3) == pytest.approx(lamp * 0.3 * 0.5, rel=1e-6)
     assert value("sheen", metal=1.0, sheenRough=0.7) == pytest.approx(lamp * (0.5 * 0.8 * 0.5 + 0.7), rel=1e-6)
+
+
+# the uniforms that our program assigns, and a formula of our own: color (lamp's cosine) (1 + E of the table) + gloss
+BABYLON = {
+    "pbr.fragment": """
+#include<__decl__pbrFragment>
+#include<__decl__lightFragment>[0..maxSimultaneousLights]
+#include<pbrFragmentSamplersDeclaration>
+void main(void) {
+vec3 color=vec3(0.0);
+#include<lightFragment>[0..maxSimultaneousLights]
+#ifdef CLEARCOAT
+color+=vClearCoatParams.x*vClearCoatRefractionParams.x;
+#endif
+#ifdef SHEEN
+color+=vSheenColor.rgb*vSheenRoughness;
+#endif
+#ifdef ANISOTROPIC
+color+=vAnisotropy.z;
+#endif
+gl_FragColor=vec4(color,1.0);
+}
+""",
+    "ShadersInclude/pbrFragmentDeclaration": """
+uniform vec4 vEyePosition;uniform vec4 vAlbedoColor;uniform float baseWeight;uniform float baseDiffuseRoughness;
+uniform vec4 vLightingIntensity;uniform vec4 vReflectivityColor;uniform vec4 vMetallicReflectanceFactors;
+uniform vec3 vEmissiveColor;uniform vec3 vAmbientColor;uniform float visibility;varying vec3 vPositionW;
+varying vec3 vNormalW;uniform vec2 vClearCoatParams;uniform vec4 vClearCoatRefractionParams;uniform vec4 vSheenColor;
+uniform float vSheenRoughness;uniform vec3 vAnisotropy;varying mat3 vTBN;
+""",
+    "ShadersInclude/pbrFragmentSamplersDeclaration": "uniform sampler2D environmentBrdfSampler;",
+    "ShadersInclude/lightFragment": """
+#ifdef LIGHT{X}
+float energy=texture2D(environmentBrdfSampler,vec2(vEyePosition.z,vReflectivityColor.y)).y;
+#ifdef LEGACY_SPECULAR_ENERGY_CONSERVATION
+energy*=2.0;
+#endif
+color+=vAlbedoColor.rgb*dot(-light{X}.vLightData.xyz,vNormalW)*energy*light{X}.vLightDiffuse.rgb+vReflectivityColor.a;
+#endif
+""",
+}
+
+
+def test_babylon_lights_its_program(tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    package = tmp_path / "node_modules" / "@babylonjs" / "core"
+    (package / "Shaders" / "ShadersInclude").mkdir(parents=True)
+    for name, text in BABYLON.items():
+        (package / "Shaders" / f"{name}.js").write_text(f"const shader = `{text}`;\nexport const one = {{ shader }};\n")
+    (package / "package.json").write_text(json.dumps({"name": "@babylonjs/core", "version": "9.999.0"}))
+    texels = np.zeros((2, 2, 4), np.uint8)
+    texels[..., 1], texels[..., 3] = [[51, 51], [102, 102]], [[255, 255], [128, 255]]  # rows by roughness
+    drawn = io.BytesIO()
+    Image.fromarray(texels, "RGBA").save(drawn, "PNG")
+    (package / "Misc").mkdir()
+    table = package / "Misc" / "brdfTextureTools.js"
+    table.write_text(
+        f'const _environmentBRDFBase64Texture = "data:image/png;base64,{base64.b64encode(drawn.getvalue()).decode()}";'
+    )
+    files = {one.stem: one for one in shaders.adopt_package(package, tmp_path / "babylon")}
+    wo, wi = np.array([[0.0, 0.0, 1.0]]), np.array([[0.8, 0.0, 0.6]])
+
+    def value(name: str, **more: float) -> float:
+        made = go.Shader(files[f"babylon-{name}"], color=0.5, **more)
+        return float(made.eval(wo, wi, precision="float64")[0, 0])
+
+    low, high = (number**2.2 for number in (0.2, 0.4))
+    assert value("standard", rough=0.0) == pytest.approx(0.5 * 0.6 * 2.0 * low + 0.04, rel=1e-3)  # half floats
+    assert value("conserving", rough=1.0, index=2.0) == pytest.approx(0.5 * 0.6 * high + 1.0 / 9.0, rel=1e-3)
+    plain = value("standard", rough=1.0)
+    assert value("coat", rough=1.0, coat=0.5) == pytest.approx(plain + 0.5 * 0.04, rel=1e-6)
+    assert value("sheen", rough=1.0, sheen=0.5, sheenRough=0.3) == pytest.approx(plain + 0.15, rel=1e-6)
+    assert value("anisotropic", rough=1.0, strength=0.3) == pytest.approx(plain + 0.3, rel=1e-6)
+    assert np.load(tmp_path / "babylon" / "environmentBrdf.npy")[1, 0, 1] == pytest.approx(high * 255 / 128, rel=1e-3)
+    for text, words in (("", "no PNG"), ('_environmentBRDFBase64Texture = "data:image/png;base64,AAAA"', "cannot be")):
+        table.write_text(text)
+        with pytest.raises(InputError, match=words):
+            shaders.adopt_package(package, tmp_path / "again")
 
 
 def test_gltf_viewer_mixes_its_lobes(tmp_path: Path) -> None:

@@ -72,5 +72,32 @@ def test_shader_includes_text_from_javascript(tmp_path: Path) -> None:
     with pytest.raises(InputError) as broken:
         compile_text("#include <both.js#b>\n", "x.glsl", folders=[tmp_path])
     assert str(broken.value.where).endswith("both.js:3")
-    with pytest.raises(InputError, match=r"'\[0..2\]' after an include"):
-        compile_text("#include <two>[0..2]\n", "x.glsl", folders=[tmp_path])
+    with pytest.raises(InputError, match=r"'twice' after an include"):
+        compile_text("#include <two> twice\n", "x.glsl", folders=[tmp_path])
+
+
+def test_include_repeats_a_text_per_index_and_renames(tmp_path: Path) -> None:
+    """As Babylon.js does: {X} stands for the index."""
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    (tmp_path / "lamp.js").write_text("const lamp = `float lamp{X}() { return {X}.0; }`;\n")
+    (tmp_path / "named.js").write_text("const named = `float _NAME_() { return 7.0 + OTHER.5; }`;\n")
+    text = "#include<lamp>[0..COUNT]\n#include<lamp>[5] // one\n#include<named>(_NAME_,seven,OTHER,0)\n"
+    defines = {"COUNT": "2"}
+    module = parse(compile_text(text, "x.glsl", folders=[tmp_path], defines=defines))
+    names = ("lamp0", "lamp1", "lamp5", "seven")
+    assert [Machine(module).call(module.function(name)[0], []) for name in names] == [0.0, 1.0, 5.0, 7.5]
+    assert not module.function("lamp2")
+    for wrong, words in (
+        ("[0..65]", "65 as the end"),
+        ("[0..MANY]", "MANY as the end"),
+        ("(a,b,c)", "after an include"),
+    ):
+        with pytest.raises(InputError, match=words):
+            compile_text(f"#include<lamp>{wrong}\n", "x.glsl", folders=[tmp_path])
+    (tmp_path / "bomb.js").write_text(f"const bomb = `{'{X}a' * 250_000}`;\n")
+    for more in ("[0..64]", f"(a,{'b' * 64})", f"[{'b' * 64}]"):
+        with pytest.raises(InputError, match="more than 4 MB"):
+            compile_text(f"#include<bomb>{more}\n", "x.glsl", folders=[tmp_path])

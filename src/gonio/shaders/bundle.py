@@ -62,10 +62,12 @@ def bundle(
     lean: bool = False,
     on: Collection[str] = (),
     constants: bool = False,
+    arrays: bool = True,
     placement: Placement | None = None,
 ) -> Bundle:
     """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
 
+    arrays     whether numbered derived constants are arrays: the page passes them to its pixels one by one
     on         paths of weights that stay fields of a lean shader although they are switched off
     placement  prefix of the names, group and first number of the bindings
     """
@@ -76,7 +78,7 @@ def bundle(
         raise InputError("no material given", "emit", "name at least one, such as conductor")
     if language.standalone:
         return _file(models, language, functions, lean, place)
-    sources = [_recorded(one, functions, lean, on) for one in models]
+    sources = [_recorded(one, functions, lean, on, arrays=arrays) for one in models]
     module = Module(language, place, constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
     text = texts.joined(module.head, module.blocks, language, place.prefix)
@@ -102,7 +104,12 @@ def _file(
 
 
 def _recorded(
-    model: MaterialLike, functions: Sequence[str], lean: bool, on: Collection[str], single: bool = True
+    model: MaterialLike,
+    functions: Sequence[str],
+    lean: bool,
+    on: Collection[str],
+    single: bool = True,
+    arrays: bool = True,
 ) -> tuple[Program, dict[str, Json]]:
     """The parts of a material's shader, and the values of its numeric parameters by path."""
     model = material(model)
@@ -110,6 +117,6 @@ def _recorded(
     numbers = dict(numbers_of(model))  # raises for arrays of materials
     try:
         without = [path for path in switched_off(model) if path not in on] if lean else ()
-        return Program(model, functions, without, single), numbers
+        return Program(model, functions, without, single, arrays), numbers
     except graph.RecordingError as error:
         raise InputError(f"it cannot be written as shader code: {error.what}", error.where, error.hint) from error

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from .layout import INDENT, common_head, wrap
 from .names import Names
 from .program import Struct, flat, place
 from .source import returned_by
 from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
-from .values import Routine, Value, stem_of
+from .values import Member, Record, Routine, Value, members, stem_of
 
 INLINE = 88  # characters: a longer part of an expression gets a separate line
 # selections of existing values, which never get a separate line
@@ -29,6 +30,7 @@ class ExpressionWriter:
         self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
         self.locals: dict[int, str] = {}
         self.lines: list[str] = []
+        self.arrays: dict[str, int] = {}  # text of an array that exists -> its length
         self.built: dict[tuple, str] = {}
         self.holders: dict[str, Value] = {}  # name -> its current value
         self.first_lines: dict[str, int] = {}  # name -> index of the line that declares it
@@ -52,13 +54,25 @@ class ExpressionWriter:
                 if derived is not None and (rest or (entry and not derive)):
                     self._object(derived, "derived", rest)
                 continue
-            for parameter in (p for p in routine.parameters if place(p.static)[0] == argument):
-                if parameter in mine or entry:
-                    name = self.fresh(flat(parameter.static))
-                    self.parameter_names[parameter.order] = name
-                    if self.language.parameters_change:
-                        self.holders[name] = parameter
-                    self.heads.append((self.language.type(parameter.type), name))
+            given = [p for p in routine.parameters if place(p.static)[0] == argument and (p in mine or entry)]
+            for member in self._members(given):
+                self._plain(member, given[member.first : member.first + max(member.length, 1)])
+
+    def _members(self, parameters: Sequence[Value]) -> list[Member]:
+        """The arguments by which parameters are given."""
+        return members([(flat(p.static), p.type) for p in parameters], self.program.arrays)
+
+    def _plain(self, member: Member, parameters: list[Value]) -> None:
+        """An argument of the function: a number, a vector, or an array of them."""
+        name = self.fresh(member.name)
+        self.heads.append(self.names.declared(member, name))
+        if member.length:
+            self.arrays[name] = member.length
+            self.parameter_names |= {p.order: f"{name}[{index}]" for index, p in enumerate(parameters)}
+            return
+        self.parameter_names[parameters[0].order] = name
+        if self.language.parameters_change:
+            self.holders[name] = parameters[0]
 
     def _object(self, struct: Struct, name: str, parameters: list[Value]) -> None:
         name = self.fresh(name) if struct.record.name not in self.objects else self.objects[struct.record.name][1]
@@ -66,8 +80,15 @@ class ExpressionWriter:
             self.objects[struct.record.name] = (struct, name)
             self.heads.append((self.names.note(struct.record), name))
         for parameter in parameters:
-            field = flat(place(parameter.static)[1])
-            self.parameter_names[parameter.order] = f"{name}.{self.language.word(field)}"
+            self.parameter_names[parameter.order] = self._field(name, struct.record, flat(place(parameter.static)[1]))
+
+    def _field(self, owner: str, record: Record, field: str | int) -> str:
+        """The text of a struct's field, by its name or index."""
+        names = [name for name, _ in record.fields]
+        text, array, count = self.names.access(record, field if isinstance(field, int) else names.index(field))
+        if count:
+            self.arrays[f"{owner}.{array}"] = count
+        return f"{owner}.{text}"
 
     def fresh(self, name: str) -> str:
         """A name that is not used in this function."""
@@ -159,8 +180,7 @@ class ExpressionWriter:
         if op == "swizzle":
             return f"{self.part(args[0], ATOM)}.{value.static}", ATOM
         if op == "element":
-            field = value.args[0].static.record.fields[value.static][0]
-            return f"{self.part(args[0], ATOM)}.{self.language.word(field)}", ATOM
+            return self._field(self.part(args[0], ATOM), args[0].static.record, value.static), ATOM
         if op == "splat":
             return self.splat(args[0], value.type), SIGN
         if op == "vector":
@@ -279,8 +299,45 @@ class ExpressionWriter:
                             texts.append(self.object(wanted, fields))
                         given.add(wanted.record.name)
                 continue
-            texts += [self.unparenthesized(value.args[i]) for i in places if i in callee.used or entry]
+            chosen = [i for i in places if i in callee.used or entry]
+            for member in self._members([callee.parameters[i] for i in chosen]):
+                values = [value.args[i] for i in chosen[member.first : member.first + max(member.length, 1)]]
+                if member.length:
+                    texts.append(self._array(member, [self.splat(one, member.type) for one in values]))
+                else:
+                    texts.append(self.unparenthesized(values[0]))
         return texts
+
+    def _array(self, member: Member, parts: list[str], initializer: bool = False) -> str:
+        """An array by the texts of its entries: one that exists, or a new one.
+
+        initializer  whether the text stands in the braces of a declaration
+        """
+        stem = parts[0].removesuffix("[0]")
+        if self.arrays.get(stem) == len(parts) and parts == [f"{stem}[{index}]" for index in range(len(parts))]:
+            return stem
+        type_ = self.language.type(member.type)
+        text = self.language.array(type_, parts)
+        if self.language.array_literal or initializer:
+            return text
+        local = self.fresh(member.name)
+        self.lines += self.wrapped(self.language.local(*self.names.declared(member, local), text))
+        return local
+
+    def member_texts(self, record: Record, values: Sequence[Value | None]) -> list[str]:
+        """The texts of a struct's members by the values of its fields; None for a field that is not read."""
+        texts = []
+        for member in self.names.members(record):
+            parts = [
+                self.splat(value, member.type) if value is not None else self._zero(member.type)
+                for value in values[member.first : member.first + max(member.length, 1)]
+            ]
+            braces = not self.language.struct_literal
+            texts.append(self._array(member, parts, initializer=braces) if member.length else parts[0])
+        return texts
+
+    def _zero(self, type_: str) -> str:
+        return "0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM))
 
     def object(self, struct: Struct, fields: dict[str, tuple[Value, bool]]) -> str:
         """A struct as an argument: this function's own if it holds exactly these fields, or a new one."""
@@ -288,20 +345,19 @@ class ExpressionWriter:
         if name in self.objects:
             own = self.objects[name][1]
             if all(
-                self.parameter_names.get(v.order) == f"{own}.{self.language.word(field)}"
+                self.parameter_names.get(v.order) == self._field(own, struct.record, field)
                 for field, (v, used) in fields.items()
                 if used
             ):
                 return own
-        parts = []
-        for field, type_ in struct.record.fields:
+        values: list[Value | None] = []
+        for field, _ in struct.record.fields:
             given, used = fields.get(field, (None, False))
             if given is not None and given.op == "parameter" and given.order not in self.parameter_names:
                 self._late(given)
-            if given is not None and (used or given.order in self.parameter_names):
-                parts.append(self.splat(given, type_))
-            else:  # it is not read
-                parts.append("0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM)))
+            read = given is not None and (used or given.order in self.parameter_names)
+            values.append(given if read else None)
+        parts = self.member_texts(struct.record, values)
         key = (name, tuple(parts))
         if key not in self.built:
             local = self.fresh(common_head(parts) or name[0].lower() + name[1:])
@@ -321,7 +377,7 @@ class ExpressionWriter:
         struct = self.program.derived_of(value) if derived or isinstance(value, dict) else self.program.struct_of(value)
         if struct is not None and struct.record.name in self.objects and path in struct.paths:
             own = self.objects[struct.record.name][1]
-            self.parameter_names[parameter.order] = f"{own}.{self.language.word(flat(path))}"
+            self.parameter_names[parameter.order] = self._field(own, struct.record, flat(path))
 
 
 def _squares(value: Value) -> bool:

@@ -73,7 +73,10 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
         "derived": derived
         and {
             "struct": names.struct(derived.record),
-            "fields": [{"name": language.word(name), "type": type_} for name, type_ in derived.record.fields],
+            "fields": [
+                {"name": language.word(one.name), "type": f"{one.type}[{one.length}]" if one.length else one.type}
+                for one in names.members(derived.record)
+            ],
         },
         "functions": {method: names.routines[routine] for method, routine in made.entries.items()},
         "operations": {method: operations(routine) for method, routine in made.entries.items()},

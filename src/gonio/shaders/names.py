@@ -13,7 +13,7 @@ from .placement import Placement
 from .program import Routines, place
 from .source import module_constant
 from .syntax import literal
-from .values import Kind, Record, Routine, Value, check_single, stem_of
+from .values import Kind, Member, Record, Routine, Value, check_single, members, stem_of
 
 CONSTANTS = {"PI": math.pi, "TWO_PI": 2.0 * math.pi, "INV_PI": 1.0 / math.pi, "INV_TWO_PI": 0.5 / math.pi}
 
@@ -65,6 +65,21 @@ class Names:
     def struct(self, record: Record) -> str:
         """The public name of a struct."""
         return self.public(self.language.word(record.name))
+
+    def members(self, record: Record) -> list[Member]:
+        """The members by which a struct is declared and constructed."""
+        return members(record.fields, record.arrays and self.program.arrays)
+
+    def declared(self, member: Member, name: str = "") -> tuple[str, str]:
+        """(type, name) of the declaration of a member, or of a parameter of the function under a name of its own."""
+        type_, name = self.language.type(member.type), name or self.language.word(member.name)
+        return self.language.array_declaration(type_, name, member.length) if member.length else (type_, name)
+
+    def access(self, record: Record, index: int) -> tuple[str, str, int]:
+        """(how a field is selected, such as "c[3]", its member's name, and that member's count)."""
+        member = next(m for m in reversed(self.members(record)) if m.first <= index)
+        name = self.language.word(member.name)
+        return (f"{name}[{index - member.first}]" if member.length else name), name, member.length
 
     def _routine_name(self, routine: Routine, used: set[str]) -> str:
         name = self.language.word(stem_of(routine))

@@ -37,9 +37,14 @@ class Struct:
     """An argument made of fields: the parameters of a model, or quantities derived from them."""
 
     def __init__(
-        self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
+        self,
+        name: str,
+        fields: list[tuple[str, str]],
+        doc: str = "",
+        docs: dict[str, str] | None = None,
+        arrays: bool = False,
     ) -> None:
-        self.record = Record(name, [(flat(path), type_) for path, type_ in fields], doc, docs)
+        self.record = Record(name, [(flat(path), type_) for path, type_ in fields], doc, docs, arrays)
         self.paths = [path for path, _ in fields]
 
 
@@ -52,9 +57,11 @@ class Routines:
     bound     the material of symbols, if there is one
     tables    the tables that are read
     readings  for each table, by identity, how it is read: "lookup" or "fetch"
+    arrays    whether numbered constants are written as arrays
     """
 
     bound: BSDF | None = None
+    arrays: bool = True
     derives: str = ""  # name of the routine that computes derived values
 
     def __init__(self, graph_of_all: graph.Graph, single: bool) -> None:
@@ -124,7 +131,8 @@ class Routines:
             name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
         fields = [(_result_name(path, value), value.type) for path, value in routine.results]
         doc = inspect.getdoc(type(result)) or "" if hasattr(result, "_fields") else ""
-        routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)))
+        arrays = not hasattr(result, "_fields")  # named fields keep their names
+        routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)), arrays)
 
     def _tables(self) -> list[Table]:
         tables: dict[int, Table] = {}
@@ -150,9 +158,14 @@ class Program(Routines):
     bound: BSDF
 
     def __init__(
-        self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = (), single: bool = True
+        self,
+        model: BSDF,
+        functions: tuple[str, ...],
+        without: Sequence[str] = (),
+        single: bool = True,
+        arrays: bool = True,
     ) -> None:
-        self.model, self.without = model, tuple(without)
+        self.model, self.without, self.arrays = model, tuple(without), arrays
         self.bound = recording.symbols(model, self.without)
         super().__init__(recorded(self.bound, functions, single), single)
         stem = graph.class_name(model)
@@ -187,7 +200,7 @@ class Program(Routines):
                 name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
                 by = f"{graph.class_name(self.model)}_derive"
                 doc = f"Quantities that depend on the parameters alone: {by} computes them, once per draw."
-                self._derived[key] = Struct(name, fields, doc)
+                self._derived[key] = Struct(name, fields, doc, arrays=True)
         derive = self.entries.get("derive")
         if derive is None:
             return

@@ -70,7 +70,7 @@ def _head(made: Program, language: Python) -> list[str]:
 
 
 def _struct(record: Record, names: Names) -> list[str]:
-    fields = [("", names.language.word(name)) for name, _ in record.fields] or [("", "nothing")]
+    fields = [("", names.language.word(one.name)) for one in names.members(record)] or [("", "nothing")]
     head, *rest = names.language.struct(names.struct(record), fields)
     return [head, *docstring(record.doc.strip().splitlines()), *rest]
 

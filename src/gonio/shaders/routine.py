@@ -67,7 +67,7 @@ class RoutineWriter(ExpressionWriter):
         called = self._forwarded()
         if called is not None:
             return self.wrapped(f"return {self.statement(called)}{self.language.end}")
-        parts = [self.splat(value, type_) for value, (_, type_) in zip(values, record.fields, strict=True)]
+        parts = self.member_texts(record, values)
         name = self.names.note(record)
         if self.language.struct_literal:
             return self.wrapped(f"return {name}({', '.join(parts)}){self.language.end}")

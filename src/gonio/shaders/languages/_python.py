@@ -41,6 +41,12 @@ class Python(Language):
     }
     reserved = frozenset([*keyword.kwlist, *dir(builtins), *_OWN.split()])
 
+    def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
+        return type_, name
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        return f"({', '.join(parts)})"
+
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
         return f"def {name}({', '.join(p for _, p in parameters)}):"
 

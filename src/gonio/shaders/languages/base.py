@@ -25,6 +25,7 @@ class Language:
     overloads            whether functions of one name may differ in their types
     parameters_change    whether a function may assign to a parameter
     struct_literal       whether `Name(a, b)` constructs a struct inside an expression
+    array_literal        whether `array` is an expression, not only the value of a declaration
     end                  the end of a statement
     single               whether all values are float32
     standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
@@ -64,6 +65,7 @@ class Language:
     overloads: ClassVar[bool] = True
     parameters_change: ClassVar[bool] = True
     struct_literal: ClassVar[bool] = True
+    array_literal: ClassVar[bool] = True
     groups: ClassVar[bool] = False
     end: ClassVar[str] = ";"
     single: ClassVar[bool] = True
@@ -78,6 +80,14 @@ class Language:
     def word(self, name: str) -> str:
         """A name that the language does not reserve."""
         return PREFERRED.get(name, name + "_") if name in self.reserved else name
+
+    def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
+        """(type, name) that declare an array."""
+        return type_, f"{name}[{count}]"
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        """An array of values."""
+        return f"{type_}[{len(parts)}]({', '.join(parts)})"
 
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
         """The head of a function, with its opening brace; parameters are (type, name)."""

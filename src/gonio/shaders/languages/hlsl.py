@@ -64,7 +64,11 @@ class HLSL(Language):
     mix = "lerp"
     reserved = frozenset(_RESERVED.split())
     struct_literal = False
+    array_literal = False
     groups = True
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        return f"{{ {', '.join(parts)} }}"
 
     def constant(self, name: str, text: str) -> str:
         return f"static const float {name} = {text};"

@@ -47,6 +47,12 @@ class MSL(Language):
     reserved = frozenset(_RESERVED.split())
     struct_literal = False
 
+    def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
+        return f"array<{type_}, {count}>", name
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        return f"array<{type_}, {len(parts)}>{{{', '.join(parts)}}}"
+
     def constant(self, name: str, text: str) -> str:
         return f"static constexpr constant float {name} = {text};"
 

@@ -47,6 +47,12 @@ class TSL(Language):
     parameters_change = False
     methods = True
 
+    def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
+        return type_, name
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        return f"[{', '.join(parts)}]"
+
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
         return f"export function {name}({', '.join(p for _, p in parameters)}) {{"
 

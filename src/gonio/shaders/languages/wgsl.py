@@ -57,6 +57,12 @@ class WGSL(Language):
     templates = True
     groups = True
 
+    def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
+        return f"array<{type_}, {count}>", name
+
+    def array(self, type_: str, parts: list[str]) -> str:
+        return f"array<{type_}, {len(parts)}>({', '.join(parts)})"
+
     def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
         return f"fn {name}({', '.join(f'{p}: {type_}' for type_, p in parameters)}) -> {result} {{"
 

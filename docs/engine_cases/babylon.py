@@ -1,0 +1,239 @@
+"""Babylon.js: furnaces, the angle that scales its diffuse lobe, the energy of its clear coat, and causes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from gonio.catalog.shaders import files
+
+from .base import Engine, Furnace, asymmetry, furnace, material, single_scattering
+
+INTRO = """PBRMaterial of the WebGL engine under directional lights: the package's own fragment program,
+`Shaders/pbr.fragment.js`, for a flat surface without maps, with the defines that the class sets. `babylon-standard`
+has the defaults of `new PBRMaterial`; `babylon-conserving` has `brdf.useLegacySpecularEnergyConservation = false`.
+Light from an environment map takes another path and is not judged here. White metal is within 1% of 1 at all
+roughnesses and angles: the best of the engines judged here."""
+
+_LOW = 0.1  # cosine of view and light for the diffuse lobe at grazing angles
+
+
+def trials(folder: Path) -> dict[str, float]:
+    """The diffuse lobe by the half vector, the coat by its base, the sheen's table, and metal without compensation."""
+    figures = _diffuse(folder) | _coat(folder)
+    table = np.load(folder / "environmentBrdf.npy")
+    figures["asymmetry"] = asymmetry(material(folder, "babylon-standard", rough=0.5))
+    try:
+        np.save(folder / "environmentBrdf.npy", np.ones_like(table))  # E = 1: no compensation
+        files.forget()
+        figures["none_asymmetry"] = asymmetry(material(folder, "babylon-standard", rough=0.5))
+    finally:
+        np.save(folder / "environmentBrdf.npy", table)
+        files.forget()
+    for width in (0.1, 0.25):
+        sheened = furnace(material(folder, "babylon-sheen", rough=0.5, sheenRough=width), (0.05,))[0]
+        kept = 1.0 - _lookup(table, width, 0.05)[2]
+        lobe = sheened - kept * furnace(material(folder, "babylon-standard", rough=0.5, metal=0.0), (0.05,))[0]
+        figures |= {f"sheen_{width:.0%}"[:-1]: lobe, f"sheen_taken_{width:.0%}"[:-1]: 1.0 - kept}
+    texels = [(r, c) for r in (0.25, 0.5, 0.75, 1.0) for c in (0.1, 0.5, 1.0)]
+    exact = [single_scattering(min(float(np.sqrt(r * r + 5e-4)), 1.0), (c,))[0] for r, c in texels]
+    figures["table"] = max(abs(_lookup(table, r, c)[1] / e - 1.0) for (r, c), e in zip(texels, exact, strict=True))
+    return figures | _smooth(folder)
+
+
+def _lookup(table: np.ndarray, rough: float, cosine: float) -> np.ndarray:
+    """The table with linear filter; rows by roughness, columns by n.v."""
+    count = table.shape[0]
+    row, column = (np.clip(x * count - 0.5, 0.0, count - 1.001) for x in (rough, cosine))
+    r, c = int(row), int(column)
+    both = table[r : r + 2, c : c + 2]
+    rows = both[0] * (1.0 - row + r) + both[1] * (row - r)
+    return np.asarray(rows[0] * (1.0 - column + c) + rows[1] * (column - c))
+
+
+def _diffuse(folder: Path) -> dict[str, float]:
+    """How the diffuse lobe of a white dielectric depends on the half vector, and shares of gloss and diffuse lobe."""
+    random = np.random.default_rng(1)
+    z, phi = random.uniform(0.05, 1.0, (2, 2000)), random.uniform(0.0, 2.0 * np.pi, (2, 2000))
+    wo, wi = (np.stack([np.sqrt(1 - c * c) * np.cos(p), np.sqrt(1 - c * c) * np.sin(p), c], -1)
+              for c, p in zip(z, phi, strict=True))  # fmt: skip
+    side = np.sqrt(1.0 - _LOW * _LOW)
+    wo[:2] = (side, 0.0, _LOW)
+    wi[:2] = (side, 0.0, _LOW), (-side, 0.0, _LOW)
+    lobes = [material(folder, "babylon-conserving", rough=0.5, color=color) for color in (1.0, 0.0)]
+    white, black = (np.asarray(one.eval(wo, wi, precision="float64"))[:, 0] for one in lobes)
+    kept = (white - black) * np.pi / wi[:, 2]
+    half = wo + wi
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    own, meant = (1.0 - (0.04 + 0.96 * (1.0 - c) ** 5) for c in (half[:, 2], np.sum(half * wo, axis=1)))
+    figures = {
+        "own_off": float(np.max(np.abs(kept - own))),
+        "meant_off": float(np.max(np.abs(kept - meant))),
+        "beside": float(kept[0]),
+        "opposite": float(kept[1]),
+        "beside_meant": float(meant[0]),
+        "opposite_meant": float(meant[1]),
+    }
+    for name in ("standard", "conserving"):
+        gloss, whole = (furnace(material(folder, f"babylon-{name}", rough=0.1, metal=0.0, color=color), (0.05,))[0]
+                        for color in (0.0, 1.0))  # fmt: skip
+        figures |= {"gloss": gloss, f"diffuse_{name}": whole - gloss}
+    return figures
+
+
+def _coat(folder: Path) -> dict[str, float]:
+    """Shares of coat and base; and a rough coat away from the highlight of a smooth metal, white over black."""
+    bare = furnace(material(folder, "babylon-standard", rough=0.5, metal=0.0), (0.05,))[0]
+    settings = {"rough": 0.5, "metal": 0.0, "coatRough": 0.1}
+    whole = furnace(material(folder, "babylon-coat", **settings), (0.05,))[0]
+    black = furnace(material(folder, "babylon-coat", color=0.0, **settings), (0.05,))[0]
+    figures = {"coated": whole, "coated_black": black, "bare": bare}
+    wo, wi = np.array([[0.0, 0.0, 1.0]]), np.array([[np.sqrt(0.5), 0.0, np.sqrt(0.5)]])
+    over, above = (
+        float(material(folder, "babylon-coat", rough=0.0, metal=1.0, coatRough=1.0, color=color).eval(wo, wi)[0, 0])
+        for color in (1.0, 0.0)
+    )
+    energy = single_scattering(1.0, (1.0,))[0]
+    return figures | {
+        "coat_ratio": over / above,
+        "coat_factor": 1.0 / energy,
+        "coat_meant": 1 + 0.04 * (1 / energy - 1),
+    }
+
+
+def _smooth(folder: Path) -> dict[str, float]:
+    """The center of the lobe at roughness 0 in 32 bits, over that in 64."""
+    cosine = np.sqrt(0.5)
+    wo, wi = (np.array([[sign * cosine, 0.0, cosine]]) for sign in (1.0, -1.0))
+    mirror = material(folder, "babylon-standard", rough=0.0, metal=0.0)
+    single, double = (float(mirror.eval(wo, wi, precision=bits)[0, 0]) for bits in ("float32", "float64"))
+    return {"smooth": single / double}
+
+
+def sections(figures: dict[str, dict[str, float]]) -> str:
+    """The angle of the diffuse lobe's factor, and the coat's energy."""
+    last = list(figures.values())[-1]
+    return f"""## The diffuse lobe is reduced by F at n.h
+
+Without legacy conservation `lightFragment` multiplies `info.diffuse` by 1 minus `fresnelSchlickGGX(NdotH, ...)`, where
+the specular lobe takes F at `preInfo.VdotH`. The angle of incidence on a facet is that between v and h. With n.h the
+formula (1 - F) / pi gives the shader's diffuse lobe within {last["own_off"]:.0e} for 2,000 random pairs, with v.h they
+differ by up to {last["meant_off"]:.2f}. White paper seen at n.v 0.1, in units of a white Lambertian surface:
+
+| lamp at n.l 0.1 | F at n.h, as it is | F at v.h |
+|---|---|---|
+| beside the viewer | {last["beside"]:.3f} | {last["beside_meant"]:.3f} |
+| opposite, where gloss is strongest | {last["opposite"]:.3f} | {last["opposite_meant"]:.3f} |
+
+The diffuse lobe keeps most where gloss takes most. Remedy: `preInfo.VdotH` in place of `NdotH`, in `lightFragment`,
+`pbrClusteredLightingFunctions` and `openpbrDirectLighting`, also in the WGSL chunks of the same names; or 1 minus the
+albedo of the specular lobe at n.v, as `pbrBlockFinalLitComponents` does for `finalIrradiance`.
+
+## The clear coat is compensated with the F0 of its base
+
+`clearcoatBlock` passes `outParams.specularEnvironmentR0` to `getEnergyConservationFactor`: 1 + F0 (1 / E - 1) with the
+F0 of the base, while the coat reflects 0.04 at normal incidence. A coat of roughness 1 over white metal is
+{last["coat_ratio"]:.2f} times as bright as the same coat over black, away from the highlight of the base; 1 / E is
+{last["coat_factor"]:.2f}, and the factor for F0 = 0.04 is {last["coat_meant"]:.2f} over any base.
+Remedy: `vec3(vClearCoatRefractionParams.x)` in place of `outParams.specularEnvironmentR0`."""
+
+
+CAUSES = {
+    (
+        "babylon-standard",
+        "reciprocity",
+    ): "`getEnergyConservationFactor` depends on n.v alone, which gives up reciprocity "
+    "for energy. Without it (E = 1 in the table) f(wo, wi) and f(wi, wo) differ by {none_asymmetry:.0e} instead of "
+    "{asymmetry:.2f}. It matters to path tracers, not to a rasterizer.",
+    (
+        "babylon-standard",
+        "energy",
+    ): "E in the table, which is stored with 8 bits and a common divisor, is wrong by up to "
+    "{table:.1%} at roughness 0.25 and more. The size is invisible.",
+    (
+        "babylon-standard",
+        "precision",
+    ): "`normalDistributionFunction_TrowbridgeReitzGGX` computes `NdotH^2 (a2 - 1) + 1`, "
+    "the difference of two numbers near 1 at the center of the lobe. `MINIMUMVARIANCE` of 0.0005 lets a2 fall to "
+    "2.5e-7, four roundings of 1: at roughness 0 and 45 degrees the center of the highlight is {smooth:.2f} times what "
+    "the formula means. Remedy: 1 - NdotH^2 as the squared length of cross(n, h), as in Filament.",
+    ("babylon-standard(metal=0)", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
+    ("babylon-standard(metal=0)", "reciprocity"): "As for metal; the factor is 1 + 0.04 (1 / E - 1).",
+    ("babylon-standard(metal=0)", "precision"): "As for metal.",
+    ("babylon-conserving", "energy"): "Gloss over a white base, and F at n.h (above).",
+    ("babylon-conserving", "reciprocity"): "As for the standard material.",
+    ("babylon-conserving", "precision"): "As for the standard material.",
+    ("babylon-conserving", "linearity"): "As for the coat: F0 of a mixed metal enters by its square.",
+    ("babylon-coat", "reciprocity"): "As for the standard material.",
+    ("babylon-coat", "energy"): "Gloss over a white base: see the furnace of the clear coat.",
+    ("babylon-coat", "pdf"): "No density of the engine's is judged here: the guide of Gonio, which stands in for one.",
+    (
+        "babylon-coat",
+        "linearity",
+    ): "`getR0RemappedForClearCoat` is a polynomial of the third order in the base's color; "
+    "besides, F0 is multiplied by 1 + F0 (1 / E - 1). It follows from the model.",
+    ("babylon-coat", "precision"): "As for the standard material, for the coat's lobe too.",
+    ("babylon-sheen", "reciprocity"): "`sheenAlbedoScaling` and `getEnergyConservationFactor` depend on n.v alone.",
+    (
+        "babylon-sheen",
+        "energy",
+    ): "Gloss over a white base. At grazing angles the sheen adds: at sheen roughness 0.1 and "
+    "n.v 0.05 the lobe reflects {sheen_10:.2f}, while the table, by which the base is reduced, has "
+    "{sheen_taken_10:.2f}; at 0.25 it is {sheen_25:.2f} and {sheen_taken_25:.2f}.",
+    ("babylon-sheen", "precision"): "As for the standard material.",
+    ("babylon-anisotropic", "reciprocity"): "As for the standard material.",
+    ("babylon-anisotropic", "energy"): "As for the standard material, and the table is read at `roughness`.",
+    ("babylon-anisotropic", "precision"): "As for the standard material.",
+}
+
+ENGINE = Engine(
+    package="@babylonjs/core",
+    page="babylon",
+    title="Babylon.js",
+    home="https://github.com/BabylonJS/Babylon.js",
+    intro=INTRO,
+    materials=(
+        "babylon-standard",
+        "babylon-standard(metal=0)",
+        "babylon-conserving",
+        "babylon-coat",
+        "babylon-sheen",
+        "babylon-anisotropic",
+    ),
+    furnaces=(
+        Furnace("White metal", "babylon-standard", lambda r: {"rough": r}),
+        Furnace("White dielectric", "babylon-standard", lambda r: {"rough": r, "metal": 0.0}),
+        Furnace("White dielectric, legacy conservation off", "babylon-conserving", lambda r: {"rough": r}),
+        Furnace("White, half metal", "babylon-standard", lambda r: {"rough": r, "metal": 0.5}),
+        Furnace("White metal, anisotropy 0.7", "babylon-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
+        Furnace(
+            "White dielectric, clear coat of this roughness",
+            "babylon-coat",
+            lambda r: {"rough": 0.5, "coatRough": r},
+        ),
+        Furnace(
+            "White dielectric, white sheen of this roughness",
+            "babylon-sheen",
+            lambda r: {"rough": 0.5, "sheenRough": r},
+        ),
+    ),
+    remarks={
+        "White dielectric": "By default the diffuse lobe is scaled by 1 - 0.04 at all angles: at roughness 0.1 and n.v "
+        "0.05 gloss alone returns {gloss:.2f}, and the diffuse lobe keeps {diffuse_standard:.2f}.",
+        "White dielectric, legacy conservation off": "At the same angle the diffuse lobe keeps "
+        "{diffuse_conserving:.2f}: see the angle of F below. Light from an environment map is reduced by the albedo of "
+        "the specular lobe instead.",
+        "White, half metal": "F0 is mixed before the compensation, 1 + F0 (1 / E - 1), which is meant for one F0.",
+        "White metal, anisotropy 0.7": "The table is read at `roughness`, while the lobe is wider along the tangent.",
+        "White dielectric, clear coat of this roughness": "At roughness 0.1 and n.v 0.05 coat and gloss over a black "
+        "base return {coated_black:.2f}; the white base, which returns {bare:.2f} without coat, is scaled by 1 - "
+        "F(v.h) of each light. At grazing angles most lights have a large v.h and a small F, while all lights together "
+        "reflect far more. At normal incidence the coat scales the base by 0.96, and adds less than it takes.",
+        "White dielectric, white sheen of this roughness": "With `sheen.albedoScaling`; for narrow sheen see *energy* "
+        "below.",
+    },
+    trials=trials,
+    sections=sections,
+    causes=CAUSES,
+    programs=("babylon-furnace.html",),
+)

@@ -1,0 +1,2 @@
+// The engine chooses between uniforms one by one, as here, and a uniform buffer.
+#include <pbrFragmentDeclaration>
