@@ -88,7 +88,7 @@ def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
 
 def test_relative_residuals_have_the_derivative_that_noise_cannot_bias() -> None:
     dr, types = backend.drjit(), backend.types("float64")
-    f = np.geomspace(1e-3, 30.0, 400)
+    f = np.append(0.0, np.geomspace(1e-3, 30.0, 400))
     for v in (-5.0, -0.2, 0.0, 1.0):
         model = backend.float_of(f, types)
         dr.enable_grad(model)
@@ -97,6 +97,14 @@ def test_relative_residuals_have_the_derivative_that_noise_cannot_bias() -> None
         score = backend.to_numpy(dr.detach(residual) * dr.grad(residual), len(f))  # of rho = r^2 / 2
         difference = np.clip((v - f) / (f + 0.1), -1.0, 1.0)
         np.testing.assert_allclose(score, -difference / (f + 0.1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("loss", ["relative", "log", "log1p"])
+def test_a_color_that_starts_at_0_does_not_stay_there(loss: str) -> None:
+    cells = data.data_of(table(go.Lambert((0.02, 0.4, 0.9)), shape=(8, 8, 8)))
+    material, moving = moving_of("lambert")
+    found = solver.solve(solver.Problem(material, moving, cells, loss), np.zeros(3))
+    np.testing.assert_allclose(found.numbers, (0.02, 0.4, 0.9), rtol=0.02)
 
 
 def test_a_model_of_0_is_no_solution() -> None:

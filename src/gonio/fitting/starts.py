@@ -36,14 +36,14 @@ def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
     return starts[:STARTS] + random_starts(first, free)
 
 
-def random_starts(first: Floats, free: list[Free]) -> list[Floats]:
+def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: int = 23) -> list[Floats]:
     """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`."""
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)
-    rng = np.random.default_rng(23)
+    rng = np.random.default_rng(seed)
     starts = []
-    for _ in range(RANDOM):
+    for _ in range(count):
         share = rng.random(len(first))
         with np.errstate(divide="ignore", invalid="ignore"):
             starts.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
