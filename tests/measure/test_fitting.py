@@ -15,6 +15,7 @@ from gonio.fitting import batch, data, solver
 from gonio.fitting.certainty import degrees_of_freedom
 from gonio.fitting.fit import fit, modelled, moving_of
 from gonio.fitting.parameters import free_of, start_of
+from gonio.fitting.starts import starts_of
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
@@ -105,6 +106,13 @@ def test_a_color_that_starts_at_0_does_not_stay_there(loss: str) -> None:
     material, moving = moving_of("lambert")
     found = solver.solve(solver.Problem(material, moving, cells, loss), np.zeros(3))
     np.testing.assert_allclose(found.numbers, (0.02, 0.4, 0.9), rtol=0.02)
+
+
+def test_starts_have_several_widths_of_a_lobe_with_a_roughness() -> None:
+    material, moving = moving_of("disney")
+    at = [name for one in moving for name in one.names].index("roughness")
+    found = {round(float(start[at]) ** 2, 6) for start in starts_of(material, moving)}
+    assert found >= {0.03, 0.1, 0.3, 0.7}
 
 
 def test_a_model_of_0_is_no_solution() -> None:
