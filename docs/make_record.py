@@ -43,6 +43,8 @@ WRITTEN = (
     "docs/phong-limits.md",  # make_phong_limits.py
     "docs/published-fits.md",  # make_published_fits.py
     "docs/published-fits/cards.json",
+    "docs/rgl-fits.md",  # make_rgl_fits.py
+    "docs/rgl-fits/fits.json",
     "docs/report-cards/*.*",  # make_report_cards.py
     "docs/report-cards/programs/*.py",
     "docs/thin-film.md",  # make_thin_film.py

@@ -22,6 +22,7 @@ from gonio.bridge.faults.black_environment import is_black_environment
 from gonio.bridge.faults.interrupted_recording import interruptible
 from gonio.bridge.faults.lost_derivatives import own_variable
 from gonio.bridge.faults.merged_mesh_bbox import compute_boxes
+from gonio.bridge.faults.ray_offset import Offsets
 from gonio.bridge.faults.rotated_sphere_normal import with_radial_normal
 from gonio.bridge.faults.shadow_ray_gap import shadow_ray_to
 from gonio.bridge.faults.textured_area_light import must_sample_by_area
@@ -96,8 +97,20 @@ def test_a_rotated_sphere_returns_the_normal_of_another() -> None:
 def test_rays_end_before_the_point_that_they_go_to() -> None:
     si, point = at(0, 0, 0), mi.Point3f(0, 0, 1)
     assert float(si.spawn_ray_to(point).maxt[0]) < 0.9995
-    ray = shadow_ray_to(si, point)
+    ray = shadow_ray_to(Offsets(mi, mi.load_dict({"type": "scene", "ball": {"type": "sphere"}})), si, point)
     assert float(ray(ray.maxt).z[0]) == pytest.approx(1, abs=1e-5)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_rays_begin_far_off_the_surfaces_of_a_small_scene(size: float) -> None:
+    si, up = at(0.0, 0.0, size), mi.Vector3f(0, 0, 1)
+    assert float(si.spawn_ray(up).o.z[0]) - size == pytest.approx((1 + size) * mi.math.RayEpsilon, rel=0.05)
+    ball = {"type": "sphere", "to_world": T().scale(size)}
+    offsets = Offsets(mi, mi.load_dict({"type": "scene", "ball": ball}))
+    for direction, side in ((up, 1.0), (-up, -1.0)):
+        away = float(offsets.ray(si, direction).o.z[0]) / size - 1.0
+        unit = min(1 / 16, 1 / size)
+        assert away == pytest.approx(side * (1 + unit) * mi.math.RayEpsilon, rel=0.05)
 
 
 def test_the_thin_lens_sends_less_than_nothing_behind_it() -> None:

@@ -208,6 +208,14 @@ def test_a_model_s_cells_hold_its_values_at_their_middles(tmp_path: Path) -> Non
     assert np.allclose(table.values.reshape(-1, 3)[some], exact, rtol=1e-9, atol=1e-12)
 
 
+def test_what_a_table_of_one_value_for_both_orders_loses_is_said(tmp_path: Path) -> None:
+    def notes(material: str, name: str) -> str:
+        return " ".join(go.measure(material, tmp_path / name).notes)
+
+    assert "exchanging both directions changes f by" in notes("phong", "a.binary")
+    assert "exchanging" not in notes("phong", "a.gonio") + notes("oren-nayar", "b.binary")
+
+
 def test_noise_is_as_large_as_asked_and_its_error_is_known() -> None:
     plain, noisy = (go.measure("lambert", table="samples", noise=noise) for noise in (0.0, 0.05))
     off = values(noisy.table) / values(plain.table) - 1.0

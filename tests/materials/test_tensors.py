@@ -135,6 +135,62 @@ def test_parameters_of_numpy_belong_to_the_material() -> None:
         GOLD.eval(WO, WI, parameters={"alpha": 0.2})
 
 
-def test_samples_take_arrays(torch: Any) -> None:
-    with pytest.raises(go.InputError, match="tensors of PyTorch or JAX in sample"):
-        GOLD.sample(torch.tensor(WO), torch.tensor(WI))
+U = np.random.default_rng(5).random((len(WO), 3))
+
+
+def test_f_of_tensors_is_that_of_arrays_and_0_at_the_horizon(torch: Any) -> None:
+    level = torch.tensor([[1.0, 0.0, 0.0]], dtype=torch.float64, requires_grad=True)
+    assert (GOLD.f(torch.tensor(WO[:1]), level) == 0.0).all()
+    alpha = torch.tensor(0.3, dtype=torch.float64, requires_grad=True)
+    value = GOLD.f(torch.tensor(WO), torch.tensor(WI), parameters={"alpha": alpha})
+    np.testing.assert_allclose(value.detach().numpy(), GOLD.f(WO, WI, precision="float64"), rtol=1e-14)
+    value.sum().backward()
+    rows = GOLD.eval(WO, WI, derivatives=["alpha"], precision="float64")[1] / WI[:, 2:]
+    np.testing.assert_allclose(alpha.grad.numpy(), rows.sum(), rtol=1e-10)
+
+
+def test_f_of_arrays_has_any_shape() -> None:
+    shaped = GOLD.f(WO.reshape(8, 8, 3), WI.reshape(8, 8, 3))
+    np.testing.assert_array_equal(shaped.reshape(-1, 3), GOLD.f(WO, WI))
+
+
+GLASS = go.Dielectric(eta=1.5, alpha=0.2)
+DRAWN = ("wi", "weight", "pdf", "eta")
+
+
+def total_of(drawn: Any) -> Any:
+    """A number that depends on every result with derivatives."""
+    return (drawn.wi[..., 0] + drawn.weight[..., 1] * drawn.pdf + drawn.eta).sum()
+
+
+def change(material: go.BSDF, path: str, value: float, step: float = 1e-6) -> float:
+    """The derivative of `total_of` by a parameter at fixed random numbers, by differences."""
+    either = [
+        total_of(go.material(material, **{path: value + s}).sample(WO, U, precision="float64")) for s in (step, -step)
+    ]
+    return float(either[0] - either[1]) / (2.0 * step)
+
+
+@pytest.mark.parametrize(("material", "path", "value"), [(GOLD, "alpha", 0.3), (GLASS, "eta", 1.5)])
+def test_samples_of_tensors_have_gradients_at_fixed_numbers(
+    torch: Any, material: go.BSDF, path: str, value: float
+) -> None:
+    given = torch.tensor(value, dtype=torch.float64, requires_grad=True)
+    drawn = material.sample(torch.tensor(WO), torch.tensor(U), parameters={path: given})
+    plain = material.sample(WO, U, precision="float64")
+    for name in (*DRAWN, "delta"):
+        np.testing.assert_array_equal(getattr(drawn, name).detach().numpy(), getattr(plain, name))
+    assert drawn.delta.dtype == torch.bool and not drawn.delta.requires_grad
+    total_of(drawn).backward()
+    np.testing.assert_allclose(given.grad.numpy(), change(material, path, value), rtol=1e-4)
+
+
+def test_samples_of_jax_have_gradients_also_compiled(jax: Any) -> None:
+    wo, u = jax.numpy.asarray(WO), jax.numpy.asarray(U)
+
+    def total(alpha: Any) -> Any:
+        return total_of(GOLD.sample(wo, u, parameters={"alpha": alpha}))
+
+    for gradient in (jax.grad(total), jax.jit(jax.grad(total))):
+        np.testing.assert_allclose(gradient(jax.numpy.float64(0.3)), change(GOLD, "alpha", 0.3), rtol=1e-4)
+    assert GOLD.f(wo, jax.numpy.asarray(WI)).shape == WO.shape

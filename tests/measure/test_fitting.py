@@ -15,6 +15,7 @@ from gonio.fitting import batch, data, solver
 from gonio.fitting.certainty import degrees_of_freedom
 from gonio.fitting.fit import fit, modelled, moving_of
 from gonio.fitting.parameters import free_of, start_of
+from gonio.fitting.starts import starts_of
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
@@ -88,7 +89,7 @@ def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
 
 def test_relative_residuals_have_the_derivative_that_noise_cannot_bias() -> None:
     dr, types = backend.drjit(), backend.types("float64")
-    f = np.geomspace(1e-3, 30.0, 400)
+    f = np.append(0.0, np.geomspace(1e-3, 30.0, 400))
     for v in (-5.0, -0.2, 0.0, 1.0):
         model = backend.float_of(f, types)
         dr.enable_grad(model)
@@ -97,6 +98,21 @@ def test_relative_residuals_have_the_derivative_that_noise_cannot_bias() -> None
         score = backend.to_numpy(dr.detach(residual) * dr.grad(residual), len(f))  # of rho = r^2 / 2
         difference = np.clip((v - f) / (f + 0.1), -1.0, 1.0)
         np.testing.assert_allclose(score, -difference / (f + 0.1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("loss", ["relative", "log", "log1p"])
+def test_a_color_that_starts_at_0_does_not_stay_there(loss: str) -> None:
+    cells = data.data_of(table(go.Lambert((0.02, 0.4, 0.9)), shape=(8, 8, 8)))
+    material, moving = moving_of("lambert")
+    found = solver.solve(solver.Problem(material, moving, cells, loss), np.zeros(3))
+    np.testing.assert_allclose(found.numbers, (0.02, 0.4, 0.9), rtol=0.02)
+
+
+def test_starts_have_several_widths_of_a_lobe_with_a_roughness() -> None:
+    material, moving = moving_of("disney")
+    at = [name for one in moving for name in one.names].index("roughness")
+    found = {round(float(start[at]) ** 2, 6) for start in starts_of(material, moving)}
+    assert found >= {0.03, 0.1, 0.3, 0.7}
 
 
 def test_a_model_of_0_is_no_solution() -> None:

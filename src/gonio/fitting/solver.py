@@ -46,7 +46,12 @@ def metric(name: str, value: Array, floor: Array) -> Array:
     if name == "cuberoot":
         size = dr.maximum(dr.abs(value), 1e-9)
         return dr.copysign(dr.exp(dr.log(size) / 3.0), value)
-    return dr.copysign(dr.log(1.0 + dr.abs(value) / (1.0 if name == "log1p" else floor)), value)
+    return dr.copysign(dr.log(1.0 + _size(value) / (1.0 if name == "log1p" else floor)), value)
+
+
+def _size(value: Array) -> Array:
+    """|value| with a derivative of 1 at 0: that of `abs` is 0 there, so a color that reaches 0 would stay."""
+    return backend.drjit().select(value < 0.0, -value, value)
 
 
 def deviance(model: Array, value: Array, floor: Array) -> Array:
@@ -65,7 +70,7 @@ def deviance(model: Array, value: Array, floor: Array) -> Array:
     constant is that of -c / 2, since no model is negative.
     """
     dr = backend.drjit()
-    size = dr.abs(model)
+    size = _size(model)
     nearest = dr.maximum(value, -0.5 * floor)
     share = dr.maximum(value + floor, 0.0) / (nearest + floor)
     u = (nearest - size) / (size + floor)

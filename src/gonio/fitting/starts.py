@@ -24,30 +24,45 @@ def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
     open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
     firsts = [first, *(np.where(open_ended, value, first) for value in INDICES if open_ended.any())]
     places = np.cumsum([0, *(one.count for one in free)])
-    lobes = [int(at) for at, one in zip(places, free, strict=False) if one.kind == "alpha" or _exponent(one)]
+    lobes = [int(at) for at, one in zip(places, free, strict=False) if _is_width(one)]
     for widths in itertools.combinations_with_replacement(WIDTHS, len(lobes)):
         for begin in firsts:
             other = begin.copy()
             for at, width in zip(lobes, widths, strict=True):
                 one = free[int(np.searchsorted(places, at, side="right")) - 1]
-                value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
-                other[at] = np.clip(value, one.low, one.high)
+                other[at] = np.clip(_of_width(one, width), one.low, one.high)
             starts.append(other)
     return starts[:STARTS] + random_starts(first, free)
 
 
-def random_starts(first: Floats, free: list[Free]) -> list[Floats]:
+def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: int = 23) -> list[Floats]:
     """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`."""
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)
-    rng = np.random.default_rng(23)
+    rng = np.random.default_rng(seed)
     starts = []
-    for _ in range(RANDOM):
+    for _ in range(count):
         share = rng.random(len(first))
         with np.errstate(divide="ignore", invalid="ignore"):
             starts.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
     return starts
+
+
+def _is_width(one: Free) -> bool:
+    return one.kind == "alpha" or _exponent(one) or _rough(one)
+
+
+def _of_width(one: Free, width: float) -> float:
+    """The value of a parameter at which a lobe has this width."""
+    if one.kind == "alpha":
+        return width
+    return float(np.sqrt(width)) if _rough(one) else 2.0 / (width * width)  # a cosine's power of that width
+
+
+def _rough(one: Free) -> bool:
+    """Whether alpha is the square of the parameter, as in principled materials."""
+    return one.kind == "float" and one.path.rpartition(".")[2].endswith("roughness") and one.high <= 1.0
 
 
 def _exponent(one: Free) -> bool:

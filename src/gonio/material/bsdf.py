@@ -30,7 +30,7 @@ from ..errors import InputError, did_you_mean
 from ..members import Family, subclasses_of
 from ..ops import Direction, Mask, Mode, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
-from . import binding, equality, notebook, recording, tree
+from . import binding, equality, notebook, recording, tensors, tree
 from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
 from .constructing import accepted, with_pair
@@ -359,12 +359,32 @@ class BSDF(Material):
     def f(self, wo: V3, wi: V3, mode: Mode = ..., precision: Precision | None = ...) -> V3: ...
     @overload
     def f(self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...) -> Floats: ...
-    def f(self, wo: Given, wi: Given, mode: Mode = "radiance", precision: Precision | None = None) -> object:
-        """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Shapes as in `eval`."""
-        value = self.eval(wo, wi, mode=mode, precision=precision)
+    @overload
+    def f(
+        self,
+        wo: tensors.Tensor,
+        wi: tensors.Tensor,
+        mode: Mode = ...,
+        precision: Precision | None = ...,
+        *,
+        parameters: Mapping[str, tensors.Tensor] = ...,
+    ) -> tensors.Tensor: ...
+    def f(
+        self,
+        wo: Given,
+        wi: Given,
+        mode: Mode = "radiance",
+        precision: Precision | None = None,
+        *,
+        parameters: Mapping[str, tensors.Tensor] | None = None,
+    ) -> object:
+        """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Shapes and `parameters` as in `eval`."""
+        value = self.eval(wo, wi, mode=mode, precision=precision, parameters=parameters or {})
         if backend.is_drjit(wi):
             return value * ops.safe_div(1.0, ops.abs(wi.z))
-        cos = np.abs(np.broadcast_to(np.asarray(wi, dtype=value.dtype), (len(value), 3))[:, 2:])
+        if kind := tensors.library(value):
+            return tensors.over_cosine(kind, value, wi)
+        cos = np.abs(np.broadcast_to(np.asarray(wi, dtype=value.dtype), value.shape)[..., 2:])
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0)
 
     def __repr__(self) -> str:

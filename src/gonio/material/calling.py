@@ -37,7 +37,7 @@ DrJit: TypeAlias = Any  # a Dr.Jit value, whose type is not expressible
 
 
 MISSING: Any = object()
-EXTRAS = ("derivatives", "wavelengths", "parameters")  # of eval and pdf on arrays
+EXTRAS = ("derivatives", "wavelengths", "parameters")  # of eval and pdf on arrays; sample has the last
 
 
 class EvalMethod(Protocol):
@@ -109,6 +109,16 @@ class SampleMethod(Protocol):
     def __call__(
         self, wo: ArrayLike, u: ArrayLike, mode: Mode = ..., precision: Precision | None = ...
     ) -> SampleArrays: ...
+    @overload
+    def __call__(
+        self,
+        wo: tensors.Tensor,
+        u: tensors.Tensor,
+        mode: Mode = ...,
+        precision: Precision | None = ...,
+        *,
+        parameters: Mapping[str, tensors.Tensor] = ...,
+    ) -> Sample[tensors.Tensor, tensors.Tensor, tensors.Tensor, tensors.Tensor]: ...
 
 
 class TermsMethod(Protocol[T_co]):
@@ -148,7 +158,8 @@ def method(formula: Callable[..., object], /) -> object:
     ) -> object:
         if other is MISSING:
             other = named.pop(second, MISSING)
-        extra = {key: named.pop(key) for key in EXTRAS if key in named and formula.__name__ in ("eval", "pdf")}
+        extras = {"eval": EXTRAS, "pdf": EXTRAS, "sample": EXTRAS[2:]}.get(formula.__name__, ())
+        extra = {key: named.pop(key) for key in extras if key in named}
         if other is MISSING or named:
             what = f"has no argument '{next(iter(named))}'" if named else f"lacks its argument '{second}'"
             raise TypeError(f"{type(self).__name__}.{formula.__name__} {what}: wo, {second}, precision and mode")
@@ -237,14 +248,14 @@ def _on_tensors(
     parameters: Mapping[str, Given],
     extra: Mapping[str, Given],
 ) -> object:
-    """`eval` and `pdf` on tensors of PyTorch or JAX."""
+    """`eval`, `pdf` and `sample` on tensors of PyTorch or JAX."""
     wo, other, mode, precision = arguments
     if not kind:
         hint = "give the values to the material: go.Conductor(alpha=0.2)"
         raise InputError("parameters without tensors of PyTorch or JAX", f"{name}: parameters", hint)
-    if name not in ("eval", "pdf") or extra:
+    if name not in ("eval", "pdf", "sample") or extra:
         what = f"tensors of PyTorch or JAX in {name}" + (f" with {next(iter(extra))}" if extra else "")
-        raise InputError(what, name, "give NumPy arrays; eval and pdf take tensors")
+        raise InputError(what, name, "give NumPy arrays; eval, f, pdf and sample take tensors")
     double = any("float64" in str(getattr(x, "dtype", "")) for x in (wo, other, *parameters.values()))
     precision = precision or ("float64" if double else backend.get_precision())
     call = tensors.Call(material, name, tuple(parameters), mode, precision, _rows)

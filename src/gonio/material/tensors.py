@@ -2,6 +2,7 @@
 
 value = gold.eval(wo, wi, parameters={"alpha": alpha})     # tensors in, a tensor out
 value.sum().backward()                                     # alpha.grad, wo.grad, wi.grad
+drawn = gold.sample(wo, u, parameters={"alpha": alpha})    # a Sample of tensors, with gradients at fixed u
 
 Neither library is imported unless one of its tensors is given. Values are computed by Dr.Jit on the CPU and returned on
 the device of wo. Gradients are those of reverse mode, of first order, for which the formula is evaluated once more.
@@ -19,7 +20,8 @@ from ..errors import InputError
 from ..ops import Mode, Precision, backend
 from ..owner import COMPUTING
 from . import binding, tree
-from .parameters import Floats, Material
+from .parameters import Material
+from .sample import Sample
 
 Tensor: TypeAlias = Any  # of a library that need not be installed
 LIBRARIES = {"torch": "torch", "jax": "jax", "jaxlib": "jax"}  # by the first part of a type's module
@@ -35,12 +37,12 @@ def library(*values: object) -> str:
 
 
 class Call(NamedTuple):
-    """A call of a material with arrays in place of tensors.
+    """A call of a material with arrays in place of tensors. `other` is wi, or the random numbers of "sample".
 
-    material, name   the material, and "eval" or "pdf"
-    paths            the parameters that are given beside wo and wi
+    material, name   the material, and "eval", "pdf" or "sample"
+    paths            the parameters that are given beside wo and `other`
     mode, precision  as in `eval`
-    rows             function (wo, wi, name) of the arrays (N, 3) of both and of the shape of the results
+    rows             function (wo, other, name) of the arrays (N, 3) of both and of the shape of the results
     """
 
     material: Material
@@ -50,25 +52,29 @@ class Call(NamedTuple):
     precision: Precision
     rows: Callable[[Any, Any, str], tuple[np.ndarray, np.ndarray, tuple[int, ...]]]
 
-    def values(self, arrays: Sequence[np.ndarray]) -> Floats:
-        """The result for wo, wi and the parameters."""
-        wo, wi, *given = arrays
+    def values(self, arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The results for wo, `other` and the parameters: one, or the fields of a `Sample`."""
+        wo, other, *given = arrays
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.material)}
         plain = {
             path: _plain(value, leaves[path].parameter.kind) for path, value in zip(self.paths, given, strict=True)
         }
-        mode = {"mode": self.mode} if self.name == "eval" else {}
         formula = getattr(tree.replace(self.material, plain), self.name)
-        return np.asarray(formula(wo, wi, precision=self.precision, **mode))
+        result = formula(wo, other, precision=self.precision, **({} if self.name == "pdf" else {"mode": self.mode}))
+        return [np.asarray(value) for value in _fields(result)]
 
-    def shape(self, arrays: Sequence[Any]) -> tuple[int, ...]:
-        """The shape of the result for arrays of these shapes."""
-        wo, wi = (np.broadcast_to(np.array([0.0, 0.0, 1.0]), tuple(x.shape)) for x in arrays[:2])
-        shape = self.rows(wo, wi, self.name)[2]
-        return (*shape, 3) if self.name == "eval" else shape
+    def shapes(self, arrays: Sequence[Any]) -> list[tuple[tuple[int, ...], type]]:
+        """Shapes and types of the results for arrays of these shapes."""
+        wo, other = (np.broadcast_to(np.array([0.0, 0.0, 1.0]), tuple(x.shape)) for x in arrays[:2])
+        shape = self.rows(wo, other, self.name)[2]
+        number: type = np.float64 if self.precision == "float64" else np.float32
+        vector, scalar, mask = ((*shape, 3), number), (shape, number), (shape, np.bool_)
+        results = {"eval": [vector], "pdf": [scalar], "sample": [vector, vector, scalar, mask, scalar]}
+        return results[self.name]
 
-    def pullback(self, arrays: Sequence[np.ndarray], cotangent: np.ndarray) -> list[np.ndarray]:
-        """The gradients by wo, wi and the parameters, in their shapes, of the sum of the result times a cotangent."""
+    def pullback(self, arrays: Sequence[np.ndarray], cotangents: Sequence[np.ndarray | None]) -> list[np.ndarray]:
+        """The gradients by wo, `other` and the parameters, in their shapes, of the sum of the results times their
+        cotangents; None for a result that has none."""
         dr, types = backend.drjit(), backend.types(self.precision)
         first, second, shape = self.rows(arrays[0], arrays[1], self.name)
         count = math.prod(shape)
@@ -83,14 +89,23 @@ class Call(NamedTuple):
                 values[path] = (backend.float_of if parameter.kind == "angle" else parameter.bind)(value, types)
             dr.enable_grad(directions, values)
             bound = binding.bind_to(tree.replace(self.material, values), types)
-            result = getattr(bound, self.name)(*directions, *([self.mode] if self.name == "eval" else []))
-            if dr.grad_enabled(result):
-                weights = np.asarray(cotangent, np.float64).reshape(count, -1)
-                columns = [backend.float_of(np.ascontiguousarray(column), types) for column in weights.T]
-                dr.backward(dr.sum(sum(c * w for c, w in zip(_components(result), columns, strict=True))))
+            result = getattr(bound, self.name)(*directions, *([] if self.name == "pdf" else [self.mode]))
+            total = dr.zeros(types.float, count)
+            for field, cotangent in zip(_fields(result), cotangents, strict=True):
+                if cotangent is not None and dr.grad_enabled(field):
+                    weights = np.asarray(cotangent, np.float64).reshape(count, -1)
+                    columns = [backend.float_of(np.ascontiguousarray(column), types) for column in weights.T]
+                    total += sum(c * w for c, w in zip(_components(field), columns, strict=True))
+            if dr.grad_enabled(total):
+                dr.backward(dr.sum(total))
             gradients = [*directions, *values.values()]
             parts = [[np.asarray(dr.grad(part).numpy(), float) for part in _components(one)] for one in gradients]
         return [_like(part, given) for part, given in zip(parts, arrays, strict=True)]
+
+
+def _fields(result: Any) -> list[Any]:
+    """The fields of a `Sample`, or the one result of another method."""
+    return list(result) if isinstance(result, Sample) else [result]
 
 
 def _components(value: backend.Array) -> list[backend.Array]:
@@ -120,17 +135,32 @@ def _like(components: list[np.ndarray], given: np.ndarray) -> np.ndarray:
     return gradient.reshape(given.shape).copy()
 
 
-def called(call: Call, kind: str, wo: Tensor, wi: Tensor, parameters: Mapping[str, Tensor]) -> Tensor:
-    """The result as a tensor of the library `kind`, with gradients by all tensors."""
+def called(call: Call, kind: str, wo: Tensor, other: Tensor, parameters: Mapping[str, Tensor]) -> Any:
+    """The result as a tensor of the library `kind`, or a `Sample` of tensors, with gradients by all tensors."""
     known = {leaf.path for leaf in tree.leaves(call.material) if leaf.parameter.numeric}
     for path in parameters:
         if path not in known:
             what = f"'{path}' is no number or color of {type(call.material).__name__}"
             raise InputError(what, f"{call.name}: parameters", f"give some of {', '.join(sorted(known))}")
-    return (_by_torch if kind == "torch" else _by_jax)(call, [wo, wi, *parameters.values()])
+    results = (_by_torch if kind == "torch" else _by_jax)(call, [wo, other, *parameters.values()])
+    return Sample(*results) if call.name == "sample" else results[0]
 
 
-def _by_torch(call: Call, given: list[Tensor]) -> Tensor:
+def over_cosine(kind: str, value: Tensor, wi: Tensor) -> Tensor:
+    """`value` / |cos theta_i|, and 0 at cos theta_i = 0, with gradients."""
+    if kind == "torch":
+        import torch as library
+
+        given = library.as_tensor(wi)
+    else:
+        import jax.numpy as library
+
+        given = library.asarray(wi)
+    cos = abs(given[..., 2:])
+    return library.where(cos > 0.0, value / library.where(cos > 0.0, cos, 1.0), 0.0)
+
+
+def _by_torch(call: Call, given: list[Tensor]) -> tuple[Tensor, ...]:
     import torch
 
     wo = next(x for x in given if isinstance(x, torch.Tensor))
@@ -141,40 +171,51 @@ def _by_torch(call: Call, given: list[Tensor]) -> Tensor:
 
     class Values(torch.autograd.Function):  # type: ignore[misc]
         @staticmethod
-        def forward(context: Any, *some: Tensor) -> Tensor:
+        def forward(context: Any, *some: Tensor) -> tuple[Tensor, ...]:
             context.save_for_backward(*some)
-            return torch.from_dlpack(np.array(call.values(arrays(some)))).to(wo.device)
+            results = tuple(torch.from_dlpack(np.array(value)).to(wo.device) for value in call.values(arrays(some)))
+            context.mark_non_differentiable(*(value for value in results if value.dtype == torch.bool))
+            return results
 
         @staticmethod
         @torch.autograd.function.once_differentiable  # type: ignore[misc]
-        def backward(context: Any, cotangent: Tensor) -> tuple[Tensor, ...]:
+        def backward(context: Any, *cotangents: Tensor) -> tuple[Tensor, ...]:
             some = context.saved_tensors
-            gradients = call.pullback(arrays(some), arrays([cotangent])[0])
+            weights = [None if c.dtype == torch.bool else arrays([c])[0] for c in cotangents]
+            gradients = call.pullback(arrays(some), weights)
             pairs = zip(gradients, some, strict=True)
             return tuple(torch.from_dlpack(g).to(device=x.device, dtype=x.dtype) for g, x in pairs)
 
-    return Values.apply(*tensors)
+    results: tuple[Tensor, ...] = Values.apply(*tensors)
+    return results
 
 
-def _by_jax(call: Call, given: list[Tensor]) -> Tensor:
+def _by_jax(call: Call, given: list[Tensor]) -> tuple[Tensor, ...]:
     import jax
 
     arrays = [jax.numpy.asarray(x) for x in given]
-    dtype = np.float64 if call.precision == "float64" else np.float32
-    shape = jax.ShapeDtypeStruct(call.shape(arrays), dtype)
+    shapes = tuple(jax.ShapeDtypeStruct(shape, dtype) for shape, dtype in call.shapes(arrays))
+
+    def values(*some: np.ndarray) -> tuple[np.ndarray, ...]:
+        known = call.values([np.asarray(x) for x in some])
+        return tuple(value.astype(like.dtype) for value, like in zip(known, shapes, strict=True))
 
     @jax.custom_vjp
-    def run(*some: Tensor) -> Tensor:
-        return jax.pure_callback(lambda *x: call.values([np.asarray(v) for v in x]).astype(dtype), shape, *some)
+    def run(*some: Tensor) -> tuple[Tensor, ...]:
+        return tuple(jax.pure_callback(values, shapes, *some))
 
-    def back(some: tuple[Tensor, ...], cotangent: Tensor) -> tuple[Tensor, ...]:
-        def gradients(cotangent: Tensor, *x: Tensor) -> tuple[np.ndarray, ...]:
+    def back(some: tuple[Tensor, ...], cotangents: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+        # the cotangent of a mask has no values, and a callback takes none
+        weights = [None if like.dtype == bool else c for c, like in zip(cotangents, shapes, strict=True)]
+
+        def gradients(weights: Sequence[Tensor | None], *x: Tensor) -> tuple[np.ndarray, ...]:
             known = [np.asarray(v) for v in x]
-            pulled = call.pullback(known, np.asarray(cotangent))
+            pulled = call.pullback(known, [None if w is None else np.asarray(w) for w in weights])
             return tuple(g.astype(v.dtype) for g, v in zip(pulled, known, strict=True))
 
-        shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in some)
-        return tuple(jax.pure_callback(gradients, shapes, cotangent, *some))
+        like = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in some)
+        return tuple(jax.pure_callback(gradients, like, weights, *some))
 
     run.defvjp(lambda *some: (run(*some), some), back)
-    return run(*arrays)
+    results: tuple[Tensor, ...] = run(*arrays)
+    return results

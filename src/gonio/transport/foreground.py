@@ -94,7 +94,7 @@ class _Transparent(Lights):
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
             still = still & si.is_valid()
             result.append(self._arriving(origin, si, solid_angle, still))
-            ray = si.spawn_ray(ray.d)
+            ray = self.surfaces.offsets.ray(si, ray.d)
         if self.has_environment:
             beyond = dr.zeros(mi.SurfaceInteraction3f)
             beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths

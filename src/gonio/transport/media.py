@@ -17,6 +17,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
+from ..bridge.faults.ray_offset import Offsets
 from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
 from ..errors import InputError
 from ..material.bsdf import Interior
@@ -64,6 +65,7 @@ class Media:
     def containing(self, point: Point) -> UInt:
         """The media that contain a point: a ray from there leaves them without having entered them."""
         mi, depth, inside = self.mi, [0] * MAX_MEDIA, [0] * MAX_MEDIA
+        offsets = Offsets(mi, self.scene)
         ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
         for _ in range(CROSSINGS):
             si = self.scene.ray_intersect(ray)
@@ -73,7 +75,7 @@ class Media:
             if number < MAX_MEDIA:
                 depth[number] += 1 if si.wi.z[0] > 0.0 else -1
                 inside[number] = max(inside[number], -depth[number])
-            ray = si.spawn_ray(ray.d)
+            ray = offsets.ray(si, ray.d)
         packed = sum(min(count, 15) << (4 * number) for number, count in enumerate(inside))
         return dr.opaque(mi.UInt32, packed)
 

@@ -99,7 +99,7 @@ class Particles:
         particle = self.sources.sample(pick, place, data.pair(key, low, AIM)[0], way, wavelengths)
         particle.flux *= weight
         particle.direct_weight *= weight
-        ray = particle.place.spawn_ray(particle.direction)  # off the lamp's own surface
+        ray = data.surfaces.offsets.ray(particle.place, particle.direction)  # off the lamp's own surface
         ray.o = dr.select(particle.place.is_valid(), ray.o, particle.origin)
         ray.wavelengths = wavelengths
         active = mi.Bool(True) & dr.any(particle.flux != 0) & (self.max_depth > 1)
@@ -178,7 +178,7 @@ class Particles:
         active &= ~plays | (data.pair(key, low, flight.dimension + CHOICE)[1] < survive)
         throughput = dr.select(plays, throughput / survive, throughput)
         inside = flight.inside if vertex.crossing is None else vertex.side(bs.wo)
-        ray = si.spawn_ray(si.to_world(bs.wo))
+        ray = data.surfaces.offsets.ray(si, si.to_world(bs.wo))
         hit = data.surfaces.nearest(ray, active)
         active &= hit.is_valid()
         eta = flight.eta * dr.select(active, bs.eta, 1)

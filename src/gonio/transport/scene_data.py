@@ -130,7 +130,7 @@ class SceneData:
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """Lanes from whose surface a point that is on no surface is visible."""
-        return active & ~self.surfaces.blocked(shadow_ray_to(si, point), active)
+        return active & ~self.surfaces.blocked(shadow_ray_to(self.surfaces.offsets, si, point), active)
 
     def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
         """Features of a sample's first vertex, averaged besides its color: albedo and normal if needed.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
+from ..bridge.faults.ray_offset import Offsets
 from ..bridge.types import Hit, Mask, Ray, Scene, SurfaceInteraction
 from . import fast
 from .fast.inline import Inline
@@ -16,14 +17,15 @@ class Surfaces:
 
     inline      traces rays in the kernel, for scenes of a few simple shapes; otherwise Mitsuba does
     placements  computes the surfaces of many shapes, or of those that are traced inline; the others are called
+    offsets     how far off the surfaces rays begin and end
     """
 
     def __init__(self, mi: ModuleType, scene: Scene) -> None:
-        self.mi, self.scene = mi, scene
+        self.mi, self.scene, self.offsets = mi, scene, Offsets(mi, scene)
         self.inline: Inline | None = None
         self.placements: Placements | None = None
         if fast.enabled():
-            self.inline = Inline.of(mi, scene, placement_reader(mi))
+            self.inline = Inline.of(mi, scene, placement_reader(mi), self.offsets.unit)
             self.placements = Placements.of(mi, scene, MANY if self.inline is None else 1)
 
     def nearest(self, ray: Ray, active: Mask = True) -> Hit:

@@ -13,12 +13,15 @@ from __future__ import annotations
 import drjit as dr
 
 from ..types import Point, Ray, SurfaceInteraction
+from .ray_offset import Offsets
 
 RELATIVE_GAP = 1e-6  # of the distance: float32 resolves it
 
 
-def shadow_ray_to(si: SurfaceInteraction, point: Point) -> Ray:
+def shadow_ray_to(offsets: Offsets, si: SurfaceInteraction, point: Point) -> Ray:
     """A ray from a surface to a point off all surfaces."""
-    ray = si.spawn_ray_to(point)
-    ray.maxt = dr.norm(point - ray.o) * (1 - RELATIVE_GAP)
+    ray = offsets.ray(si, point - si.p)
+    away = point - ray.o
+    distance = dr.norm(away)
+    ray.d, ray.maxt = away / distance, distance * (1 - RELATIVE_GAP)
     return ray

@@ -19,6 +19,7 @@ from ...catalog.material import material as named
 from ...errors import InputError
 from ...material import BSDF, is_model
 from ...measure import colours
+from ...measure.compare import asymmetry
 from ...measure.tables.base import Measurement
 from ...owner import public
 from ..surfaces import base as surfaces
@@ -30,6 +31,8 @@ from .specimen import BOUNCES, GROUPS, Model, Specimen
 Floats = NDArray[np.float64]
 DETECTOR = 0.006  # sr, a cone with a half angle of 2.5 degrees: the default for surfaces
 MAX_BLOCKED = 60.0  # degrees
+EXCHANGED = 1 << 12  # pairs of directions at which reciprocity is tested
+SAME = 1e-6  # relative change by the exchange of both directions that roundings explain
 
 
 @dataclass(frozen=True)
@@ -214,6 +217,7 @@ def measure(
     rough = None if surface is None else _rough(surface, facet, detector, tracing, plan)
     specimen = rough or _model(material, detector)
     measured, hidden, notes = _filled(plan, specimen, detector, tracing.seed)
+    notes += _lost(measured, specimen)
     notes += [] if target is None else _written(measured, plan, target)
     return _readout(measured, specimen, path, "" if path is None else plan.file.name, hidden, notes, begun)
 
@@ -255,6 +259,19 @@ def _model(material: MaterialLike | None, detector: Detector) -> Model:
         raise InputError(what, "--bounces", "use it with --surface only")
     name = (str(material),) if isinstance(material, str | Path) else ()
     return Model(named(material), detector.solid_angle, *name)
+
+
+def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
+    """A note on a material that is not reciprocal, in a table of one value for both orders of a pair of directions."""
+    if not (measured.reciprocal and isinstance(specimen, Model)):
+        return []
+    change = asymmetry(_Pass(Model(specimen.material, None), Detector(None, 0.0, 0.0, "all"), 0), EXCHANGED)
+    if change < SAME:
+        return []
+    return [
+        f"exchanging both directions changes f by {100.0 * change:.2g} % on average, but this table holds one value "
+        "for both: their least-squares mean is stored; .bsdf files and .gonio files with --table angles store each"
+    ]
 
 
 def _written(measured: Measurement, plan: Plan, target: Path) -> list[str]:

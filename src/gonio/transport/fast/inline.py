@@ -29,7 +29,8 @@ COST_OF_FLAT = 2
 
 # float32 must distinguish a sphere's far side from the side that a ray has just left: the distance from the surface is
 # known to some 2e-7 of the radius and of the center's distance from the origin, and a ray starts off the surface by
-# 9e-5 of (1 + |p|). For spheres larger than so many times that, Mitsuba is used, which computes in 64 bits.
+# 9e-5 of (unit + |p|), see `Offsets`. For spheres larger than so many times that, Mitsuba is used, which computes in 64
+# bits.
 MAX_SPHERE = 50.0
 
 MESHES = ("Mesh", "OBJMesh", "PLYMesh", "SerializedMesh", "Cube")
@@ -90,10 +91,11 @@ class Inline:
         self.flats = [(flat, [list(itertools.islice(read, 4)) for _ in range(3)]) for flat in flats]
 
     @staticmethod
-    def of(mi: ModuleType, scene: Scene, to_world: Callable[[Shape], list[float]]) -> Inline | None:
+    def of(mi: ModuleType, scene: Scene, to_world: Callable[[Shape], list[float]], unit: float) -> Inline | None:
         """None if Mitsuba must be used: for many shapes, unsupported ones, or on a GPU, which has ray tracing hardware.
 
         to_world  returns a shape's placement, 16 numbers row by row
+        unit      of the distances at which rays begin, see `Offsets`
         """
         shapes = scene.shapes()
         if "llvm" not in mi.variant() or not 0 < sum(map(_cost, shapes)) <= MAX_COST:
@@ -112,7 +114,7 @@ class Inline:
                 continue
             center, radius = matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0]))
             away = float(np.linalg.norm(center))
-            if away + radius > MAX_SPHERE * (1.0 + max(away - radius, 0.0)):
+            if away + radius > MAX_SPHERE * (unit + max(away - radius, 0.0)):
                 return None
             spheres.append(Sphere(index, center.tolist(), radius))
         return Inline(mi, scene, spheres, flats) if spheres or flats else None

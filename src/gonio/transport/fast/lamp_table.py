@@ -33,6 +33,7 @@ from ..lights.directions import direction_sample
 from ..lights.lamps import Lamps
 from ..lights.solid_angles import STRAIGHT, Ball, LampView, Rectangle, RectangularArea, SphericalCap
 from ..placement import placement_reader
+from ..surfaces import Surfaces
 
 NONE, RECTANGLE, BALL = 0, 1, 2
 
@@ -118,6 +119,7 @@ class TabledLamps(Lamps):
         cls,
         mi: ModuleType,
         scene: Scene,
+        surfaces: Surfaces,
         emitters: Sequence[Emitter],
         scene_indices: UInt,
         environment: int,
@@ -132,7 +134,7 @@ class TabledLamps(Lamps):
         table = LampTable(mi, emitters, pointers)
         if not table.kinds:
             return None
-        lamps = cls(mi, scene, emitters, scene_indices, environment)
+        lamps = cls(mi, scene, surfaces, emitters, scene_indices, environment)
         lamps.table, lamps.index_of_pointer = table, index_of_pointer
         others = [i for i, known in enumerate(table.known) if not known and i != environment]
         lamps.asks = bool(others)
@@ -153,7 +155,7 @@ class TabledLamps(Lamps):
         return dr.select(here, self.table.sent(row, index, si.n, si.to_world(si.wi), here), 0)
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
-        mi, table = self.mi, self.table
+        table = self.table
         emitter = self.emitter(index, active)
         row = table.row(index, active)
         known = active & table.is_known(row)
@@ -162,10 +164,10 @@ class TabledLamps(Lamps):
             sent = table.sent(row, index, ds.n, -ds.d, known)
         else:
             sent = self.sent(emitter, ds, si, known)
-        light = with_shadow_target(mi, si, ds, dr.select(ds.pdf > 0, sent / ds.pdf, 0))
+        light = with_shadow_target(self.surfaces.offsets, si, ds, dr.select(ds.pdf > 0, sent / ds.pdf, 0))
         if not self.asks:
             return light
-        asked = with_shadow_target(mi, si, *self._asked(emitter, index, si, u, active & ~known))
+        asked = with_shadow_target(self.surfaces.offsets, si, *self._asked(emitter, index, si, u, active & ~known))
         return dr.select(known, light, asked)
 
     def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:

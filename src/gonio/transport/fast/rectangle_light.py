@@ -13,7 +13,7 @@ from types import ModuleType
 import drjit as dr
 
 from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Ray, Scene, SurfaceInteraction, UInt
-from ..lights.base import LightHit, LightSample, shadow_offset, with_shadow_target
+from ..lights.base import LightHit, LightSample, with_shadow_target
 from ..lights.directions import direction_sample
 from ..lights.lamps import Lamps
 from ..lights.solid_angles import Rectangle, SphericalRectangle
@@ -25,31 +25,30 @@ class RectangleLight(Lamps):
     """The only light of a scene, a rectangle."""
 
     rectangle: Rectangle
-    surfaces: Surfaces
 
     @classmethod
     def of(
         cls,
         mi: ModuleType,
         scene: Scene,
+        surfaces: Surfaces,
         emitters: Sequence[Emitter],
         scene_indices: UInt,
         environment: int,
-        surfaces: Surfaces,
     ) -> RectangleLight | None:
         """None if the only light is not a rectangle."""
         rectangle = rectangle_of(mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
         if rectangle is None:
             return None
         dr.make_opaque(rectangle)
-        light = cls(mi, scene, emitters, scene_indices, environment)
-        light.rectangle, light.surfaces = rectangle, surfaces
+        light = cls(mi, scene, surfaces, emitters, scene_indices, environment)
+        light.rectangle = rectangle
         return light
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
         view = SphericalRectangle(self.rectangle, si.p)
         ds = direction_sample(self.mi, view, u, si)
-        light = with_shadow_target(self.mi, si, ds, self.sent(self.emitters[0], ds, si, active) / ds.pdf)
+        light = with_shadow_target(self.surfaces.offsets, si, ds, self.sent(self.emitters[0], ds, si, active) / ds.pdf)
         light.solid_angle = dr.select(view.uniform, view.solid_angle, 0)
         return light
 
@@ -69,7 +68,7 @@ class RectangleLight(Lamps):
         at_light.wi = at_light.to_local(-ray.d)
         radiance = self.emitters[0].eval(at_light, active)
         shadow = mi.Ray3f(ray)
-        shadow.maxt = distance - shadow_offset(mi, ray.o, ray(distance))
+        shadow.maxt = distance - self.surfaces.offsets.between(ray.o, ray(distance))
         active &= dr.any(radiance != 0)
         active &= ~self.surfaces.blocked(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))

@@ -237,7 +237,7 @@ class LightTransport(Integrator):
         return replace(
             path,
             depth=path.depth + 1,
-            ray=vertex.si.spawn_ray(vertex.si.to_world(bs.wo)),
+            ray=self.data.surfaces.offsets.ray(vertex.si, vertex.si.to_world(bs.wo)),
             eta=path.eta * dr.select(active, bs.eta, 1),
             pdf=dr.select(delta, 0, bs.pdf) if self.samples_lights else mi.Float(0),
             solid_angle=mi.Float(0) if light is None else light.solid_angle,

@@ -8,6 +8,7 @@ from types import ModuleType
 
 import drjit as dr
 
+from ...bridge.faults.ray_offset import Offsets
 from ...bridge.types import DirectionSample, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
 
 
@@ -71,20 +72,14 @@ class LightSampler:
         raise NotImplementedError
 
 
-def with_shadow_target(mi: ModuleType, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
+def with_shadow_target(offsets: Offsets, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
     """A light sample whose shadow ray ends as far off the lamp's surface as it begins off that of `si`.
 
     A ray that ended on the surface itself would let a round lamp occlude its own limb. At shorter distances positions
     consist of rounding errors, so the weight is 0.
     """
-    offset = shadow_offset(mi, si.p, ds.p)
+    mi, offset = offsets.mi, offsets.between(si.p, ds.p)
     normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point light has none
     target = mi.Point3f(ds.p - normal * dr.mulsign(offset, dr.dot(normal, ds.d)))
     weight = dr.select(ds.delta | (ds.dist > offset), weight, 0)
     return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))
-
-
-def shadow_offset(mi: ModuleType, p: Point, q: Point) -> Float:
-    """How far off the surfaces a ray between two points begins and ends."""
-    reach = dr.maximum(dr.max(dr.abs(p)), dr.max(dr.abs(q)))
-    return mi.math.RayEpsilon * (1 + reach)

@@ -6,7 +6,8 @@ from types import ModuleType
 
 import drjit as dr
 
-from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
+from ...bridge.types import Emitter, Float, Mask, Point, Radiance, SurfaceInteraction, UInt
+from ..surfaces import Surfaces
 from .base import LightHit, LightSample, LightSampler, with_shadow_target
 from .sky import Sky
 
@@ -14,8 +15,8 @@ from .sky import Sky
 class Environment(LightSampler):
     """The light of rays that leave the scene, sampled by Mitsuba."""
 
-    def __init__(self, mi: ModuleType, emitter: Emitter) -> None:
-        self.mi, self.emitter = mi, emitter
+    def __init__(self, mi: ModuleType, surfaces: Surfaces, emitter: Emitter) -> None:
+        self.mi, self.surfaces, self.emitter = mi, surfaces, emitter
 
     def owns(self, si: SurfaceInteraction) -> Mask:
         return ~si.is_valid()
@@ -24,7 +25,7 @@ class Environment(LightSampler):
         return self.emitter.eval(si, active)
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
-        return with_shadow_target(self.mi, si, *self.emitter.sample_direction(si, u, active))
+        return with_shadow_target(self.surfaces.offsets, si, *self.emitter.sample_direction(si, u, active))
 
     def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
         return self.emitter.pdf_direction(hit.it, hit.ds, active)
@@ -33,8 +34,8 @@ class Environment(LightSampler):
 class VaryingEnvironment(Environment):
     """An environment map that is sampled by its luminance."""
 
-    def __init__(self, mi: ModuleType, emitter: Emitter, sky: Sky) -> None:
-        super().__init__(mi, emitter)
+    def __init__(self, mi: ModuleType, surfaces: Surfaces, emitter: Emitter, sky: Sky) -> None:
+        super().__init__(mi, surfaces, emitter)
         self.sky = sky
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
@@ -48,13 +49,13 @@ class VaryingEnvironment(Environment):
         return self.sky.pdf(hit.ds.d)
 
 
-def environment(mi: ModuleType, scene: Scene, emitter: Emitter, mis_compensation: bool) -> Environment:
+def environment(mi: ModuleType, surfaces: Surfaces, emitter: Emitter, mis_compensation: bool) -> Environment:
     """The sampler of an environment.
 
     mis_compensation  whether BSDFs are sampled too, so that they can sample the uniform part of a map (Karlik2019)
     """
     if "data" in dict(mi.traverse(emitter)):
-        sky = Sky(mi, scene, emitter, mis_compensation)
+        sky = Sky(mi, surfaces.scene, emitter, mis_compensation)
         if sky.known:
-            return VaryingEnvironment(mi, emitter, sky)
-    return Environment(mi, emitter)
+            return VaryingEnvironment(mi, surfaces, emitter, sky)
+    return Environment(mi, surfaces, emitter)

@@ -28,6 +28,7 @@ from ...bridge.types import (
     UInt,
 )
 from ..placement import placement_reader
+from ..surfaces import Surfaces
 from .base import LightHit, LightSample, LightSampler, with_shadow_target
 from .directions import area_density, area_sample, per_steradian
 from .solid_angles import is_sphere
@@ -44,9 +45,16 @@ class Lamps(LightSampler):
     """
 
     def __init__(
-        self, mi: ModuleType, scene: Scene, emitters: Sequence[Emitter], scene_indices: UInt, environment: int
+        self,
+        mi: ModuleType,
+        scene: Scene,
+        surfaces: Surfaces,
+        emitters: Sequence[Emitter],
+        scene_indices: UInt,
+        environment: int,
     ) -> None:
-        self.mi, self.scene, self.emitters, self.scene_indices = mi, scene, emitters, scene_indices
+        self.mi, self.scene, self.surfaces = mi, scene, surfaces
+        self.emitters, self.scene_indices = emitters, scene_indices
         lamps = [emitter for i, emitter in enumerate(emitters) if i != environment]
         self.lone = lamps[0] if len(lamps) == 1 else None
         shape = emitters[0].get_shape() if len(emitters) == 1 else None
@@ -77,7 +85,7 @@ class Lamps(LightSampler):
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
         emitter = self.emitter(index, active)
-        return with_shadow_target(self.mi, si, *self._asked(emitter, index, si, u, active))
+        return with_shadow_target(self.surfaces.offsets, si, *self._asked(emitter, index, si, u, active))
 
     def _asked(
         self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask

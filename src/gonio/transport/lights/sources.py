@@ -31,7 +31,6 @@ from ...bridge.types import (
     Vector,
 )
 from ...errors import InputError
-from .base import shadow_offset
 from .directions import area_density
 from .lights import Lights
 from .solid_angles import is_sphere
@@ -247,7 +246,7 @@ class Sources:
             # Light into a ball smaller than the ray's offset from the surface would start on its other side.
             radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
-            shines &= ~inward | (abs(radius) > shadow_offset(mi, ps.p, ps.p))
+            shines &= ~inward | (abs(radius) > lights.surfaces.offsets.at(ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
         direct_weight = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
