@@ -9,8 +9,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-
-from render.scaled_scenes import scaled
+from scaled_scenes import scaled
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENES = sorted(path.parent.name for path in EXAMPLES.glob("*/scene.json"))
