@@ -16,6 +16,7 @@ import sheets  # noqa: E402
 
 PICTURE = "photographs.jpg"  # in the current folder
 LAMP = "#ffe08a"
+SIDES = ("right", "lower right", "below", "lower left", "left", "upper left", "above", "upper right")  # y is downward
 
 
 def lamp_angles(calibration: dict[str, dict]) -> dict[str, tuple[float, np.ndarray]]:
@@ -30,6 +31,11 @@ def lamp_angles(calibration: dict[str, dict]) -> dict[str, tuple[float, np.ndarr
         cosine = toward @ -center / (np.linalg.norm(toward) * np.linalg.norm(center))
         found[name] = float(np.degrees(np.arccos(cosine))), toward[:2] / np.linalg.norm(toward[:2])
     return found
+
+
+def side_of(toward: np.ndarray) -> str:
+    """The direction of a lamp in the picture, in words."""
+    return SIDES[round(float(np.degrees(np.arctan2(toward[1], toward[0]))) / 45.0) % 8]
 
 
 def outline(calibration: dict[str, dict], size: int) -> tuple[np.ndarray, float]:
@@ -60,7 +66,7 @@ def main(stops: float = 1.0) -> None:
         style = {"arrowstyle": "-|>", "color": LAMP, "lw": 4.0, "mutation_scale": 26, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", middle + 1.04 * radius * toward, middle + 1.31 * radius * toward, arrowprops=style)
         axes.set_axis_off()
-        for above, line in enumerate((f"{angle:.0f}° off the axis", f"lamp {name},")):
+        for above, line in enumerate((f"{angle:.0f}° off the axis", f"lamp {side_of(toward)},")):
             base = sheets.GAP + side + (above + 0.33) * sheets.LINE
             place = (left + side / 2.0) / width, base / height
             figure.text(*place, line, color=sheets.TEXT, fontsize=sheets.POINTS, ha="center")

@@ -121,6 +121,8 @@ def test_arrows_point_from_the_lamps(monkeypatch: pytest.MonkeyPatch) -> None:
         and lamps["left"][1][0] < -0.5
         and lamps["above"][1][1] < -0.5
     )
+    sides = [module.side_of(toward) for _, toward in lamps.values()]
+    assert sides == ["right", "below", "upper left", "upper right"]
     middle, radius = module.outline(calibration, 96)
     y, x = np.nonzero(matplotlib.image.imread(EXAMPLES / "photographs" / "right.png")[..., 0] > 0.2)
     distance = np.hypot(x - middle[0], y - middle[1])
