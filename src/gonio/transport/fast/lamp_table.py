@@ -22,7 +22,6 @@ from ...bridge.types import (
     OfVariant,
     Point,
     Radiance,
-    Scene,
     Shape,
     SurfaceInteraction,
     UInt,
@@ -117,8 +116,6 @@ class TabledLamps(Lamps):
     @classmethod
     def of(
         cls,
-        mi: ModuleType,
-        scene: Scene,
         surfaces: Surfaces,
         emitters: Sequence[Emitter],
         scene_indices: UInt,
@@ -131,10 +128,10 @@ class TabledLamps(Lamps):
         pointers          Dr.Jit's pointers to the emitters
         index_of_pointer  the emitters' index by the number of that pointer, if there are several
         """
-        table = LampTable(mi, emitters, pointers)
+        table = LampTable(surfaces.mi, emitters, pointers)
         if not table.kinds:
             return None
-        lamps = cls(mi, scene, surfaces, emitters, scene_indices, environment)
+        lamps = cls(surfaces, emitters, scene_indices, environment)
         lamps.table, lamps.index_of_pointer = table, index_of_pointer
         others = [i for i, known in enumerate(table.known) if not known and i != environment]
         lamps.asks = bool(others)

@@ -8,11 +8,10 @@ replace the search for the nearest surface.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import ModuleType
 
 import drjit as dr
 
-from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Ray, Scene, SurfaceInteraction, UInt
+from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Ray, SurfaceInteraction, UInt
 from ..lights.base import LightHit, LightSample, with_shadow_target
 from ..lights.directions import direction_sample
 from ..lights.lamps import Lamps
@@ -28,20 +27,14 @@ class RectangleLight(Lamps):
 
     @classmethod
     def of(
-        cls,
-        mi: ModuleType,
-        scene: Scene,
-        surfaces: Surfaces,
-        emitters: Sequence[Emitter],
-        scene_indices: UInt,
-        environment: int,
+        cls, surfaces: Surfaces, emitters: Sequence[Emitter], scene_indices: UInt, environment: int
     ) -> RectangleLight | None:
         """None if the only light is not a rectangle."""
-        rectangle = rectangle_of(mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
+        rectangle = rectangle_of(surfaces.mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
         if rectangle is None:
             return None
         dr.make_opaque(rectangle)
-        light = cls(mi, scene, surfaces, emitters, scene_indices, environment)
+        light = cls(surfaces, emitters, scene_indices, environment)
         light.rectangle = rectangle
         return light
 

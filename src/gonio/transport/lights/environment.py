@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import drjit as dr
 
 from ...bridge.types import Emitter, Float, Mask, Point, Radiance, SurfaceInteraction, UInt
@@ -15,8 +13,8 @@ from .sky import Sky
 class Environment(LightSampler):
     """The light of rays that leave the scene, sampled by Mitsuba."""
 
-    def __init__(self, mi: ModuleType, surfaces: Surfaces, emitter: Emitter) -> None:
-        self.mi, self.surfaces, self.emitter = mi, surfaces, emitter
+    def __init__(self, surfaces: Surfaces, emitter: Emitter) -> None:
+        self.mi, self.surfaces, self.emitter = surfaces.mi, surfaces, emitter
 
     def owns(self, si: SurfaceInteraction) -> Mask:
         return ~si.is_valid()
@@ -34,8 +32,8 @@ class Environment(LightSampler):
 class VaryingEnvironment(Environment):
     """An environment map that is sampled by its luminance."""
 
-    def __init__(self, mi: ModuleType, surfaces: Surfaces, emitter: Emitter, sky: Sky) -> None:
-        super().__init__(mi, surfaces, emitter)
+    def __init__(self, surfaces: Surfaces, emitter: Emitter, sky: Sky) -> None:
+        super().__init__(surfaces, emitter)
         self.sky = sky
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
@@ -49,13 +47,13 @@ class VaryingEnvironment(Environment):
         return self.sky.pdf(hit.ds.d)
 
 
-def environment(mi: ModuleType, surfaces: Surfaces, emitter: Emitter, mis_compensation: bool) -> Environment:
+def environment(surfaces: Surfaces, emitter: Emitter, mis_compensation: bool) -> Environment:
     """The sampler of an environment.
 
     mis_compensation  whether BSDFs are sampled too, so that they can sample the uniform part of a map (Karlik2019)
     """
-    if "data" in dict(mi.traverse(emitter)):
-        sky = Sky(mi, surfaces.scene, emitter, mis_compensation)
+    if "data" in dict(surfaces.mi.traverse(emitter)):
+        sky = Sky(surfaces.mi, surfaces.scene, emitter, mis_compensation)
         if sky.known:
-            return VaryingEnvironment(mi, surfaces, emitter, sky)
-    return Environment(mi, surfaces, emitter)
+            return VaryingEnvironment(surfaces, emitter, sky)
+    return Environment(surfaces, emitter)

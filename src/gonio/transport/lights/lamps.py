@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from types import ModuleType
 from typing import TypeVar
 
 import drjit as dr
@@ -22,7 +21,6 @@ from ...bridge.types import (
     Point,
     PositionSample,
     Radiance,
-    Scene,
     Shape,
     SurfaceInteraction,
     UInt,
@@ -44,16 +42,9 @@ class Lamps(LightSampler):
     environment    position of the environment in `emitters`, -1 if there is none
     """
 
-    def __init__(
-        self,
-        mi: ModuleType,
-        scene: Scene,
-        surfaces: Surfaces,
-        emitters: Sequence[Emitter],
-        scene_indices: UInt,
-        environment: int,
-    ) -> None:
-        self.mi, self.scene, self.surfaces = mi, scene, surfaces
+    def __init__(self, surfaces: Surfaces, emitters: Sequence[Emitter], scene_indices: UInt, environment: int) -> None:
+        self.mi, self.scene, self.surfaces = surfaces.mi, surfaces.scene, surfaces
+        mi = self.mi
         self.emitters, self.scene_indices = emitters, scene_indices
         lamps = [emitter for i, emitter in enumerate(emitters) if i != environment]
         self.lone = lamps[0] if len(lamps) == 1 else None

@@ -56,7 +56,7 @@ class Lights:
         place = next((i for i in range(self.count) if self._is_environment(self.emitters[i])), -1)
         self.samplers: list[LightSampler] = []
         if place >= 0:
-            self.samplers.append(environment(mi, self.surfaces, self.emitters[place], mis_compensation))
+            self.samplers.append(environment(self.surfaces, self.emitters[place], mis_compensation))
         self.environment_index = place
         if self.count > 1:
             self._prepare_choice()
@@ -81,7 +81,7 @@ class Lights:
     def _lamps(self, order: list[int]) -> Lamps:
         """The fastest sampler that supports the lamps."""
         mi = self.mi
-        parts = mi, self.scene, self.surfaces, self.emitters, self.scene_indices, self.environment_index
+        parts = self.surfaces, self.emitters, self.scene_indices, self.environment_index
         if not fast.enabled() or not self.count:
             return Lamps(*parts)
         if self.count == 1 and (rectangle := RectangleLight.of(*parts)) is not None:
