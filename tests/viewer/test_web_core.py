@@ -502,7 +502,7 @@ def test_a_figure_in_a_closed_part_of_a_document_has_its_picture_before_it_is_op
     tab.goto(document.as_uri())
     figure = tab.frames[1]
     assert not tab.locator("iframe").is_visible()
-    figure.evaluate("() => gonio.ready")
+    assert figure.evaluate("() => Promise.race([gonio.ready.then(() => 1), new Promise(r => setTimeout(r, 30000))])")
     drawn = figure.evaluate("() => gonio.frames")
     assert drawn > 0
     tab.locator("summary").click()
