@@ -70,8 +70,9 @@ class Certainty:
     @property
     def coupling(self) -> Floats:
         """Correlation matrix for independent errors of equal size, (K, K): how far the data tell parameters apart. A
-        misfit that several parameters share correlates their values, but does not couple them."""
-        return _correlation(self.inverse)
+        misfit that several parameters share correlates their values, but does not couple them. 0 for undetermined
+        parameters, whose entries in the pseudoinverse are rounding."""
+        return _correlation(np.where(np.isfinite(np.diag(self.covariance)), self.inverse, 0.0))
 
 
 def _correlation(covariance: Floats) -> Floats:

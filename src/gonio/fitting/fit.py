@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import renamed
 from ..catalog import notation
@@ -27,6 +28,7 @@ from .models import modelled as modelled
 from .models import moving_of as moving_of
 from .models import moving_with_notes
 from .parameters import NAMES, Free, with_values
+from .profiles import profiles
 from .solver import METRICS, Problem, Solution, solve
 from .starts import starts_of
 
@@ -59,6 +61,8 @@ class Fit:
     seconds      duration of the fit
     ranges       (K, 2), the least and the largest value that each number can have; None for any
     degrees      (K,), effective degrees of freedom of the standard errors; None for many
+    profiles     (K, 2), ends of 95 % intervals by the profile of the loss where value +- error does not hold, NaN
+                 elsewhere; None for none
     """
 
     material: BSDF
@@ -76,20 +80,27 @@ class Fit:
     data: Data
     ranges: Floats | None = None
     degrees: Floats | None = None
+    profiles: Floats | None = None
 
     @property
     def half_widths(self) -> Floats:
-        """Half widths of the 95 % intervals, (K,): by Student's t distribution where few runs determine a number."""
-        from scipy import special  # imported late: not every run fits
-
-        degrees = MANY if self.degrees is None else np.minimum(self.degrees, MANY)
-        return np.asarray(special.stdtrit(degrees, 0.975) * self.errors)
+        """Half widths of the symmetric 95 % intervals, (K,): by Student's t distribution where few runs determine a
+        number."""
+        return quantiles(self.degrees) * self.errors
 
     @property
     def interval(self) -> Floats:
-        """95 % intervals within the parameters' ranges, (K, 2)."""
+        """95 % intervals within the parameters' ranges, (K, 2); infinite for numbers that the data do not determine."""
         ends = np.stack([self.values - self.half_widths, self.values + self.half_widths], axis=1)
+        if self.profiles is not None:
+            ends = np.where(np.isfinite(self.profiles), self.profiles, ends)
         return ends if self.ranges is None else np.clip(ends, self.ranges[:, :1], self.ranges[:, 1:])
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """Whether the data bound a number, (K,)."""
+        told = np.isfinite(self.errors)
+        return told if self.profiles is None else told | np.isfinite(self.profiles).all(axis=1)
 
     @property
     def text(self) -> str:
@@ -114,9 +125,11 @@ class Fit:
                 name: {
                     "value": float(v),
                     "error": float(e) if np.isfinite(e) else None,
-                    "interval": [float(x) for x in ends] if np.isfinite(e) else None,
+                    "interval": [float(x) for x in ends] if told else None,
                 }
-                for name, v, e, ends in zip(self.names, self.values, self.errors, self.interval, strict=True)
+                for name, v, e, ends, told in zip(
+                    self.names, self.values, self.errors, self.interval, self.determined, strict=True
+                )
             },
             "correlation": [[round(float(x), 4) for x in row] for row in self.correlation],
             "notes": list(self.notes),
@@ -146,10 +159,17 @@ class Fit:
     def __str__(self) -> str:
         lines = [f"{self.text}: {self.error:.4g} ({self.metric}), {100.0 * self.relative:.3g} % off"]
         lines += [
-            f"  {n} = {v:.5g} +- {half:.2g}"
-            for n, v, half in zip(self.names, self.values, self.half_widths, strict=True)
+            f"  {n} = {v:.5g}, {low:.5g} to {high:.5g}" if told else f"  {n} = {v:.5g}, not determined by the data"
+            for n, v, (low, high), told in zip(self.names, self.values, self.interval, self.determined, strict=True)
         ]
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+
+def quantiles(degrees: Floats | None) -> Floats:
+    """Quantile of Student's distribution for 95 % intervals, (K,) or ()."""
+    from scipy import special  # imported late: not every run fits
+
+    return np.asarray(special.stdtrit(MANY if degrees is None else np.minimum(degrees, MANY), 0.975))
 
 
 @renamed(metric="loss", fixed="param")
@@ -237,8 +257,11 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
     material = with_values(problem.material, problem.free, numbers)
     value = material.eval(data.wo, data.wi)
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
-    told = notes_on(problem.free, numbers, sure.errors, sure.coupling, names, sure.undetermined)
     mean = cost / max(3 * len(data), 1)
+    degrees = degrees_of_freedom(parts, data.row, sure.inverse)
+    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean)
+    unknown = ~(np.isfinite(sure.errors) | np.isfinite(ends).all(axis=1))
+    told = notes_on(problem.free, numbers, unknown, sure.coupling, names, sure.undetermined)
     return Fit(
         material,
         names,
@@ -258,20 +281,22 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
         seconds,
         data,
         np.array([(one.low, one.high) for one in problem.free for _ in range(one.count)]).reshape(-1, 2),
-        degrees_of_freedom(parts, data.row, sure.inverse),
+        degrees,
+        ends,
     )
 
 
 def notes_on(
     free: Sequence[Free],
     numbers: Floats,
-    errors: Floats,
+    unknown: NDArray[np.bool_],
     coupling: Floats,
     names: tuple[str, ...],
     undetermined: Sequence[Sequence[int]] = (),
 ) -> list[str]:
     """Remarks that a reader needs to judge the values.
 
+    unknown       whether the data do not determine a parameter, (K,)
     coupling      correlations of the parameters for errors that are independent
     undetermined  groups of parameter indices of which the data determine at most a combination
     """
@@ -283,14 +308,14 @@ def notes_on(
     together = {k for group in undetermined if len(group) > 1 for k in group}
     for one in free:
         for k in range(at, at + one.count):
-            if not np.isfinite(errors[k]) and k not in together:
+            if unknown[k] and k not in together:
                 notes.append(f"the data do not determine {names[k]}")
             elif numbers[k] <= one.low or numbers[k] >= one.high:
                 notes.append(f"{names[k]} ends at {numbers[k]:.4g}, a bound of its range")
         at += one.count
     size = np.abs(coupling)
     for i, j in itertools.combinations(range(len(names)), 2):
-        if size[i, j] > TIED:
+        if size[i, j] > TIED and not (unknown[i] or unknown[j]):
             notes.append(f"{names[i]} and {names[j]} are tied (correlation {coupling[i, j]:.3f}): fix one of them")
     return notes
 

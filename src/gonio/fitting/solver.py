@@ -7,7 +7,7 @@ million cells and six parameters moves about 70 MB and is limited by that and by
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -275,10 +275,12 @@ def solve(
     steps: int = 30,
     tolerance: float = 1e-6,
     progress: Callable[[float], None] = lambda cost: None,
+    held: Sequence[int] = (),
 ) -> Solution:
     """Minimize the sum of squares from `start` within the ranges of the parameters, in at most `steps` steps.
 
     tolerance  relative decrease of the cost below which the solver stops
+    held       indices of parameters that keep their value
     progress   called with the cost after each accepted step
     """
     low, high, ratio = ranges(problem.free)
@@ -297,6 +299,7 @@ def solve(
         g, h = gradient * slope, hessian * np.outer(slope, slope)
         # parameters at a bound with a gradient that points outside stay fixed in this step
         stuck = ((numbers <= low) & (g > 0.0)) | ((numbers >= high) & (g < 0.0))
+        stuck[list(held)] = True
         moves = np.flatnonzero(~stuck & (np.diag(h) > 0.0))
         if not len(moves):
             break

@@ -346,6 +346,6 @@ def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: flo
         float(np.abs(shown - problem.wanted).mean() / np.abs(problem.wanted).mean()),
         problem.wanted.astype(np.float32),
         shown.astype(np.float32),
-        tuple(notes_on(problem.free, numbers, sure.errors, sure.coupling, names, sure.undetermined)),
+        tuple(notes_on(problem.free, numbers, ~np.isfinite(sure.errors), sure.coupling, names, sure.undetermined)),
         seconds,
     )

@@ -168,7 +168,8 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     size = np.concatenate([np.abs(part.value) for part, _, _ in shown])
     mean = float(np.mean((off / np.maximum(np.concatenate([p for _, _, p in shown]), 1e-12)) ** 2))
     runs = int(np.count_nonzero(np.bincount(np.concatenate([part.tile for part, _, _ in shown]))))
-    notes = tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names, undetermined)
+    unknown = ~np.isfinite(errors[own])
+    notes = tables.notes_on(problem.moving, numbers[own], unknown, _apart(problem, hessian), names, undetermined)
     fit = Fit(
         material,
         names,

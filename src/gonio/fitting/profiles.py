@@ -1,0 +1,123 @@
+"""Intervals by the profile of the sum of squares, where it is not the parabola that standard errors assume.
+
+The profile of a parameter at x is the least sum of squares of all fits in which the parameter is x (Venzon1988). Its
+95 % interval is the set of x at which the profile is less than
+
+    t^2 s
+
+above the minimum, where t is the quantile of Student's distribution and s = V_kk / (J^T J)^-1_kk is the variance of
+correlated residuals of unequal size, relative to that of independent ones of size 1: along a parabola the ends are
+value +- t sqrt(V_kk), those of the standard error. Not a parabola: an index of refraction of 1, where the reflectance
+has no slope, so that J^T J tells nothing about it; a value at a bound of its range; a width that the data bound from
+one side only.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from ..measure.tables.base import Floats
+from .certainty import Certainty
+from .parameters import ranges
+from .solver import Residuals, solve
+
+STEPS = 6  # of the solver for each point of a profile; it begins at the solution of the point before
+POINTS = 14  # of a profile, on each side
+NEAR = 0.005  # relative error of the square root of the rise at which an end counts as found
+UNEQUAL = 0.3  # relative difference of the rises at both ends from which a profile is computed
+FIRST = 0.02  # first step from a value without a finite standard error: part of the range, or of the logarithm's unit
+SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
+
+
+class Costs(Residuals, Protocol):
+    """A least-squares problem whose sum of squares can be asked for alone."""
+
+    def cost(self, numbers: Floats) -> float: ...
+
+
+def profiles(problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float) -> Floats:
+    """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
+
+    A parameter of a group of which the data determine only a combination has no profile (NaN).
+
+    numbers    solution, (K,)
+    cost       its sum of squares
+    sure       standard errors and the pseudoinverse of J^T J
+    quantiles  of Student's distribution, (K,)
+    scale      mean squared residual: s if the data determine no parameter; else an undetermined one has the median s
+    """
+    low, high, ratio = ranges(problem.free)
+    ends = np.full((len(numbers), 2), np.nan)
+    known = np.isfinite(sure.errors) & (np.diag(sure.inverse) > 0.0)
+    tied = {k for group in sure.undetermined if len(group) > 1 for k in group}
+    own = np.divide(np.diag(sure.covariance), np.diag(sure.inverse), where=known, out=np.full(len(numbers), scale))
+    own[~known] = np.median(own[known]) if known.any() else scale
+    for k in range(len(numbers)):
+        if k in tied:
+            continue
+        rise = quantiles[k] ** 2 * own[k]
+        half = quantiles[k] * sure.errors[k]
+        if not rise > 0.0 or (known[k] and _is_even(problem, numbers, k, half, sure.inverse, cost)):
+            continue
+        step = half if known[k] else FIRST * (numbers[k] if ratio[k] else _span(numbers[k], low[k], high[k]))
+        for side, bound in ((0, low[k]), (1, high[k])):
+            ends[k, side] = _end(problem, numbers, k, bound, step, cost + rise, cost)
+    return ends
+
+
+def _span(value: float, low: float, high: float) -> float:
+    """Length of a parameter's range, as far as it is a sensible unit."""
+    return float(min(high - low, SPAN * max(1.0, abs(value))))
+
+
+def _is_even(problem: Costs, numbers: Floats, k: int, half: float, inverse: Floats, cost: float) -> bool:
+    """Whether the sum of squares rises alike towards both ends of value +- half, which lie within the range; the other
+    parameters follow along the parabola's valley."""
+    low, high, _ = ranges(problem.free)
+    direction = inverse[:, k] / inverse[k, k]
+    ends = [numbers - half * direction, numbers + half * direction]
+    if any(not low[k] <= end[k] <= high[k] for end in ends):
+        return False
+    below, above = (problem.cost(np.clip(end, low, high)) - cost for end in ends)
+    return bool(abs(above - below) <= UNEQUAL * abs(above + below) / 2.0)
+
+
+def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, level: float, cost: float) -> float:
+    """Value of parameter k on the side of `bound` at which the profile reaches `level`; the bound if it does not."""
+    if numbers[k] == bound:
+        return bound
+    sign = np.sign(bound - numbers[k])
+    rise = level - cost
+    inside, start, outside = 0.0, numbers, np.inf
+    roots = [(0.0, 0.0)]  # distances and sqrt of the rise over that wanted: nearly linear, 1 at the end
+    distance = min(step, abs(bound - numbers[k]))
+    for _ in range(POINTS):
+        at = start.copy()
+        at[k] = numbers[k] + sign * distance
+        found = solve(problem, at, steps=STEPS, tolerance=1e-3 * rise / max(cost, rise), held=(k,))
+        root = float(np.sqrt(max(found.cost - cost, 0.0) / rise))
+        if abs(root - 1.0) < NEAR or (root < 1.0 and at[k] == bound):
+            return float(at[k])
+        roots.append((distance, root))
+        if root < 1.0:
+            inside, start = distance, found.numbers
+        else:
+            outside = distance
+        distance = _next(roots, inside, outside, abs(bound - numbers[k]))
+    return float(numbers[k] + sign * distance)
+
+
+def _next(roots: list[tuple[float, float]], inside: float, outside: float, most: float) -> float:
+    """The next distance: by the secant through the last two points, kept between the nearest points on both sides."""
+    (a, fa), (b, fb) = sorted(roots)[-2:] if not np.isfinite(outside) else _around(roots, inside, outside)
+    guess = b + (1.0 - fb) * (b - a) / (fb - fa) if fb > fa else np.inf
+    if not np.isfinite(outside):
+        return float(min(np.clip(guess, 1.2 * b, 4.0 * b), most))
+    margin = 0.05 * (outside - inside)
+    return float(np.clip(guess, inside + margin, outside - margin))
+
+
+def _around(roots: list[tuple[float, float]], inside: float, outside: float) -> list[tuple[float, float]]:
+    return [one for one in roots if one[0] == inside][-1:] + [one for one in roots if one[0] == outside][-1:]
