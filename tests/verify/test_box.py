@@ -6,7 +6,7 @@ from typing import Any
 
 import gonio as go
 import pytest
-from gonio.verify import box, subject, verify
+from gonio.verify import box, ranges, subject, verify
 from gonio.verify.effort import EFFORTS
 
 
@@ -33,9 +33,9 @@ class Unbounded(go.BSDF):
 
 def test_a_scan_finds_where_something_begins() -> None:
     one = subject.of(BrightCoat())
-    found = box.jumps(one, box.axes(one), 1)
+    found = box.jumps(one, ranges.axes(one), 1)
     assert any(0.88 < jump.get("coat", 0.0) < 0.95 for jump in found)
-    assert box.jumps(subject.of(go.Lambert(0.5)), box.axes(subject.of(go.Lambert(0.5))), 1) == []
+    assert box.jumps(subject.of(go.Lambert(0.5)), ranges.axes(subject.of(go.Lambert(0.5))), 1) == []
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_a_mistake_in_a_corner_of_the_ranges_is_caught_and_placed() -> None:
 
 @pytest.mark.slow
 def test_no_range_is_invented() -> None:
-    (axis,) = [a for a in box.axes(subject.of(Unbounded())) if a.path == "gain"]
+    (axis,) = [a for a in ranges.axes(subject.of(Unbounded())) if a.path == "gain"]
     assert (axis.low, axis.high) == (0.0, 0.25)
     report = verify(Unbounded(), quick=True)
     assert report.passed, str(report)
@@ -64,10 +64,10 @@ class Painted(go.BSDF):
 
 
 def test_an_inner_material_is_made_no_delta_lobe_where_the_outer_says_that_it_has_none() -> None:
-    (alpha,) = [axis for axis in box.axes(subject.of(Painted())) if axis.path == "metal.alpha"]
+    (alpha,) = [axis for axis in ranges.axes(subject.of(Painted())) if axis.path == "metal.alpha"]
     assert 0.0 < alpha.low < 0.03
     both = subject.of(go.TwoSided(go.Conductor(alpha=0.3)))
-    (alpha,) = [axis for axis in box.axes(both) if axis.path == "base.alpha"]
+    (alpha,) = [axis for axis in ranges.axes(both) if axis.path == "base.alpha"]
     assert alpha.low == 0.0  # it hands on what its base says
 
 

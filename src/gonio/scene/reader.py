@@ -225,7 +225,7 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     elif kind == "union_tag_invalid":
         tag = str(context["tag"])
         known = [name for item in context["expected_tags"].split(",") if (name := item.strip(" '")) != OWN]
-        hint = ELSEWHERE[tag] if tag in ELSEWHERE else did_you_mean(tag, known)
+        hint = ELSEWHERE.get(tag) or _as_file(tag) or did_you_mean(tag, _plain(known))
         what, more = f"unknown type '{tag}'", ("type",)
     elif kind == "union_tag_not_found":
         what, hint = "key 'type' is missing", 'add "type": it says what this object is'
@@ -243,7 +243,7 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
         limit = next(context[name] for name in ("gt", "ge", "lt", "le") if name in context)
         what, hint = f"expected a number {sign} {limit:g}, got {value}", f"give a number {sign} {limit:g}"
     elif kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
-        what, hint = f"expected an object {{...}}, got {got}", "put it in { }"
+        what, hint = f"expected an object {{...}}, got {got}", _as_file(value) or "put it in { }"
     elif kind == "list_type":
         what, hint = f"expected a list [...], got {got}", "put it in [ ]"
     elif kind == "bool_type":
@@ -255,6 +255,18 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     else:
         what = f"{detail['msg'][0].lower()}{detail['msg'][1:]}, got {got}"
     return pointer(*steps, *more), what, hint
+
+
+def _as_file(value: Json) -> str:
+    """How to write the name of a file where an object, or its type, is expected; "" for other values."""
+    if not isinstance(value, str) or not Path(value).suffix:
+        return ""
+    return f'write {{"type": "{_type_of(value)}", "file": "{value}"}}'
+
+
+def _plain(known: list[str]) -> list[str]:
+    """One spelling of each name: without underscores, and without the prefix of names that Mitsuba has too."""
+    return [name for name in known if "_" not in name and not name.startswith("gonio-")]
 
 
 def _unquote(value: Json) -> str:

@@ -1,8 +1,6 @@
-"""The parameter values at which a BSDF is judged, besides the given ones.
-
-A material that is right at its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of
-two parameters. Therefore the laws are tested again, at less cost, at corners, edges and random points of the declared
-ranges, and behind every discontinuity in a scan along one parameter.
+"""The parameter values at which a BSDF is judged, besides the given ones: corners, edges and random points of the
+declared ranges, and the values behind every discontinuity in a scan along one parameter. A material that is right at
+its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of two parameters.
 
     for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
 
@@ -13,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
@@ -21,22 +18,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..material import BSDF, Parameter, tree
-from ..material.parameters import pair_of
+from ..material import BSDF, tree
 from . import directions
 from .effort import Effort
+from .ranges import MARGIN, Axis, axes
 from .subject import Fault, Subject
 
 SCAN = 64  # values along one parameter
 RAYS = 96  # pairs of directions per value
-WIDE = 30.0  # ratio of the ends beyond which a range is scanned and sampled in equal ratios
 JUMP = 6.0  # least ratio of a jump to the neighboring steps
 MIN_JUMP = 0.004  # smallest jump, relative to the value: smaller ones are invisible
 UNIFORM_PLACES = 1  # places of a material whose values must not vary from ray to ray
 PLACES_PER_CHOICE = 9
-MARGIN = 0.02  # fraction of a range, if its ends are excluded
-MIN_ALBEDO = 0.01  # of plugins whose failed samples have weight 0: black samples would count as failed
-MIN_RATIO = 1e-4  # first value over the last of a range that starts at 0 and is divided in equal ratios
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,77 +72,6 @@ class Place:
         return ", ".join(f"{name} = {_short(value)}" for name, value in self.values.items())
 
 
-@dataclasses.dataclass(frozen=True)
-class Axis:
-    """The range of one parameter; `ratio` if it is divided in equal ratios."""
-
-    path: str
-    low: float
-    high: float
-    ratio: bool
-    kind: str = "float"
-
-    def at(self, share: float | np.ndarray) -> Any:
-        """The value at a share of the range, 0 to 1."""
-        if not self.ratio:
-            return self.low + share * (self.high - self.low)
-        low = self.low if self.low > 0.0 else MIN_RATIO * self.high
-        value = low * (self.high / low) ** share
-        return np.where(np.asarray(share) <= 0.0, self.low, value) if self.low <= 0.0 else value
-
-
-def axes(subject: Subject) -> list[Axis]:
-    """The parameters that declare a range, including those of inner materials."""
-    if not isinstance(subject.model, BSDF):
-        return []
-    axes_ = []
-    for leaf in tree.surface(subject.model):
-        ends = _ends(leaf.parameter, leaf.value)
-        if ends is None:
-            continue
-        low, high, ratio = ends
-        if leaf.parameter.kind == "spectrum" and subject.zero_weight_is_failure:
-            low = max(low, min(MIN_ALBEDO, high))
-        if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
-            low += MARGIN * (high - low)
-        # fitted widths and powers are spectra too, but no colors
-        color = leaf.parameter.kind == "spectrum" and leaf.parameter.high <= 1.0
-        axes_.append(Axis(leaf.path, low, high, ratio, "color" if color else leaf.parameter.kind))
-    return axes_
-
-
-def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
-    """Whether an inner material has a delta lobe at this value, while the outer one declares none: it was not written
-    for such lobes."""
-    if _hides_delta(subject.model):
-        return False  # it already does at the given values, which are tested anyway
-    try:
-        return _hides_delta(subject.replace(**{path: value}).model)
-    except InputError:
-        return False
-
-
-def _hides_delta(model: BSDF) -> bool:
-    inner = tree.children(model).values()
-    return any((model.delta == "never" and one.delta != "never") or _hides_delta(one) for one in inner)
-
-
-def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
-    if not parameter.numeric or value is None:
-        return None
-    if parameter.kind == "angle":
-        return 0.0, 2.0 * math.pi, False
-    low, high = parameter.low, parameter.high
-    if not math.isfinite(low):
-        return None
-    if not math.isfinite(high):
-        # no upper end is declared, and none is assumed: up to the given value
-        high = float(np.max(np.asarray(pair_of(value) if parameter.kind == "alpha" else value, float)))
-    if not low < high:
-        return None
-    return low, high, high > WIDE * max(low, 1.0) or parameter.kind == "alpha"
-
-
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     """The points besides the given one, without repetition, in order of importance."""
     along, others = axes(subject), _choices(subject)
@@ -169,7 +91,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
             corners.append({axis.path: axis.at(float(rng.integers(2))) for axis in along})
     edges = [{axis.path: axis.at(end)} for axis in along for end in (1.0, 0.0)]
     rng.shuffle(edges)  # type: ignore[arg-type]
-    interior = [{axis.path: axis.at(rng.uniform()) for axis in along} for _ in range(effort.places) if along]
+    interior = [_inside(along, rng) for _ in range(effort.places) if along]
     kinds = {"corner": corners, "color": _colors(along), "pair": _unequal(subject, along)}
     kinds |= {"edge": edges, "interior": interior}
     while any(kinds.values()):
@@ -191,15 +113,19 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
 
 # of three channels, as shares of a range: all different, one alone, one at the low end
 COLORS = ((0.95, 0.1, 0.5), (0.0, 0.9, 0.9), (0.9, 0.0, 0.0), (0.5, 0.95, 0.1), (0.0, 0.9, 0.0), (0.9, 0.0, 0.9))
+NARROW = 0.3  # share of a range of widths
 WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # of the two axes, as shares of a range
 
 
 def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Saturated values of all colors together, the channels of each in another order."""
+    """Saturated values of all colors together, the channels of each in another order; every second one with narrow
+    lobes, which lose so little by shadowing that a Fresnel term above 1 is seen."""
     colors = [axis for axis in along if axis.kind == "color"]
+    narrow = {axis.path: _plain(axis.at(NARROW)) for axis in along if axis.kind == "alpha"}
     return [
         {axis.path: _plain([float(axis.at(s)) for s in np.roll(shares, k)]) for k, axis in enumerate(colors)}
-        for shares in COLORS
+        | (narrow if number % 2 else {})
+        for number, shares in enumerate(COLORS)
         if colors
     ]
 
@@ -208,6 +134,11 @@ def _unequal(subject: Subject, along: list[Axis]) -> list[dict[str, tuple[float,
     """Two unequal widths where one number, or two equal ones, are given."""
     alphas = [axis for axis in along if axis.kind == "alpha" and _equal(tree.value_at(subject.model, axis.path))]
     return [{axis.path: _plain([float(axis.at(s)) for s in shares]) for axis in alphas} for shares in WIDTHS if alphas]
+
+
+def _inside(along: list[Axis], rng: np.random.Generator) -> dict[str, Any]:
+    """Random values of all parameters; of widths two, for the two axes."""
+    return {axis.path: axis.at(rng.uniform(size=2) if axis.kind == "alpha" else rng.uniform()) for axis in along}
 
 
 def _equal(value: Any) -> bool:

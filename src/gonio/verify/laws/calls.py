@@ -11,7 +11,7 @@ from ...bridge.answers import Answer
 from ...errors import InputError
 from ...material import BSDF
 from ...ops import Mode, Precision, backend
-from .. import box, directions, severity
+from .. import box, directions, ranges, severity
 from ..effort import Effort
 from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject, guarded
@@ -246,7 +246,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     """Parameters that vary from ray to ray, as with textures: each ray has the result of its own values."""
     if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
         return
-    along = [axis for axis in box.axes(subject) if axis.path not in subject.model.fixed]
+    along = [axis for axis in ranges.axes(subject) if axis.path not in subject.model.fixed]
     if not along:
         return
     odd = np.arange(len(wo)) % 2 == 1

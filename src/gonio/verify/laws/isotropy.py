@@ -17,6 +17,8 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 EXACT = 1e-6
 SINGLE = 2e-3
 VISIBLE = 1e-3  # least anisotropy
+ROTATION = "rotation"  # parameter that turns the axes about the normal, counterclockwise (docs/conventions.md)
+TURN = 0.7  # radians by which the axes are turned
 
 
 class Isotropy(Law):
@@ -61,14 +63,35 @@ class Isotropy(Law):
         if size < VISIBLE and effort.full:  # at other parameter values it may be isotropic
             finding.problems.append(f"declared anisotropic, but a rotation changes it by {size:.1e} at most")
         self._axes(subject, finding)
+        self._turned(subject, finding, (wo, wi), exact)
         return finding
+
+    def _turned(self, subject: Subject, finding: Finding, pair: tuple[np.ndarray, np.ndarray], exact: bool) -> None:
+        """With its axes turned, the material has the same values for directions that are turned with them."""
+        other = _with_turned_axes(subject)
+        if other is None:
+            return
+        wo, wi = pair
+        turned_o, turned_i = (directions.rotated(w, np.full(len(w), TURN)) for w in pair)
+        there, back = subject.eval(wo, wi), other.eval(turned_o, turned_i)
+        noise = 0.0 if exact else rounding(subject.eval, wo, wi) + rounding(other.eval, turned_o, turned_i)
+        row, size = worst_of(self._error(there, back, exact, noise))
+        finding.figure, finding.tolerance = size, EXACT if exact else SINGLE
+        finding.at, finding.worst = (wo[row], wi[row]), pair_in_words(wo[row], wi[row])
+        finding.notes.append(f"axes and directions turned together: differs by {size:.1e}")
+        if size > finding.tolerance:
+            finding.shown = f"changes by {size:.2g} if axes and directions turn together"
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
         swapped = _swapped(subject) if not subject.isotropic else None
-        if not subject.isotropic and swapped is None:
+        turned = _with_turned_axes(subject) if finding.figure > 0.0 and not subject.isotropic else None
+        if not subject.isotropic and swapped is None and turned is None:
             return None
 
         def rotated(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            if turned is not None:
+                angle = np.full(len(wo), TURN)
+                return subject.eval(wo, wi), turned.eval(directions.rotated(wo, angle), directions.rotated(wi, angle))
             if swapped is not None:
                 return subject.eval(wo, wi), swapped.eval(wo, wi)
             # an angle per wo, the same for all its wi
@@ -76,6 +99,7 @@ class Isotropy(Law):
             return subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
 
         where = ", against the other axes" if swapped is not None else ", under rotation"
+        where = ", with axes and directions turned together" if turned is not None else where
         return severity.between(subject, rotated, where)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
@@ -84,6 +108,8 @@ class Isotropy(Law):
                 "the wider axis has the smaller width: alpha_x and alpha_y exchanged?",
                 "axes exchanged",
             )
+        elif not subject.isotropic and finding.figure > finding.tolerance:
+            yield self._cause_of_turn(subject, seed)
         elif subject.isotropic:
             wo, wi = pairs(subject, 4096, seed)
             turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
@@ -98,14 +124,31 @@ class Isotropy(Law):
             words = f"values change{where} when both directions rotate about the normal: `isotropic` should be False"
             yield Cause(f"{words}, or does the formula depend on a tangent?", "turns")
 
+    def _cause_of_turn(self, subject: Subject, seed: int) -> Cause:
+        """Whether the axes turn the wrong way, or only parts of the formula turn."""
+        wo, wi = pairs(subject, 4096, seed)
+        other = _with_turned_axes(subject)
+        assert other is not None, "the law has failed for it"
+        back = np.full(len(wo), -TURN)
+        there, clockwise = subject.eval(wo, wi), other.eval(directions.rotated(wo, back), directions.rotated(wi, back))
+        if np.mean(np.abs(there - clockwise) > 1e-3 * np.maximum(there, clockwise)) < 1e-3:
+            return Cause(f"{ROTATION} turns the axes clockwise; the convention is counterclockwise", "turn reversed")
+        return Cause(
+            f"only a part of the formula turns with {ROTATION}: a term uses directions of the other frame", "turn"
+        )
+
     def _difference(
         self, subject: Subject, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], exact: bool
     ) -> np.ndarray:
         there, back = subject.eval(*first), subject.eval(*second)
+        noise = 0.0 if exact else rounding(subject.eval, *first) + rounding(subject.eval, *second)
+        return self._error(there, back, exact, noise)
+
+    def _error(self, there: np.ndarray, back: np.ndarray, exact: bool, noise: np.ndarray | float) -> np.ndarray:
+        """Largest relative difference over the channels, (N,)."""
         if exact:
             floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
             return relative(there, back, 0.0, floor).max(1)
-        noise = rounding(subject.eval, *first) + rounding(subject.eval, *second)
         floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
         return relative(there, back, noise, floor).max(1)
 
@@ -147,6 +190,14 @@ def _spread(subject: Subject) -> tuple[float, float, float]:
     moment = light * np.sin(t) ** 2
     along, across = (float(np.sum(moment * harmonic(p - phi0) ** 2)) for harmonic in (np.cos, np.sin))
     return along, across, (along + across) / max(float(np.sum(light)), 1e-30)
+
+
+def _with_turned_axes(subject: Subject) -> Subject | None:
+    """The subject with its axes turned by TURN; None if it has no parameter for that."""
+    parameter = subject.parameters.get(ROTATION)
+    if parameter is None or parameter.kind != "angle":
+        return None
+    return subject.replace(**{ROTATION: float(getattr(subject.model, ROTATION) or 0.0) + TURN})
 
 
 def _swapped(subject: Subject) -> Subject | None:

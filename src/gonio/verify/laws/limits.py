@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...material import BSDF, Limit, tree
-from .. import box, severity
+from .. import box, ranges, severity
 from ..effort import Effort
 from ..subject import Fault, Subject, of
 from ..verdict import DoesNotApply, Finding
@@ -123,7 +123,7 @@ def _finding(cases: list[_Case], wo: np.ndarray, wi: np.ndarray) -> Finding:
 def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[_Case]:
     """The comparisons at all declared limits."""
     rng = np.random.default_rng([seed, 83])
-    axes = {axis.path: axis for axis in box.axes(subject) if axis.path not in subject.model.fixed}
+    axes = {axis.path: axis for axis in ranges.axes(subject) if axis.path not in subject.model.fixed}
     limits, count = subject.model.limits, len(wo)
     blocks = [_block(subject, axes, limit, rng, count) for limit in (*limits, Limit({}))]
     together = _in_blocks(subject, blocks)
@@ -180,7 +180,7 @@ def _named(
 
 def _at_one(
     subject: Subject,
-    axes: Mapping[str, box.Axis],
+    axes: Mapping[str, ranges.Axis],
     limit: Limit,
     rng: np.random.Generator,
     wo: np.ndarray,
@@ -237,7 +237,7 @@ def _case(
 
 
 def _block(
-    subject: Subject, axes: Mapping[str, box.Axis], limit: Limit, rng: np.random.Generator, count: int
+    subject: Subject, axes: Mapping[str, ranges.Axis], limit: Limit, rng: np.random.Generator, count: int
 ) -> dict[str, np.ndarray]:
     """One value per pair of every parameter that may vary: at a limit its own; every fourth is the given one, all
     others are random."""
@@ -252,7 +252,7 @@ def _block(
 
 
 def _changed(
-    axes: Mapping[str, box.Axis], limit: Limit, block: dict[str, np.ndarray], rng: np.random.Generator
+    axes: Mapping[str, ranges.Axis], limit: Limit, block: dict[str, np.ndarray], rng: np.random.Generator
 ) -> dict[str, np.ndarray]:
     """The block with other values of the muted parameters."""
     muted = [path for path in axes if any(fnmatchcase(path, pattern) for pattern in limit.mutes)]
@@ -281,7 +281,7 @@ def _values(
     return value.reshape(count, len(wo), -1)
 
 
-def _draw(axis: box.Axis, rng: np.random.Generator, count: int) -> np.ndarray:
+def _draw(axis: ranges.Axis, rng: np.random.Generator, count: int) -> np.ndarray:
     """Random values of a parameter, (N,), of a color (N, 3), of two widths (N, 2)."""
     columns = 3 if axis.kind in ("color", "spectrum") else 2 if axis.kind == "alpha" else 1
     values = np.asarray(axis.at(rng.uniform(size=(count, columns))), float)
@@ -320,7 +320,7 @@ def _row(subject: Subject, row: int, count: int) -> Subject:
 def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     """Whether a weight or a thickness fades out: near 0, values come close to those at 0. No more is known of a
     material that declares no limits."""
-    names = [axis for axis in box.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
+    names = [axis for axis in ranges.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:
         raise DoesNotApply("it declares no `limits`, and has no weight or thickness that may be 0")

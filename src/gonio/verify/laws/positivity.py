@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import InputError
 from ...material import BSDF, binding, guide_search
 from ...ops import Precision, backend
-from .. import box, directions, severity
+from .. import directions, ranges, severity
 from ..effort import Effort
 from ..forensics.causes import place_of
 from ..forensics.ratio import Cause
@@ -208,9 +208,9 @@ def _values(
     yield "wi", s.wi[drawn], wo[drawn], shown[drawn], rows[drawn]
 
 
-def _own_axes(subject: Subject) -> list[box.Axis]:
+def _own_axes(subject: Subject) -> list[ranges.Axis]:
     """The ranges of its own parameters, without angles."""
-    return [axis for axis in box.axes(subject) if axis.path in subject.parameters and axis.kind != "angle"]
+    return [axis for axis in ranges.axes(subject) if axis.path in subject.parameters and axis.kind != "angle"]
 
 
 def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:

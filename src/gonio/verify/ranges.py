@@ -1,0 +1,91 @@
+"""The ranges that the parameters of a BSDF declare, as the axes along which it is judged."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..material import BSDF, Parameter, tree
+from ..material.parameters import pair_of
+from .subject import Subject
+
+WIDE = 30.0  # ratio of the ends beyond which a range is scanned and sampled in equal ratios
+MARGIN = 0.02  # fraction of a range, if its ends are excluded
+MIN_ALBEDO = 0.01  # of plugins whose failed samples have weight 0: black samples would count as failed
+TURNS = (0.4, 5.8)  # of angles: no rotation, and a whole turn, would hide what is not rotated
+MIN_RATIO = 1e-4  # first value over the last of a range that starts at 0 and is divided in equal ratios
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """The range of one parameter; `ratio` if it is divided in equal ratios."""
+
+    path: str
+    low: float
+    high: float
+    ratio: bool
+    kind: str = "float"
+
+    def at(self, share: float | np.ndarray) -> Any:
+        """The value at a share of the range, 0 to 1."""
+        if not self.ratio:
+            return self.low + share * (self.high - self.low)
+        low = self.low if self.low > 0.0 else MIN_RATIO * self.high
+        value = low * (self.high / low) ** share
+        return np.where(np.asarray(share) <= 0.0, self.low, value) if self.low <= 0.0 else value
+
+
+def axes(subject: Subject) -> list[Axis]:
+    """The parameters that declare a range, including those of inner materials."""
+    if not isinstance(subject.model, BSDF):
+        return []
+    axes_ = []
+    for leaf in tree.surface(subject.model):
+        ends = _ends(leaf.parameter, leaf.value)
+        if ends is None:
+            continue
+        low, high, ratio = ends
+        if leaf.parameter.kind == "spectrum" and subject.zero_weight_is_failure:
+            low = max(low, min(MIN_ALBEDO, high))
+        if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
+            low += MARGIN * (high - low)
+        # fitted widths and powers are spectra too, but no colors
+        color = leaf.parameter.kind == "spectrum" and leaf.parameter.high <= 1.0
+        axes_.append(Axis(leaf.path, low, high, ratio, "color" if color else leaf.parameter.kind))
+    return axes_
+
+
+def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
+    """Whether an inner material has a delta lobe at this value, while the outer one declares none: it was not written
+    for such lobes."""
+    if _hides_delta(subject.model):
+        return False  # it already does at the given values, which are tested anyway
+    try:
+        return _hides_delta(subject.replace(**{path: value}).model)
+    except InputError:
+        return False
+
+
+def _hides_delta(model: BSDF) -> bool:
+    inner = tree.children(model).values()
+    return any((model.delta == "never" and one.delta != "never") or _hides_delta(one) for one in inner)
+
+
+def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
+    if not parameter.numeric or value is None:
+        return None
+    if parameter.kind == "angle":
+        return *TURNS, False
+    low, high = parameter.low, parameter.high
+    if not math.isfinite(low):
+        return None
+    if not math.isfinite(high):
+        # no upper end is declared, and none is assumed: up to the given value
+        high = float(np.max(np.asarray(pair_of(value) if parameter.kind == "alpha" else value, float)))
+    if not low < high:
+        return None
+    return low, high, high > WIDE * max(low, 1.0) or parameter.kind == "alpha"
