@@ -113,7 +113,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
 
 # of three channels, as shares of a range: all different, one alone, one at the low end
 COLORS = ((0.95, 0.1, 0.5), (0.0, 0.9, 0.9), (0.9, 0.0, 0.0), (0.5, 0.95, 0.1), (0.0, 0.9, 0.0), (0.9, 0.0, 0.9))
-NARROW = 0.3  # share of a range of widths
+NARROW = 0.1  # share of a range of widths
 WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # of the two axes, as shares of a range
 
 

@@ -204,8 +204,7 @@ def _values(
     shown = np.where(np.isfinite(s.wi), s.wi, 0.0)
     yield "weight", s.weight, wo, shown, rows
     yield "a sample's pdf", s.pdf[:, None], wo, shown, rows
-    drawn = s.pdf > 0.0
-    yield "wi", s.wi[drawn], wo[drawn], shown[drawn], rows[drawn]
+    yield "wi", s.wi, wo, shown, rows  # of failed samples too: a renderer derives rays and derivatives from them
 
 
 def _own_axes(subject: Subject) -> list[ranges.Axis]:
