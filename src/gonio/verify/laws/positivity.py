@@ -13,6 +13,7 @@ from ...material import BSDF, binding, guide_search
 from ...ops import Precision, backend
 from .. import directions, ranges, severity
 from ..effort import Effort
+from ..forensics import extremes
 from ..forensics.causes import place_of
 from ..forensics.ratio import Cause
 from ..subject import Fault, Subject, guarded
@@ -113,15 +114,71 @@ class Positivity(Law):
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         there = where_found(subject, finding)
         wo, wi, _ = _grid(there, effort, seed)
-        value = np.min([there.eval(wo, wi, precision=p).min(1) for p in there.precisions], axis=0)
-        for what, bad in (("not finite", ~np.isfinite(value)), ("negative", value < 0.0)):
-            for words, rows in _exact_places(wo, wi):
-                if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
-                    yield Cause(f"eval is {what} only where {words}: a division by 0?", f"{what} where {words}")
-                    return
-            place = place_of(wo, wi, bad)
-            if place:
-                yield Cause(f"eval is {what} only {place}", f"{what} {place}")
+        for fault, wrong in _FAULTS.items():
+            bad = np.any([wrong(there.eval(wo, wi, precision=p)).any(1) for p in there.precisions], axis=0)
+            if bad.any():
+                yield from self._of_eval(subject, finding, effort, seed, fault, bad)
+                return
+            rows = [
+                (what, wrong(values).any(1), u)
+                for precision in there.precisions
+                for what, values, u in _drawn(there, effort, seed, precision)
+            ]
+            if what := next((what for what, many, _ in rows if many.any()), ""):
+                cause = extremes.of_numbers(rows, CORNERS, fault)
+                if cause is not None:
+                    yield cause
+                yield from self._of_settings(subject, finding, effort, seed, fault, what)
+                many = next(many for name, many, _ in rows if name == what)
+                drawn = len(many) == len(wo) and extremes.of_views(what, wo, many, fault, there.transmits)
+                if drawn:
+                    yield drawn
+                return
+
+    def _of_eval(
+        self, subject: Subject, finding: Finding, effort: Effort, seed: int, fault: str, bad: np.ndarray
+    ) -> Iterator[Cause]:
+        wo, wi, _ = _grid(where_found(subject, finding), effort, seed)
+        for words, rows in _exact_places(wo, wi):
+            if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
+                guess = "a division by 0" if fault == "not finite" else "a term that is not clamped"
+                yield Cause(f"eval is {fault} only where {words}: {guess}?", f"{fault} where {words}")
+                return
+        yield from self._of_settings(subject, finding, effort, seed, fault, "eval")
+        if place := place_of(wo, wi, bad):
+            yield Cause(f"eval is {fault} only {place}", f"{fault} {place}")
+
+    def _of_settings(
+        self, subject: Subject, finding: Finding, effort: Effort, seed: int, fault: str, what: str
+    ) -> Iterator[Cause]:
+        wo, wi, _ = _grid(subject, effort, seed)
+
+        def fails(one: Subject) -> bool:
+            for precision in one.precisions:
+                values = [one.eval(wo, wi, precision=precision)]
+                if what != "eval":
+                    values += [drawn for name, drawn, _ in _drawn(one, effort, seed, precision) if name == what]
+                if any(_FAULTS[fault](part).any() for part in values):
+                    return True
+            return False
+
+        if words := extremes.of_parameters(subject, finding.settings, fault, fails):
+            yield Cause(f"{what} is {fault} {words}", f"{fault} for settings")
+
+
+_FAULTS = {"not finite": lambda values: ~np.isfinite(values), "negative": lambda values: values < 0.0}
+
+
+def _drawn(
+    subject: Subject, effort: Effort, seed: int, precision: Precision
+) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
+    """The checked quantities but eval: name, values (n, channels), and random numbers if they are of samples."""
+    wo, wi, u = _grid(subject, effort, seed)
+    for what, values, _, _, rows in _values(subject, wo, wi, u, precision):
+        if what not in ("eval", "wi"):
+            yield what, values, None if what == "pdf" else u[rows]
+        elif what == "wi":
+            yield what, np.where(np.isfinite(values), 1.0, np.nan), u[rows]
 
 
 def _exact_places(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -163,6 +163,8 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 
 def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
     """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else ""."""
+    if not len(weight):
+        return ""
     off = np.abs(weight - right) > 0.01 * np.maximum(weight, right)
     share = off.mean(0)  # a constant channel is not clamped
     if off.sum() < 64 or not np.any((share > 0.01) & (share < 0.97)) or np.any(share >= 0.97):

@@ -1,0 +1,92 @@
+"""Where values that are negative or not finite occur: for which parameter value, which random number, which side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ..subject import Fault, Subject
+from .ratio import Cause
+
+MOST = 4  # parameters of which each is set back to see whether it matters
+OFTEN = 0.2  # share of the rows with a random number that must be bad for it to be the reason
+STEEP = 15.0  # degrees; an angle below counts as none
+NUMBERS = ("first", "second", "third")
+
+# (kind of the values, whether each row is bad, random numbers (N, 3) or None if they do not matter)
+Bad = tuple[str, np.ndarray, np.ndarray | None]
+
+
+def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fails: Callable[[Subject], bool]) -> str:
+    """Which of the changed parameters a fault needs, in words: "for tint = 0"; "" if none alone, or if too many.
+
+    settings  the values at which the fault occurs
+    fails     whether a subject has the fault
+    """
+    if not settings or len(settings) > MOST or fails(subject):
+        return ""
+    needed = []
+    for name, value in settings.items():
+        try:
+            without = subject.replace(**{k: v for k, v in settings.items() if k != name})
+            if not fails(without):
+                needed.append(f"{name} = {_written(value)}")
+        except (Fault, InputError):
+            return ""
+    if not needed:  # each of several parameters brings it about
+        return ""
+    zero = all(np.all(np.asarray(settings[part.split(" = ")[0]], float) == 0.0) for part in needed)
+    guess = {
+        (True, "not finite"): "a division by it, or a logarithm of it",
+        (False, "not finite"): "an overflow, or a division by 0",
+        (True, "negative"): "a term that is subtracted and not clamped",
+        (False, "negative"): "a term that exceeds its range and is not clamped",
+    }[zero, fault]
+    return f"only for {' and '.join(needed)}: {guess}?"
+
+
+def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cause | None:
+    """The random number whose extreme value brings about the fault; None if it occurs for others too."""
+    for what, bad, u in rows:
+        if u is None or not bad.any():
+            continue
+        for dimension, name in enumerate(NUMBERS):
+            for corner in corners:
+                there = u[:, dimension] == corner
+                if not np.any(bad & ~there) and np.sum(bad & there) > OFTEN * there.sum():
+                    value = "0" if corner == 0.0 else "next to 1" if corner > 0.9 else f"{corner:g}"
+                    other = "1 - " if corner > 0.9 else ""
+                    words = f"{what} is {fault} only where the {name} random number is {value}"
+                    return Cause(f"{words}: a logarithm of {other}u, or a division by it?", f"{fault} at u")
+    return None
+
+
+def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: bool) -> Cause | None:
+    """The side of the surface, and the angle, from which viewers meet the fault; None if neither tells it apart.
+
+    wo, bad  of the same samples, (N, 3) and (N,)
+    """
+    below = wo[:, 2] < 0.0
+    sides = [side for side in (below, ~below) if side.any() and not np.any(bad & ~side)]
+    if not bad.any() or not sides:
+        return None
+    side = sides[0]
+    angle = np.degrees(np.arccos(np.clip(np.abs(wo[:, 2]), 0.0, 1.0)))
+    first = float(angle[bad].min())
+    beyond = side & (angle >= first)
+    if np.sum(bad & beyond) < OFTEN * beyond.sum() or (first < STEEP and side.all()):
+        return None
+    name = "below" if side is below else "above"
+    words = f"{what} is {fault} only for wo {name} the surface"
+    if first < STEEP:
+        return Cause(words, f"{fault} {name}")
+    guess = ": total reflection?" if transmits else ""
+    return Cause(f"{words}, from {first:.3g} degrees to the normal on{guess}", f"{fault} {name}")
+
+
+def _written(value: Any) -> str:
+    numbers = np.unique(np.asarray(value, float))
+    return f"{numbers[0]:.4g}" if len(numbers) == 1 else "(" + ", ".join(f"{v:.4g}" for v in np.ravel(value)) + ")"
