@@ -19,6 +19,8 @@ from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceIntera
 
 COUNT = 4096
 SAME = 1e-4  # relative: float32, and kernels that are fused differently
+SIGMAS = 6.0  # of the difference of two means that chance does not explain
+LEAST = 0.02  # smallest difference of means that is reported
 FEW = 0.002  # fraction of rows that rounding may move across a discontinuity
 
 
@@ -33,6 +35,7 @@ def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Ans
         ("components", trial.components),
         ("types", trial.types),
         ("shading frame", trial.rotated_frame),
+        ("texture coordinates", trial.textured),
         ("eval_diffuse_reflectance", trial.diffuse_reflectance),
     ):
         trial.difference = None
@@ -88,8 +91,7 @@ class _Trial:
         self.drawn, weight = bsdf.sample(self.ctx, si, *self.u)
         self.weight = self.color(weight)
         self.lit = np.any(self.weight > 0.0, axis=1)
-        sampled = np.asarray(self.drawn.sampled_type.numpy())
-        self.delta = (np.broadcast_to(sampled, COUNT) & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0
+        self.delta = _is_delta(self.drawn)
         self.noisy = not np.array_equal(self.value, self.color(bsdf.eval(self.ctx, si, self.wo)))
 
     @staticmethod
@@ -211,8 +213,29 @@ class _Trial:
         frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
         si = mi.SurfaceInteraction3f(self.si)
         si.n, si.sh_frame, si.dp_du, si.dp_dv = (mi.Normal3f(frame.n), frame, frame.s, frame.t)
-        return self.unlike(
-            "eval on a tilted surface", "eval", self.color(self.bsdf.eval(self.ctx, si, self.wo)), self.value
+        bs, weight = self.bsdf.sample(self.ctx, si, *self.u)
+        value = self.color(self.bsdf.eval(self.ctx, si, self.wo))
+        return (
+            self.unlike("eval on a tilted surface", "eval", value, self.value)
+            or self.unlike("pdf on a tilted surface", "pdf", _rows(self.bsdf.pdf(self.ctx, si, self.wo)), self.pdf)
+            or self.unlike("sample's weight on a tilted surface", "sample's weight", self.color(weight), self.weight)
+            or self.unlike("a sample's wo on a tilted surface", "a sample's wo", _rows(bs.wo), _rows(self.drawn.wo))
+        )
+
+    def textured(self) -> str:
+        """At other texture coordinates sample, eval and pdf read the same textures."""
+        si = mi.SurfaceInteraction3f(self.si)
+        uv = np.random.default_rng(112).random((2, COUNT), dtype=np.float32)
+        si.uv = mi.Point2f(uv[0], uv[1])
+        bs, weight = self.bsdf.sample(self.ctx, si, *self.u)
+        smooth = ~_is_delta(bs) & np.any(self.color(weight) > 0.0, axis=1)
+        if smooth.sum() < 20:
+            return ""
+        density = _rows(bs.pdf)[smooth]
+        value = self.color(self.bsdf.eval(self.ctx, si, bs.wo))[smooth]
+        pdf = _rows(self.bsdf.pdf(self.ctx, si, bs.wo))[smooth]
+        return self.unlike("a sample's pdf", "pdf with other si.uv", density, pdf) or self.unlike(
+            "weight x pdf", "eval with other si.uv", self.color(weight)[smooth] * density, value
         )
 
     def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
@@ -231,7 +254,7 @@ class _Trial:
             if number is not None and np.any(lit & (component != number)):
                 strange = int(component[lit & (component != number)][0])
                 return f"{name} requested, but sample returns component {strange}"
-            wrong = self.shares(name, bs, self.color(weight))
+            wrong = self.shares(name, bs, self.color(weight)) or self.drawn_by_pdf(name, ctx, bs, self.color(weight))
             if wrong:
                 return wrong
         if np.any(self.value > 0.0) or np.any(total > 0.0):
@@ -240,14 +263,41 @@ class _Trial:
 
     def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
         """A delta lobe carries weight x pdf, whether it is requested alone or chosen among others."""
-        type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
-        delta = (type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0
+        delta = _is_delta(bs)
         same = np.abs(_rows(bs.wo) - _rows(self.drawn.wo)).max(1) < 1e-3
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
             return ""
         single, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
         return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", single, among)
+
+    def drawn_by_pdf(self, name: str, ctx: BSDFContext, bs: BSDFSample, weight: np.ndarray) -> str:
+        """Samples that were requested of one part have the density that `pdf` states for it: their means of 1, of the
+        cosine to the mirror direction and of cos^2, where the part reflects light, are those of all samples, weighted
+        by the ratio of the densities."""
+        if self.delta.any() or _is_delta(bs).any():
+            return ""
+        other = self.drawn.wo
+        whole, part = (_rows(self.bsdf.pdf(one, self.si, other))[:, 0] for one in (self.ctx, ctx))
+        lit = np.any(self.color(self.bsdf.eval(ctx, self.si, other)) > 0.0, axis=1) & self.lit & (whole > 0.0)
+        ratio = np.divide(part, whole, out=np.zeros(COUNT), where=lit)
+        own = np.where(np.any(weight > 0.0, axis=1), 1.0, 0.0)
+        mirror = _rows(self.si.wi) * np.array([-1.0, -1.0, 1.0])
+
+        def moments(w: np.ndarray) -> np.ndarray:
+            return np.stack([np.ones(COUNT), np.sum(w * mirror, axis=1), w[:, 2] ** 2], axis=1)
+
+        first, second = own[:, None] * moments(_rows(bs.wo)), ratio[:, None] * moments(_rows(other))
+        if not (np.isfinite(first).all() and np.isfinite(second).all()):
+            return ""
+        off = np.abs(first.mean(0) - second.mean(0))
+        noise = np.sqrt((first.var(0) + second.var(0)) / COUNT)
+        if np.any((off > SIGMAS * noise) & (off > LEAST)):
+            row = int(np.argmax(off / np.maximum(noise, 1e-12)))
+            of = ("the number of samples", "the mean cosine to the mirror direction", "the mean cos^2")[row]
+            means = f"{of} is {first.mean(0)[row]:.3g}, not {second.mean(0)[row]:.3g}"
+            return f"samples of {name} alone do not follow its pdf: {means}"
+        return ""
 
     def diffuse_reflectance(self) -> str:
         value = _rows(mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self.si)))
@@ -288,6 +338,12 @@ class _Trial:
         ratio = got[wrong].sum() / max(expected[wrong].sum(), 1e-30)
         part = f"in {wrong.mean():.1%} of the pairs"
         return f"{name} is not {other}: {ratio:.4g} times as large where they differ, {part}"
+
+
+def _is_delta(bs: BSDFSample) -> np.ndarray:
+    """Whether each sample is of a delta lobe or passes straight through, (COUNT,)."""
+    type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
+    return np.asarray((type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0)
 
 
 def _uniform(rng: np.random.Generator) -> np.ndarray:

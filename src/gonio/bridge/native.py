@@ -61,9 +61,11 @@ class MitsubaBSDF(BSDF):
         delta = mi.has_flag(bs.sampled_type, flags.Delta) | mi.has_flag(bs.sampled_type, flags.Null)
         pdf = bs.pdf
         if self._si is None:
-            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. Inside a
-            # mix, weight 0 may also be a black lobe toward a direction that the other material reflects to.
-            failed = dr.all(weight == 0.0)
+            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. A direction
+            # that is drawn with the density that `pdf` states is a sample, though, also where nothing is reflected.
+            # Inside a mix, weight 0 may also be a black lobe toward a direction that the other material reflects to.
+            stated = self.bsdf.pdf(ctx, si, bs.wo, self._active)
+            failed = dr.all(weight == 0.0) & ~((pdf > 0.0) & (dr.abs(stated - pdf) < 1e-3 * pdf))
             pdf, delta = dr.select(failed, 0.0, pdf), delta & ~failed
         return Sample(bs.wo, _like(wo, weight), pdf, delta, bs.eta)
 

@@ -30,6 +30,7 @@ JUMP = 6.0  # least ratio of a jump to the neighboring steps
 MIN_JUMP = 0.004  # smallest jump, relative to the value: smaller ones are invisible
 UNIFORM_PLACES = 1  # places of a material whose values must not vary from ray to ray
 PLACES_PER_CHOICE = 9
+LEAST_CHOICES = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,7 +85,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     if not subject.model.needs_uniform:
         for jump in jumps(subject, along, seed)[: max(2, most // 3)]:
             wanted.append(("jump", jump))
-    wanted += [("choice", other) for other in others[: max(1, most // PLACES_PER_CHOICE)]]
+    wanted += [("choice", other) for other in others[: max(LEAST_CHOICES, most // PLACES_PER_CHOICE)]]
     corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)] if along else []
     if len(along) > 1:
         for _ in range(2):

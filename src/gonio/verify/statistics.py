@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 
 def chi_square_tail(statistic: float, degrees: int) -> float:
     """P(X >= statistic) of the chi-square distribution."""
@@ -29,3 +31,34 @@ def binomial_two_sided(count: int, trials: int, probability: float) -> float:
 def sidak(significance: float, tests: int) -> float:
     """Significance per test, such that the probability of a false alarm in all tests is the given one."""
     return -math.expm1(math.log1p(-significance) / max(tests, 1))
+
+
+# --------------------------------------------------------------------------- values of several bounces
+
+STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
+
+
+def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) -> bool:
+    """Whether values are a sum of powers of an albedo with no negative factor: light that is reflected once, twice, and
+    so on. A color that is decoded, or multiplied twice, has no first power.
+
+    rows         values at the albedos STEPS, (7, N)
+    noise        of the values, relative
+    first_power  whether it must occur; light that crosses five panes has none
+    """
+    moved = rows[-1] > rows[0] * (1.0 + 1e-6) + 1e-9 * rows.max(initial=0.0)
+    if not moved.any():
+        return False
+    rows = rows[:, moved] / rows[-1, moved]
+    first = rows[1] - rows[0]
+    differences = rows
+    for order in range(1, len(STEPS) - 1):  # all differences of such a sum are positive
+        differences = np.diff(differences, axis=0)
+        if np.mean((differences < -noise * 2.0**order).any(0)) > 1e-3:
+            return False
+    if not first_power:
+        return True
+    if not np.any(first > 0.0):
+        return False
+    # with powers of 1.1 and more, the first step is negligible
+    return bool(np.median(first[first > 0.0] / (rows[2] - rows[1])[first > 0.0]) > 0.5)

@@ -208,7 +208,8 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
     """Directions wo on each side that answers: in equal steps of the cosine, the normal, and near grazing."""
-    mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
+    # not in the middle: steps of a material lie at simple fractions, where the precisions may be on different sides
+    mu = (np.arange(effort.furnace) + 0.47) / effort.furnace
     # the normal itself as well, where tangents and azimuths are undefined
     theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else ()])
     wo = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -22,6 +23,9 @@ TOLERANCE = 1e-4
 ROWS = 1 << 17  # rays in flight
 # Relative to the parameter: with five points the truncation error is its fourth power, the rounding error 1e-16 / 1e-4.
 STEP = 1e-4
+ALL = 0.9  # share of the lit pairs that a rounded parameter changes at once
+PARTS = 8  # of the way to another value
+LEVELS = 3  # of ever smaller parts
 
 
 class Gradients(Law):
@@ -111,8 +115,9 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter without derivative changes nearly all values when it is changed by a third, and has no
-    derivative there either; with a derivative there, it is only clamped at the given value."""
+    """Whether a parameter without derivative changes nearly all values at once when it is changed by a third, and has
+    no derivative there either. With a derivative there, it is only clamped at the given value; if pairs change one by
+    one, it is the threshold of a step in space."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -125,10 +130,33 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
         return False
     lit = before.max(1) > 0.0
     changed = np.abs(after - before).max(1) > 1e-3 * before.max(1)
-    if not (lit.any() and np.mean(changed[lit]) > 0.9):
+    if not (lit.any() and np.mean(changed[lit]) > ALL):
+        return False
+    if not _at_once(subject, path, (value, moved), (wo[lit], wi[lit])):
         return False
     exact, _, _, least = _derivatives(subject.replace(**{path: moved}).model, [path], wo, wi)[path]
     return bool(np.max(np.abs(exact)) < least)
+
+
+def _at_once(subject: Subject, path: str, ends: tuple[Any, Any], pair: tuple[np.ndarray, np.ndarray]) -> bool:
+    """Whether nearly all values change at the same value of the parameter: in the step with most changes, in the part
+    of this step with most changes, and so on."""
+    low, high = 0.0, 1.0
+    for _ in range(LEVELS):
+        at = np.linspace(low, high, PARTS + 1)
+        values = [subject.replace(**{path: _between(*ends, share)}).eval(*pair) for share in at]
+        shares = [float(np.mean(np.any(a != b, axis=1))) for a, b in itertools.pairwise(values)]
+        if max(shares) < ALL:
+            return False
+        k = int(np.argmax(shares))
+        low, high = at[k], at[k + 1]
+    return True
+
+
+def _between(first: Any, last: Any, share: float) -> Any:
+    """A value on the way from one to another: a number or a tuple."""
+    at = (1.0 - share) * np.asarray(first, float) + share * np.asarray(last, float)
+    return tuple(map(float, at)) if at.ndim else float(at)
 
 
 def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:

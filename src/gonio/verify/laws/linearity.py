@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ...material import BSDF, models
-from .. import directions, severity
+from .. import directions, severity, statistics
 from ..effort import Effort
 from ..forensics.ratio import SPREAD, Cause
 from ..subject import Subject
@@ -114,28 +114,12 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
 
 Value: TypeAlias = "float | tuple[float, float, float]"
 COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
-STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 
 def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether values are a sum of powers of an albedo with no negative factor and with the first power: light that is
-    reflected once, twice, and so on. A color that is decoded, or multiplied twice, has no first power."""
-    rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in STEPS])
-    moved = rows[-1] > rows[0] * (1.0 + 1e-6) + 1e-9 * rows.max(initial=0.0)
-    if not moved.any():
-        return False
-    rows = rows[:, moved] / rows[-1, moved]
-    first = rows[1] - rows[0]
-    noise = 1e-9 if subject.best == "float64" else 1e-4
-    differences = rows
-    for order in range(1, len(STEPS) - 1):  # all differences of such a sum are positive
-        differences = np.diff(differences, axis=0)
-        if np.mean((differences < -noise * 2.0**order).any(0)) > 1e-3:
-            return False
-    # with powers of 1.1 and more, the first step is negligible
-    return (
-        bool(np.median(first[first > 0.0] / (rows[2] - rows[1])[first > 0.0]) > 0.5) if np.any(first > 0.0) else False
-    )
+    """Whether light is reflected once, twice, and so on by this albedo: see `statistics.is_power_series`."""
+    rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
+    return statistics.is_power_series(rows, 1e-9 if subject.best == "float64" else 1e-4)
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:

@@ -19,17 +19,19 @@ from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, angles, pair_in_words, pairs, where_found
 
+# No simple fraction is the cosine or the square of the sine of these angles: the steps of a material often lie there,
+# where the two precisions may be on different sides.
 ABOVE = (
     (0.0, 0.0),
     (12.0, 20.0),
-    (30.0, 110.0),
-    (45.0, 200.0),
-    (60.0, 300.0),
-    (75.0, 45.0),
+    (31.0, 110.0),
+    (44.0, 200.0),
+    (61.0, 300.0),
+    (76.0, 45.0),
     (85.0, 160.0),
     (89.5, 250.0),
 )
-BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
+BELOW = ((180.0, 0.0), (155.0, 70.0), (139.0, 190.0), (124.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
 OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for Fresnel's term
 FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for an accuracy of a percent
 PAIRS = 1 << 13  # of directions, to find a cause
