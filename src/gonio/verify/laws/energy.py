@@ -23,6 +23,7 @@ from .base import Law, where_found
 
 GAIN = 1e-3
 MOST_ALONE = 6  # parameters that are whitened alone
+ELSEWHERE = 88.0  # degrees; a view at other parameter values
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
 
@@ -211,7 +212,7 @@ def _views(subject: Subject, effort: Effort) -> np.ndarray:
     # not in the middle: steps of a material lie at simple fractions, where the precisions may be on different sides
     mu = (np.arange(effort.furnace) + 0.47) / effort.furnace
     # the normal itself as well, where tangents and azimuths are undefined
-    theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else ()])
+    theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else (ELSEWHERE,)])
     wo = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
     return directions.single(np.concatenate(wo))
 

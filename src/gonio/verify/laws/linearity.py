@@ -49,7 +49,7 @@ class Linearity(Law):
                 # as where one layer dims another by its brightest channel
                 notes.append(f"{label} is not linear between two colors: off by {size:.2g}")
                 continue
-            if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi):
+            if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi, effort.full):
                 notes.append(f"{label} counts more than once, as with several bounces of light: off by {size:.2g}")
                 continue
             if size > worst:
@@ -116,10 +116,11 @@ Value: TypeAlias = "float | tuple[float, float, float]"
 COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
 
 
-def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether light is reflected once, twice, and so on by this albedo: see `statistics.is_power_series`."""
+def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given: bool) -> bool:
+    """Whether light is reflected once, twice, and so on by this albedo: see `statistics.is_power_series`. At other than
+    the given values of the other colors the first power may be absent: what meets a black part once is lost."""
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
-    return statistics.is_power_series(rows, 1e-9 if subject.best == "float64" else 1e-4)
+    return statistics.is_power_series(rows, 1e-9 if subject.best == "float64" else 1e-4, first_power=given)
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
