@@ -14,12 +14,13 @@ from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
+from ..forensics import channels
 from ..forensics.causes import place_of
 from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
 from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
-from .base import Law, where_found
+from .base import Law, pairs, where_found
 
 GAIN = 1e-3
 MOST_ALONE = 6  # parameters that are whitened alone
@@ -100,6 +101,10 @@ class Energy(Law):
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
+        there = where_found(subject, finding)
+        mix = channels.mixed(there, *pairs(there, 4096, seed)) if there.has_density else None
+        if mix is not None and not _gains_in_gray(there, curves, effort, seed):
+            yield mix
         # the right albedo is known only where nothing is absorbed
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:
@@ -205,6 +210,18 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
         if np.abs(a - b).max() < SPREAD and np.ptp(factor) < SPREAD * middle:
             words = f"without absorption, {name} is {written(middle)} times the other channels for every wo"
             yield Cause(f"{words}: a constant of that channel?", f"{factor_key(middle)} in {name}")
+
+
+def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed: int) -> bool:
+    """Whether more light is reflected than arrives if the largest channel of every color stands for all three."""
+    gray = {
+        name: (max(value),) * 3
+        for name, parameter in subject.parameters.items()
+        if parameter.kind == "spectrum" and isinstance(value := getattr(subject.model, name, None), tuple | list)
+    }
+    worst = int(np.argmax(curves.quadrature.max(1)))
+    value, error = _quadrature(subject.replace(**gray), curves.wo[worst : worst + 1], effort, seed)
+    return bool((value - error).max() - 1.0 > GAIN)
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:

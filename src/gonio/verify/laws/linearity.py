@@ -10,6 +10,7 @@ import numpy as np
 from ...material import BSDF, models
 from .. import directions, severity, statistics
 from ..effort import Effort
+from ..forensics import channels
 from ..forensics.ratio import SPREAD, Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
@@ -82,13 +83,18 @@ class Linearity(Law):
         wo, wi = pairs(subject, 4096, seed)
         low, high, middle = (subject.replace(**{name: v}).eval(wo, wi).mean(1) for v in (0.125, 0.875, 0.3125))
         lit = (low > 1e-9 * high.max()) & (high > 0.0)
+        mix = channels.mixed(subject, wo, wi)
         if lit.sum() < 64:
+            if mix is not None:
+                yield mix
             return
         powers = (np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5))
         power = float(np.median(powers[0]))
         if abs(power - 1.0) > 0.01 and all(np.percentile(np.abs(p / power - 1.0), 97.0) < SPREAD for p in powers):
             text = f"values follow {name}^{power:.3g}, within 1e-3: a color decoded or multiplied twice?"
             yield Cause(text, f"{name}^{power:.3g}")
+        if mix is not None:
+            yield mix
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:

@@ -18,6 +18,7 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 EXACT = 1e-6
 SINGLE = 2e-3
 STEPS = 24  # of the map, per angle
+EVEN = 512  # pairs of angles
 REPEATS = 4096  # values of a stochastic model per pair
 PERTURBATION = 1e-5  # radians
 PAIRS = 1 << 13  # of directions, to find a cause
@@ -86,6 +87,10 @@ class Reciprocity(Law):
         wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
         there, back = (subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo))
         yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
+        if subject.isotropic and not subject.transmits and _difference_is_even(subject, seed):
+            words = "f(wo, wi) - f(wi, wo) is the same for all azimuths"
+            guess = "a base, or a compensation, that is attenuated for one of the two directions only"
+            yield Cause(f"{words}: {guess}?", "one direction of a base")
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
         """A stochastic model: means over many values per pair, both ways."""
@@ -113,6 +118,19 @@ class Reciprocity(Law):
             at=(wo[place], wi[place]),
             trials=trials,
         )
+
+
+def _difference_is_even(subject: Subject, seed: int) -> bool:
+    """Whether f(wo, wi) - f(wi, wo) depends on the two angles to the normal alone."""
+    rng = np.random.default_rng([seed, 7])
+    theta = rng.uniform(2.0, 88.0, (2, EVEN))
+    off = []
+    for turn in (20.0, 75.0, 130.0, 170.0):
+        wo, wi = directions.at(theta[0], 0.0), directions.at(theta[1], turn)
+        off.append(subject.f(wo, wi).mean(1) - subject.f(wi, wo).mean(1))
+    size = np.abs(off).max(0)
+    lit = size > 1e-3 * float(np.median(np.abs(subject.f(wo, wi))))
+    return bool(lit.mean() > 0.2 and np.mean(np.ptp(off, axis=0)[lit] < 1e-3 * size[lit]) > 0.97)
 
 
 def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed: int) -> float | None:
