@@ -15,7 +15,7 @@ from gonio.material.parameters import Value
 from gonio.ops import abs, dot, safe_div, sqr, vec3, where
 from gonio.optics import frame
 from gonio.verify import verify
-from gonio.verify.forensics import crowding
+from gonio.verify.forensics import crowding, mixture
 from gonio.verify.laws import laws
 from gonio.verify.laws import pdf as pdf_law
 from gonio.verify.subject import of
@@ -217,7 +217,24 @@ def test_samples_name_the_factor_of_the_pdf(mistake: type, words: str) -> None:
     (tested,) = pdf_law._chi_square(subject, pdf_law.FEW, 1, wo)
     held = crowding.blocks(tested.cells)
     assert held is not None
-    found = crowding.named(subject, held)
+    found = crowding.named(subject, tested.cells, held, 1)
+    assert (found is None) if not words else (found is not None and words in found.words), found
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        (OtherLobeWeights, "the probability of the choice is another one in the pdf"),
+        (RightLobes, ""),
+        (HalfVectorPdf, ""),
+    ],
+)
+def test_the_weights_of_lobes_are_named(mistake: type, words: str) -> None:
+    subject = of(mistake())
+    (tested,) = pdf_law._chi_square(subject, pdf_law.FEW, 1, np.array([[0.6, 0.0, 0.8]]))
+    held = crowding.blocks(tested.cells)
+    assert held is not None
+    found = mixture.named(subject, tested.cells, held, 1)
     assert (found is None) if not words else (found is not None and words in found.words), found
 
 

@@ -95,8 +95,8 @@ def crowd(subject: Subject, held: Blocks) -> str:
 # --------------------------------------------------------------------------- the factor that would remove it
 
 
-def named(subject: Subject, held: Blocks) -> Cause | None:
-    """The factor between samples and pdf; None if none fits."""
+def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
+    """The factor between samples and pdf; None if none fits. Arguments as of `mixture.named`."""
     light = estimators.of_subject(subject)
     total = float(held.observed.sum())
     for formula, guess, field in _factors(subject):

@@ -12,7 +12,7 @@ from .. import directions, estimators, histogram, severity
 from ..cells import place
 from ..effort import Effort
 from ..figures import SampleCells
-from ..forensics import crowding
+from ..forensics import crowding, mixture
 from ..forensics.causes import nothing_below
 from ..forensics.ratio import Cause
 from ..subject import Subject
@@ -113,11 +113,13 @@ class Pdf(Law):
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are equal
         views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
         oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
-        for tested in _chi_square(there, FEW, seed, oblique):
-            held = crowding.blocks(tested.cells)
-            cause = crowding.named(there, held) if held is not None else None
-            if cause is not None:
-                yield cause
+        oblique_tests = _chi_square(there, FEW, seed, oblique)
+        for explain in (crowding.named, mixture.named):
+            for tested in oblique_tests:
+                held = crowding.blocks(tested.cells)
+                cause = explain(there, tested.cells, held, seed) if held is not None else None
+                if cause is not None:
+                    yield cause
         if _reused(there, oblique[:1], seed):
             yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
         for note in finding.notes:
