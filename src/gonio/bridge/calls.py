@@ -278,9 +278,9 @@ class _Trial:
         if self.delta.any() or _is_delta(bs).any():
             return ""
         other = self.drawn.wo
-        whole, part = (_rows(self.bsdf.pdf(one, self.si, other))[:, 0] for one in (self.ctx, ctx))
-        lit = np.any(self.color(self.bsdf.eval(ctx, self.si, other)) > 0.0, axis=1) & self.lit & (whole > 0.0)
-        ratio = np.divide(part, whole, out=np.zeros(COUNT), where=lit)
+        density, part = (_rows(self.bsdf.pdf(one, self.si, other))[:, 0] for one in (self.ctx, ctx))
+        lit = np.any(self.color(self.bsdf.eval(ctx, self.si, other)) > 0.0, axis=1) & self.lit & (density > 0.0)
+        ratio = np.divide(part, density, out=np.zeros(COUNT), where=lit)
         own = np.where(np.any(weight > 0.0, axis=1), 1.0, 0.0)
         mirror = _rows(self.si.wi) * np.array([-1.0, -1.0, 1.0])
 

@@ -25,7 +25,7 @@ from .solver import Residuals, solve
 
 STEPS = 6  # of the solver for each point of a profile; it begins at the solution of the point before
 POINTS = 14  # of a profile, on each side
-NEAR = 0.005  # relative error of the square root of the rise at which an end counts as found
+NEAR = 0.005  # relative error of the square root of the rise at which an end is accepted
 UNEQUAL = 0.3  # relative difference of the rises at both ends from which a profile is computed
 FIRST = 0.02  # first step from a value without a finite standard error: part of the range, or of the logarithm's unit
 SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
@@ -96,13 +96,13 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
     for _ in range(POINTS):
         at = start.copy()
         at[k] = numbers[k] + sign * distance
-        found = solve(problem, at, steps=STEPS, tolerance=1e-3 * rise / max(cost, rise), held=(k,))
-        root = float(np.sqrt(max(found.cost - cost, 0.0) / rise))
+        solution = solve(problem, at, steps=STEPS, tolerance=1e-3 * rise / max(cost, rise), held=(k,))
+        root = float(np.sqrt(max(solution.cost - cost, 0.0) / rise))
         if abs(root - 1.0) < NEAR or (root < 1.0 and at[k] == bound):
             return float(at[k])
         roots.append((distance, root))
         if root < 1.0:
-            inside, start = distance, found.numbers
+            inside, start = distance, solution.numbers
         else:
             outside = distance
         distance = _next(roots, inside, outside, abs(bound - numbers[k]))
@@ -111,7 +111,7 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
 
 def _next(roots: list[tuple[float, float]], inside: float, outside: float, most: float) -> float:
     """The next distance: by the secant through the last two points, kept between the nearest points on both sides."""
-    (a, fa), (b, fb) = sorted(roots)[-2:] if not np.isfinite(outside) else _around(roots, inside, outside)
+    (a, fa), (b, fb) = sorted(roots)[-2:] if not np.isfinite(outside) else _bracket(roots, inside, outside)
     guess = b + (1.0 - fb) * (b - a) / (fb - fa) if fb > fa else np.inf
     if not np.isfinite(outside):
         return float(min(np.clip(guess, 1.2 * b, 4.0 * b), most))
@@ -119,5 +119,5 @@ def _next(roots: list[tuple[float, float]], inside: float, outside: float, most:
     return float(np.clip(guess, inside + margin, outside - margin))
 
 
-def _around(roots: list[tuple[float, float]], inside: float, outside: float) -> list[tuple[float, float]]:
+def _bracket(roots: list[tuple[float, float]], inside: float, outside: float) -> list[tuple[float, float]]:
     return [one for one in roots if one[0] == inside][-1:] + [one for one in roots if one[0] == outside][-1:]

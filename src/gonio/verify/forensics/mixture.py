@@ -127,10 +127,10 @@ def _weights(lobes: np.ndarray, expected: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.lstsq((lobes * scale).T, expected * scale, rcond=None)[0])
 
 
-def _effect(found: np.ndarray, expected: np.ndarray) -> float:
-    """Root mean square of found / expected - 1 beyond the noise of `found`, over well-filled blocks."""
+def _effect(fitted: np.ndarray, expected: np.ndarray) -> float:
+    """Root mean square of fitted / expected - 1 beyond the noise of `fitted`, over well-filled blocks."""
     filled = expected * SAMPLES > 100.0
     if not filled.any():
         return np.inf
-    off = np.sum((found - expected)[filled] ** 2 / expected[filled]) - 2.0 * filled.sum() / SAMPLES
+    off = np.sum((fitted - expected)[filled] ** 2 / expected[filled]) - 2.0 * filled.sum() / SAMPLES
     return float(np.sqrt(max(off, 0.0) / max(float(expected[filled].sum()), 1e-30)))

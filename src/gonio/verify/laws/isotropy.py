@@ -63,10 +63,12 @@ class Isotropy(Law):
         if size < VISIBLE and effort.full:  # at other parameter values it may be isotropic
             finding.problems.append(f"declared anisotropic, but a rotation changes it by {size:.1e} at most")
         self._axes(subject, finding)
-        self._turned(subject, finding, (wo, wi), exact)
+        self._rotated_together(subject, finding, (wo, wi), exact)
         return finding
 
-    def _turned(self, subject: Subject, finding: Finding, pair: tuple[np.ndarray, np.ndarray], exact: bool) -> None:
+    def _rotated_together(
+        self, subject: Subject, finding: Finding, pair: tuple[np.ndarray, np.ndarray], exact: bool
+    ) -> None:
         """With its axes turned, the material has the same values for directions that are turned with them."""
         other = _with_turned_axes(subject)
         if other is None:
@@ -84,14 +86,14 @@ class Isotropy(Law):
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
         swapped = _swapped(subject) if not subject.isotropic else None
-        turned = _with_turned_axes(subject) if finding.figure > 0.0 and not subject.isotropic else None
-        if not subject.isotropic and swapped is None and turned is None:
+        other = _with_turned_axes(subject) if finding.figure > finding.tolerance and not subject.isotropic else None
+        if not subject.isotropic and swapped is None and other is None:
             return None
 
         def rotated(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            if turned is not None:
+            if other is not None:
                 angle = np.full(len(wo), TURN)
-                return subject.eval(wo, wi), turned.eval(directions.rotated(wo, angle), directions.rotated(wi, angle))
+                return subject.eval(wo, wi), other.eval(directions.rotated(wo, angle), directions.rotated(wi, angle))
             if swapped is not None:
                 return subject.eval(wo, wi), swapped.eval(wo, wi)
             # an angle per wo, the same for all its wi
@@ -99,7 +101,7 @@ class Isotropy(Law):
             return subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
 
         where = ", against the other axes" if swapped is not None else ", under rotation"
-        where = ", with axes and directions turned together" if turned is not None else where
+        where = ", with axes and directions turned together" if other is not None else where
         return severity.between(subject, rotated, where)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
