@@ -272,3 +272,11 @@ def loss_bias(subject: Subject) -> Bias:
     light = _of_power(subject)
     lost = np.maximum(1.0 - light.value, 0.0)
     return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")
+
+
+def stated_bias(subject: Subject) -> Bias:
+    """The power by which a base, weighted by the albedo that is stated, is too bright or too dark."""
+    light = _of_power(subject)
+    stated = subject.model.stated_albedo(light.wo)
+    off = light.value - stated.value
+    return summed(off, np.ones_like(off), light.wo, light.mass)

@@ -22,6 +22,7 @@ from ..verdict import Finding, Trial
 from .base import Law, where_found
 
 GAIN = 1e-3
+STATED = "the albedo that is stated"
 MOST_ALONE = 6  # parameters that are whitened alone
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
@@ -65,6 +66,7 @@ class Energy(Law):
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
+        _stated(subject, wo, value, error, finding)
         masking = mismatch(subject) if effort.full else ""
         if masking:
             finding.problems.append(masking)
@@ -90,12 +92,16 @@ class Energy(Law):
             if white is not None and biases[-1].average == 0.0:
                 gained = estimators.gain_bias(white)
                 biases.append(dataclasses.replace(gained, where=f"{gained.where}, of the lossless variant"))
-        if finding.problems and (white := lossless_variant(subject)) is not None:
+        others = [problem for problem in finding.problems if not problem.startswith(STATED)]
+        if others and (white := lossless_variant(subject)) is not None:
             biases.append(estimators.loss_bias(white))
+        if len(others) < len(finding.problems):
+            biases.append(estimators.stated_bias(subject))
         return max(biases, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         yield from (Cause(problem, "masking") for problem in finding.problems if problem.startswith("the masking"))
+        yield from (Cause(problem, "stated albedo") for problem in finding.problems if problem.startswith(STATED))
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
@@ -193,6 +199,22 @@ class Energy(Law):
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}
                 finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
+
+
+def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
+    """The albedo by which the authors weight other layers is that of the values."""
+    stated = subject.model.stated_albedo(wo) if isinstance(subject.model, BSDF) and not subject.stochastic else None
+    if stated is None:
+        return
+    off = np.abs(stated.value - value).max(1) - error.max(1) - stated.tolerance
+    row = int(np.argmax(off))
+    if off[row] > 0.0:
+        channel = int(np.argmax(np.abs(stated.value[row] - value[row])))
+        theta = directions.angles(wo)[row, 0]
+        finding.problems.append(
+            f"{STATED}, {stated.source}, is {stated.value[row, channel]:.4f} at {theta:.4g} degrees, and the integral "
+            f"of eval is {value[row, channel]:.4f}"
+        )
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
