@@ -298,3 +298,19 @@ def test_claims_of_an_adapter_are_checked(tmp_path: Path) -> None:
         written(tmp_path, "stated.glsl.toml", f"function = 'brdf'\n{line}\n")
         with pytest.raises(InputError, match=message):
             go.Shader(file)
+
+
+MIXED = """
+uniform float metal;
+vec3 brdf(vec3 L, vec3 V) { return vec3((1.0 - metal * (1.0 - metal)) / 3.14159265358979); }
+"""
+
+
+def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
+    file = written(tmp_path, "mixed.glsl", MIXED)
+    adapter = "function = 'brdf'\nlossless_tolerance = 0.02\n[parameters.metal]\ndefault = 0.5\nlow = 0.0\nhigh = 1.0\n"
+    written(tmp_path, "mixed.glsl.toml", adapter)
+    assert "0.0000 at metal = 1: parameters mixed in place of two lobes?" in energy_of(file).cause
+    written(tmp_path, "mixed.glsl.toml", adapter.replace("high = 1.0", "high = 0.5"))
+    shaders.files.forget()
+    assert "the loss depends on metal: 0.0000 at metal = 0 and 0.2500 at metal = 0.5" in energy_of(file).cause

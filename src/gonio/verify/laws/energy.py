@@ -14,6 +14,7 @@ from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
+from ..forensics import losses
 from ..forensics.causes import place_of
 from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
@@ -23,6 +24,8 @@ from .base import Law, where_found
 
 GAIN = 1e-3
 STATED = "the albedo that is stated"
+LOST = "white furnace loses"
+COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo, to find what a loss depends on
 MOST_ALONE = 6  # parameters that are whitened alone
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
@@ -102,6 +105,16 @@ class Energy(Law):
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         yield from (Cause(problem, "masking") for problem in finding.problems if problem.startswith("the masking"))
         yield from (Cause(problem, "stated albedo") for problem in finding.problems if problem.startswith(STATED))
+        white = lossless_variant(subject) or subject
+        claim = getattr(white.model, "lossless_tolerance", None)
+        if claim is not None and any(problem.startswith(LOST) for problem in finding.problems):
+            coarse = dataclasses.replace(effort, accuracy=1e-3)
+            wo = directions.single(directions.at(np.array(COARSE), 37.0))
+
+            def loss(one: Subject) -> float:
+                return 1.0 - float(_quadrature(one, wo, coarse, seed)[0].mean(1).min())
+
+            yield from losses.causes(white, loss, claim)
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
@@ -175,7 +188,7 @@ class Energy(Law):
         # a black material reflects nothing regardless of its claim
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
-                f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
+                f"{LOST} {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
