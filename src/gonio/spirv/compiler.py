@@ -122,8 +122,8 @@ class _Sources:
         self.defines, self.missing = defines, list[str]()
         self.once: dict[Path, list[Context]] = {}  # guarded files, and the conditions under which they were included
 
-    def expanded(self, text: str, name: str, depth: int, first: int = 1, around: Context = ()) -> str:
-        """A text with its includes; it begins on the line `first` of its file, under the conditions `around`."""
+    def expanded(self, text: str, name: str, depth: int, first: int = 1, outer: Context = ()) -> str:
+        """A text with its includes; it begins on the line `first` of its file, under the conditions `outer`."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
@@ -132,7 +132,7 @@ class _Sources:
         def include(match: re.Match[str]) -> str:
             line = text.count("\n", 0, match.start()) + first
             file, _, literal = match[1].partition("#")
-            path, under = self._located(file, name), (*around, *context(text, match.start()))
+            path, under = self._located(file, name), (*outer, *context(text, match.start()))
             if path is None:
                 if under:  # perhaps in a branch that is left out, as headers for several languages have them
                     self.missing.append(file)
@@ -189,8 +189,8 @@ class _Sources:
 
     def _located(self, file: str, name: str) -> Path | None:
         """An include of the file `name`: in the named folders, or beside an include that is itself in one of them."""
-        beside = [Path(name).parent] if name in self.names[1:] else []
-        for folder in [*self.folders, *beside]:
+        nearby = [Path(name).parent] if name in self.names[1:] else []
+        for folder in [*self.folders, *nearby]:
             for suffix in _SUFFIXES:
                 path = (folder / f"{file}{suffix}").resolve()
                 if any(path.is_relative_to(one) for one in self.folders) and path.is_file():

@@ -1,4 +1,4 @@
-"""Include guards and conditions of a C-like text, so that a header is expanded once, not once for each #include of it."""
+"""Include guards and conditions of a C-like text, so that a header is expanded once, not for each #include of it."""
 
 from __future__ import annotations
 

@@ -45,12 +45,12 @@ def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> It
 
 def _ranges(model: BSDF) -> list[tuple[str, float, tuple[float, float]]]:
     """The numbers with a finite range, but colors: path, value and ends."""
-    found: list[tuple[str, float, tuple[float, float]]] = []
+    result: list[tuple[str, float, tuple[float, float]]] = []
     for leaf in tree.surface(model):
         parameter, value = leaf.parameter, leaf.value
         low, high = (float(getattr(parameter, end, np.inf)) for end in ("low", "high"))
         plain = isinstance(value, int | float) and not isinstance(value, bool)
         if parameter.numeric and plain and parameter.white is None and np.isfinite([low, high]).all() and low < high:
             number: Any = value
-            found.append((leaf.path, float(number), (low, high)))
-    return found
+            result.append((leaf.path, float(number), (low, high)))
+    return result
