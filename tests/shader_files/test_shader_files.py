@@ -294,7 +294,13 @@ def test_albedo_that_a_shader_states_is_judged(tmp_path: Path, name: str, status
 
 def test_claims_of_an_adapter_are_checked(tmp_path: Path) -> None:
     file = written(tmp_path, "stated.glsl", LOSSY)
-    for line, message in (("lossless_tolerance = 2.0", "a share of the light"), ("albedo = 'none'", "no function")):
+    claims = (
+        ("lossless_tolerance = 2.0", "a share of the light"),
+        ("albedo_tolerance = nan", "a share of the light"),
+        ("lossless_tolerance = true", "a float expected"),
+        ("albedo = 'none'", "no function"),
+    )
+    for line, message in claims:
         written(tmp_path, "stated.glsl.toml", f"function = 'brdf'\n{line}\n")
         with pytest.raises(InputError, match=message):
             go.Shader(file)

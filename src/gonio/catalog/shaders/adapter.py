@@ -128,10 +128,11 @@ def read(path: Path) -> Adapter:
     for key, value in content.items():
         if key not in kinds:
             raise InputError(f"unknown key '{key}'", str(path), did_you_mean(key, list(kinds)))
-        if not isinstance(value, kinds[key]):
+        number = kinds[key] is float and isinstance(value, int | float) and not isinstance(value, bool)
+        if not number and not isinstance(value, kinds[key]):
             what = f"{key} = {value!r:.40}, a {kinds[key].__name__} expected"
             raise InputError(what, str(path), "see `gonio adopt FILE`")
-        if isinstance(value, float) and not 0.0 <= value < 1.0:
+        if isinstance(value, int | float) and number and not 0.0 <= value < 1.0:
             raise InputError(f"{key} = {value!r:.40}", str(path), "a share of the light, 0 to 1")
     for key in ("arguments", "pdf_arguments", "sample_arguments", "albedo_arguments"):
         content[key] = tuple(_meaning(value, path) for value in content.get(key, ()))
