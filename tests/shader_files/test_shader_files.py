@@ -320,3 +320,9 @@ def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
     written(tmp_path, "mixed.glsl.toml", adapter.replace("high = 1.0", "high = 0.5"))
     shaders.files.forget()
     assert "the loss depends on metal: 0.0000 at metal = 0 and 0.2500 at metal = 0.5" in energy_of(file).cause
+
+
+def test_energy_of_values_that_are_not_finite_has_the_grade_of_nan(tmp_path: Path) -> None:
+    verdict = energy_of(written(tmp_path, "root.glsl", "vec3 brdf(vec3 L, vec3 V) { return vec3(sqrt(L.z - 0.2)); }"))
+    assert verdict.status == "fail" and verdict.grade is Grade.NAN
+    assert verdict.bias is not None and 0.1 < verdict.bias.average < 0.4

@@ -88,6 +88,8 @@ class Energy(Law):
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
         subject = where_found(subject, finding)
+        if not np.isfinite(finding.figure):
+            return estimators.undefined_bias(subject, seed)
         biases = [estimators.sampling_bias(subject)]
         if finding.figure > finding.tolerance:
             biases.append(estimators.gain_bias(subject))
