@@ -12,6 +12,8 @@ from gonio.errors import InputError
 from gonio.scene.materials import described
 from gonio.spirv.compiler import compiler
 from gonio.spirv.replay import Replayed
+from gonio.verify.severity import Grade
+from gonio.verify.verdict import Verdict
 
 
 @pytest.fixture(autouse=True)
@@ -255,3 +257,72 @@ def test_the_page_of_a_shader_names_its_file(tmp_path: Path) -> None:
     shader = tmp_path / "red.wgsl"
     shader.write_text("fn brdf(L: vec3f, V: vec3f, N: vec3f) -> vec3f { return vec3f(0.3, 0.1, 0.1); }\n")
     assert str(go.explain(str(shader))).endswith(f"Source: {shader}")
+
+
+LOSSY = """
+uniform float share;
+vec3 brdf(vec3 L, vec3 V) { return vec3((1.0 - share * V.z) / 3.14159265358979); }
+float right(float NoV) { return 1.0 - share * NoV; }
+float squared(float NoV) { return right(NoV) * right(NoV); }
+"""
+
+
+def energy_of(file: str) -> Verdict:
+    return go.verify(go.Shader(file), law="energy", quick=True).cards[0].verdicts[0]
+
+
+def test_loss_is_judged_where_the_adapter_means_none(tmp_path: Path) -> None:
+    range_ = "function = 'brdf'\n[parameters.share]\ndefault = 0.5\nlow = 0.5\nhigh = 0.5\n"
+    for name, claim, status in (("silent", "", "pass"), ("lossy", "lossless_tolerance = 0.1\n", "fail")):
+        file = written(tmp_path, f"{name}.glsl", LOSSY)
+        written(tmp_path, f"{name}.glsl.toml", claim + range_)
+        assert energy_of(file).status == status
+    assert any("loses 0.5000 at 0 degrees, more than the claimed 0.1" in one for one in energy_of(file).why)
+
+
+@pytest.mark.parametrize(("name", "status"), [("right", "pass"), ("squared", "fail")])
+def test_albedo_that_a_shader_states_is_judged(tmp_path: Path, name: str, status: str) -> None:
+    file = written(tmp_path, "stated.glsl", LOSSY)
+    adapter = f"function = 'brdf'\nalbedo = '{name}'\n[parameters.share]\ndefault = 0.5\nlow = 0.0\nhigh = 0.9\n"
+    written(tmp_path, "stated.glsl.toml", adapter)
+    verdict = energy_of(file)
+    assert verdict.status == status
+    if status == "fail":
+        assert "the albedo that is stated, squared, is " in verdict.cause
+        assert verdict.grade is Grade.BROKEN
+
+
+def test_claims_of_an_adapter_are_checked(tmp_path: Path) -> None:
+    file = written(tmp_path, "stated.glsl", LOSSY)
+    claims = (
+        ("lossless_tolerance = 2.0", "a share of the light"),
+        ("albedo_tolerance = nan", "a share of the light"),
+        ("lossless_tolerance = true", "a float expected"),
+        ("albedo = 'none'", "no function"),
+    )
+    for line, message in claims:
+        written(tmp_path, "stated.glsl.toml", f"function = 'brdf'\n{line}\n")
+        with pytest.raises(InputError, match=message):
+            go.Shader(file)
+
+
+MIXED = """
+uniform float metal;
+vec3 brdf(vec3 L, vec3 V) { return vec3((1.0 - metal * (1.0 - metal)) / 3.14159265358979); }
+"""
+
+
+def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
+    file = written(tmp_path, "mixed.glsl", MIXED)
+    adapter = "function = 'brdf'\nlossless_tolerance = 0.02\n[parameters.metal]\ndefault = 0.5\nlow = 0.0\nhigh = 1.0\n"
+    written(tmp_path, "mixed.glsl.toml", adapter)
+    assert "0.0000 at metal = 1: parameters mixed in place of two lobes?" in energy_of(file).cause
+    written(tmp_path, "mixed.glsl.toml", adapter.replace("high = 1.0", "high = 0.5"))
+    shaders.files.forget()
+    assert "the loss depends on metal: 0.0000 at metal = 0 and 0.2500 at metal = 0.5" in energy_of(file).cause
+
+
+def test_energy_of_values_that_are_not_finite_has_the_grade_of_nan(tmp_path: Path) -> None:
+    verdict = energy_of(written(tmp_path, "root.glsl", "vec3 brdf(vec3 L, vec3 V) { return vec3(sqrt(L.z - 0.2)); }"))
+    assert verdict.status == "fail" and verdict.grade is Grade.NAN
+    assert verdict.bias is not None and 0.1 < verdict.bias.average < 0.4

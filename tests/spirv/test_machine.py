@@ -112,6 +112,41 @@ def test_construct_without_meaning_is_refused_by_name_and_line(what: str) -> Non
     assert error.value.where.startswith("test" if what in ("an array of", "recursion") else "test:2")
 
 
+HEADER = """/* one text for several languages */
+#ifndef HEADER_H
+#define HEADER_H
+#if defined(__cplusplus)
+#include "of_cpp.h"
+#else
+#include "parts/tools.h"
+#endif
+#include "header.h"
+#endif
+"""
+
+
+def test_headers_are_included_once_and_beside_one_another(tmp_path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "header.h").write_text(HEADER)
+    (tmp_path / "parts" / "tools.h").write_text('#pragma once\n#include "more.h"\n#include "../header.h"\n')
+    (tmp_path / "parts" / "more.h").write_text("float twice(float x) { return 2.0 * x; }\n")
+    text = '#include "header.h"\n#include "parts/tools.h"\nfloat f(float x) { return twice(x); }'
+    compile_text(text, "x.glsl", folders=[tmp_path])
+    with pytest.raises(InputError, match=r"'of_cpp.h' lies in no folder") as error:
+        compile_text(f"#define __cplusplus 1\n{text}", "x.glsl", folders=[tmp_path])
+    assert error.value.where.endswith("header.h:5")
+    (tmp_path / "parts" / "more.h").write_text('#include "../../outside.h"\n')
+    (tmp_path.parent / "outside.h").write_text("float twice(float x) { return 2.0 * x; }\n")
+    with pytest.raises(InputError, match=r"outside.h' lies in no folder"):
+        compile_text(text, "x.glsl", folders=[tmp_path])
+
+
+def test_header_of_a_branch_that_is_left_out_is_included_again(tmp_path) -> None:
+    (tmp_path / "once.h").write_text("#ifndef ONCE\n#define ONCE\nfloat one() { return 1.0; }\n#endif\n")
+    text = '#ifdef ABSENT\n#include "once.h"\n#endif\n#include "once.h"\nfloat f() { return one(); }'
+    compile_text(text, "x.glsl", folders=[tmp_path])
+
+
 def test_include_reads_named_folders_only(tmp_path) -> None:
     (tmp_path / "a.glsl").write_text("float twice(float x) { return 2.0 * x; }\n")
     text = '#include "a.glsl"\nfloat f(float x) { return twice(x) + missing; }'

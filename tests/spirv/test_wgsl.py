@@ -165,7 +165,8 @@ def test_bevys_imports_and_conditions_are_followed_in_named_folders_only(tmp_pat
     (tmp_path / "tools.wgsl").write_text("#define_import_path engine::fresnel::tools\nfn one() -> f32 { return 1.0; }")
     text = (
         "#import engine::{\n    fresnel as F, // the rest\n    fresnel::{TWO, P},\n}\n#if LEVEL >= 2\nconst LEVEL = "
-        "#{LEVEL};\n#endif\nfn f(x: f32) -> f32 { let p = P(x); return F::schlick(p.a) + TWO + f32(LEVEL); }"
+        "#{LEVEL};\n#endif\n// see page.org/a#Section and #{ABSENT}\n"
+        "fn f(x: f32) -> f32 { let p = P(x); return F::schlick(p.a) + TWO + f32(LEVEL); }"
     )
     result = value(text, {"SQUARE": "", "LEVEL": "3"}, (tmp_path,))
     np.testing.assert_allclose(result, 2 * X * X + 5)

@@ -20,7 +20,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, dataclass_transform, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, dataclass_transform, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +42,15 @@ from .sample import Sample
 
 if TYPE_CHECKING:
     from .guide import Guide
+
+
+class StatedAlbedo(NamedTuple):
+    """An albedo by its authors: what states it, values (N, 3), and the error that they mean to allow."""
+
+    source: str
+    value: NDArray[np.float64]
+    tolerance: float
+
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
 
@@ -267,6 +276,11 @@ class BSDF(Material):
         inner    the albedo of an inner material, if known
         nodes    of a quadrature that the material performs itself; None requests closed forms only
         """
+        return None
+
+    def stated_albedo(self, wo: NDArray[np.float64]) -> StatedAlbedo | None:
+        """The albedo that its authors use for it elsewhere, such as a fit by which they weight a base below it; the law
+        of energy compares it with the integral of `eval`. wo: (N, 3)."""
         return None
 
     @classmethod

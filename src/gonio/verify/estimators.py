@@ -25,6 +25,7 @@ SAMPLES = 1 << 13  # per wo; stratified, so that the mean is accurate to about 1
 NEGLIGIBLE = 2e-4  # difference of two albedos that counts as none
 SPHERE = 0.25 / np.pi  # density of light samples: those of a constant environment
 BINS = 16  # four quarters of the azimuth, within 45 degrees of the normal and beyond, on each side of the surface
+UNDEFINED = 512  # random wi per wo, to count values that are not finite
 TAIL = 64  # largest weights per wo, from which the exponent of the tail is estimated
 
 Part: TypeAlias = Literal["all", "weights", "pdf"]
@@ -272,3 +273,34 @@ def loss_bias(subject: Subject) -> Bias:
     light = _of_power(subject)
     lost = np.maximum(1.0 - light.value, 0.0)
     return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")
+
+
+def stated_bias(subject: Subject) -> Bias:
+    """The power by which a base, weighted by the albedo that is stated, is too bright or too dark."""
+    light = _of_power(subject)
+    stated = subject.model.stated_albedo(light.wo)
+    off = light.value - stated.value
+    return summed(off, np.ones_like(off), light.wo, light.mass)
+
+
+def undefined_bias(subject: Subject, seed: int) -> Bias:
+    """The share of directions with values that are not finite, at random wi."""
+    wo, mass = views(subject.sides)
+    many = np.repeat(wo, UNDEFINED, axis=0)
+    rng = np.random.default_rng([seed, 10])
+    wi = directions.single(directions.uniform(rng, len(many)))
+    if not subject.transmits:
+        wi = np.where(wi[:, 2:] * many[:, 2:] < 0.0, wi * [1.0, 1.0, -1.0], wi)
+    wrong = np.zeros((len(wo), UNDEFINED), bool)
+    for precision in subject.precisions:
+        s = subject.sample(many, directions.numbers(rng, len(many)), precision=precision)
+        for values in (
+            subject.eval(many, wi, precision=precision),
+            subject.pdf(many, wi, precision)[:, None],
+            s.weight,
+        ):
+            wrong |= ~np.isfinite(values).all(1).reshape(wrong.shape)
+    bad = wrong.mean(1)
+    theta = directions.angles(wo[int(np.argmax(bad))])[0]
+    where = f"wo at {theta:.3g} degrees"
+    return Bias(float(bad.max()), float(mass @ bad), float(mass[bad > 0.01].sum()), where, "nan")

@@ -3,6 +3,8 @@
 function = "BRDF"                       # f, a color or a number
 arguments = ["light", "view", "normal"] # the meaning of each argument
 cosine = false                          # whether the function includes |cos theta_i|
+albedo = "sheenAlbedo"                  # a function of the view that states the integral of the BRDF
+lossless_tolerance = 0.02               # the largest loss that is meant in a white furnace
 
 [parameters.roughness]                  # a uniform, or an argument
 default = 0.5
@@ -79,6 +81,8 @@ class Adapter:
     """The meaning of a shader, see the head of this file.
 
     pdf, sample  names of functions, "" for none; pdf_arguments, sample_arguments: their meanings
+    albedo       the name of a function that states the albedo for the view, "" for none, and its error that is meant
+    lossless_tolerance  the loss that is meant in a white furnace, None makes no claim
     includes     folders, relative to the shader, from which it may include
     defines      macros
     """
@@ -90,6 +94,10 @@ class Adapter:
     pdf_arguments: tuple[str, ...] = ()
     sample: str = ""
     sample_arguments: tuple[str, ...] = ()
+    albedo: str = ""
+    albedo_arguments: tuple[str, ...] = ()
+    albedo_tolerance: float = 0.01
+    lossless_tolerance: float | None = None
     transmits: bool = False
     language: str = ""
     doc: str = ""
@@ -115,14 +123,18 @@ def read(path: Path) -> Adapter:
         raise InputError(f"no adapter: {error}", str(path), "TOML as `gonio adopt` writes it") from None
     kinds = {"function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
              "sample_arguments": list, "transmits": bool, "language": str, "doc": str, "includes": list,
-             "defines": dict, "parameters": dict, "textures": dict}  # fmt: skip
+             "defines": dict, "parameters": dict, "textures": dict, "albedo": str, "albedo_arguments": list,
+             "albedo_tolerance": float, "lossless_tolerance": float}  # fmt: skip
     for key, value in content.items():
         if key not in kinds:
             raise InputError(f"unknown key '{key}'", str(path), did_you_mean(key, list(kinds)))
-        if not isinstance(value, kinds[key]):
+        number = kinds[key] is float and isinstance(value, int | float) and not isinstance(value, bool)
+        if not number and not isinstance(value, kinds[key]):
             what = f"{key} = {value!r:.40}, a {kinds[key].__name__} expected"
             raise InputError(what, str(path), "see `gonio adopt FILE`")
-    for key in ("arguments", "pdf_arguments", "sample_arguments"):
+        if isinstance(value, int | float) and number and not 0.0 <= value < 1.0:
+            raise InputError(f"{key} = {value!r:.40}", str(path), "a share of the light, 0 to 1")
+    for key in ("arguments", "pdf_arguments", "sample_arguments", "albedo_arguments"):
         content[key] = tuple(_meaning(value, path) for value in content.get(key, ()))
     content["includes"] = tuple(map(str, content.get("includes", ())))
     content["defines"] = {str(key): str(value) for key, value in content.get("defines", {}).items()}

@@ -183,6 +183,7 @@ def _made(path: Path, program: Program, inside: Path | None) -> type[BSDF]:
         "name": re.sub(r"[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "shader",
         "program": program,
         "fields": fields,
+        "lossless_tolerance": program.adapter.lossless_tolerance,
     }
     cls: Any = _ShaderType(stem, (_SampledShader if sampled else _Shader,), namespace)
     _probe(cls())
@@ -193,6 +194,7 @@ def _probe(material: BSDF) -> None:
     """Raise InputError, with file and line, for constructs that are not read, before a law or a render meets them."""
     for formula in ("eval", "pdf", "sample") if not type(material).guided else ("eval",):
         material.record(formula)
+    material.stated_albedo(np.array([[0.0, 0.0, 1.0]]))
 
 
 _SCENES = ("file", "type", "preset", "normalmap", "bump", "two_sided")  # keys of materials in scenes

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import ops
-from ...material import tree
-from ...material.bsdf import BSDF
+from ...material import binding, tree
+from ...material.bsdf import BSDF, StatedAlbedo
 from ...material.calling import method
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend
 from ...ops.types import Value
 from ...spirv.values import leaves, numeric, truth, where
 
@@ -68,6 +69,17 @@ class _ShaderFile(BSDF):
         if self.program.adapter.transmits:
             return (wo.z != 0.0) & (wi.z != 0.0)
         return (wo.z > 0.0) & (wi.z > 0.0)
+
+    def stated_albedo(self, wo: NDArray[np.float64]) -> StatedAlbedo | None:
+        """The values of the adapter's function `albedo`."""
+        adapter = self.program.adapter
+        if not adapter.albedo:
+            return None
+        types = backend.types("float64")
+        bound = binding.bind_to(self, types)
+        color = self.program.color(bound._run("albedo", backend.vector_of(wo, 3, types)))
+        channels = [np.broadcast_to(np.asarray(channel, float), len(wo)) for channel in color]
+        return StatedAlbedo(adapter.albedo, np.stack(channels, axis=-1), adapter.albedo_tolerance)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:

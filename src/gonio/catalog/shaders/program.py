@@ -35,9 +35,9 @@ class Program:
         self.adapter = _completed(module, adapter, where)
         self.eval = _one(module, self.adapter.function, where)
         self.formulas = {"eval": (self.eval, self.adapter.arguments)}
-        for name, arguments in (("pdf", self.adapter.pdf_arguments), ("sample", self.adapter.sample_arguments)):
+        for name in ("pdf", "sample", "albedo"):
             if function := getattr(self.adapter, name):
-                self.formulas[name] = _one(module, function, where), arguments
+                self.formulas[name] = _one(module, function, where), getattr(self.adapter, f"{name}_arguments")
         for name, (function, arguments) in self.formulas.items():
             if len(arguments) != len(function.parameters):
                 what = f"{name}: {len(arguments)} meanings for the {len(function.parameters)} arguments of "
@@ -262,4 +262,5 @@ def _completed(module: Module, adapter: Adapter, where: str) -> Adapter:
         sample=sample,
         pdf_arguments=meanings(adapter.pdf_arguments, pdf),
         sample_arguments=meanings(adapter.sample_arguments, sample),
+        albedo_arguments=meanings(adapter.albedo_arguments, adapter.albedo),
     )

@@ -104,7 +104,7 @@ def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preproces
         elif match is not None:
             _other(match[1], match[2].split("//")[0].strip(), known, result, place)
         else:
-            expanded = _VALUE.sub(lambda one: _value(one, known, place), line) if "#" in line else line  # noqa: B023
+            expanded = _expanded(line, known, place) if "#" in line else line
         if pending and pending.count("{") <= pending.count("}"):
             _add(result, pending, start, f"{where}:{start}")
             pending = ""
@@ -124,6 +124,12 @@ def _other(word: str, rest: str, defines: dict[str, str], result: Preprocessed, 
     else:
         known = "#import, #define, #ifdef, #ifndef, #if, #else, #endif, #define_import_path"
         raise refuse(f"the directive #{word}", known, place)
+
+
+def _expanded(line: str, defines: Mapping[str, str], place: str) -> str:
+    """A line with the values of its names; comments, in which a # may be that of an address, stay as they are."""
+    code, slashes, comment = line.partition("//")
+    return _VALUE.sub(lambda one: _value(one, defines, place), code) + slashes + comment
 
 
 def _value(match: re.Match[str], defines: Mapping[str, str], place: str) -> str:

@@ -14,7 +14,7 @@ from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
-from ..forensics import channels
+from ..forensics import channels, losses
 from ..forensics.causes import place_of
 from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
@@ -24,6 +24,9 @@ from .base import Law, pairs, where_found
 
 GAIN = 1e-3
 FINER = 100.0  # accuracy of an integral that is computed again
+STATED = "the albedo that is stated"
+LOST = "white furnace loses"
+COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo, to find what a loss depends on
 MOST_ALONE = 6  # parameters that are whitened alone
 ELSEWHERE = 88.0  # degrees; a view at other parameter values
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
@@ -71,6 +74,7 @@ class Energy(Law):
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
+        _stated(subject, wo, value, error, finding)
         masking = mismatch(subject) if effort.full else ""
         if masking:
             finding.problems.append(masking)
@@ -89,6 +93,8 @@ class Energy(Law):
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
         subject = where_found(subject, finding)
+        if not np.isfinite(finding.figure):
+            return estimators.undefined_bias(subject, seed)
         biases = [estimators.sampling_bias(subject)]
         if finding.figure > finding.tolerance:
             biases.append(estimators.gain_bias(subject))
@@ -96,12 +102,26 @@ class Energy(Law):
             if white is not None and biases[-1].average == 0.0:
                 gained = estimators.gain_bias(white)
                 biases.append(dataclasses.replace(gained, where=f"{gained.where}, of the lossless variant"))
-        if finding.problems and (white := lossless_variant(subject)) is not None:
+        others = [problem for problem in finding.problems if not problem.startswith(STATED)]
+        if others and (white := lossless_variant(subject)) is not None:
             biases.append(estimators.loss_bias(white))
+        if len(others) < len(finding.problems):
+            biases.append(estimators.stated_bias(subject))
         return max(biases, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         yield from (Cause(problem, "masking") for problem in finding.problems if problem.startswith("the masking"))
+        yield from (Cause(problem, "stated albedo") for problem in finding.problems if problem.startswith(STATED))
+        white = lossless_variant(subject) or subject
+        claim = getattr(white.model, "lossless_tolerance", None)
+        if claim is not None and any(problem.startswith(LOST) for problem in finding.problems):
+            coarse = dataclasses.replace(effort, accuracy=1e-3)
+            wo = directions.single(directions.at(np.array(COARSE), 37.0))
+
+            def loss(one: Subject) -> float:
+                return 1.0 - float(_quadrature(one, wo, coarse, seed)[0].mean(1).min())
+
+            yield from losses.causes(white, loss, claim)
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
@@ -179,7 +199,7 @@ class Energy(Law):
         # a black material reflects nothing regardless of its claim
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
-                f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
+                f"{LOST} {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
@@ -203,6 +223,22 @@ class Energy(Law):
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}
                 finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
+
+
+def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
+    """The albedo by which the authors weight other layers is that of the values."""
+    stated = subject.model.stated_albedo(wo) if isinstance(subject.model, BSDF) and not subject.stochastic else None
+    if stated is None:
+        return
+    off = np.abs(stated.value - value).max(1) - error.max(1) - stated.tolerance
+    row = int(np.argmax(off))
+    if off[row] > 0.0:
+        channel = int(np.argmax(np.abs(stated.value[row] - value[row])))
+        theta = directions.angles(wo)[row, 0]
+        finding.problems.append(
+            f"{STATED}, {stated.source}, is {stated.value[row, channel]:.4f} at {theta:.4g} degrees, and the integral "
+            f"of eval is {value[row, channel]:.4f}"
+        )
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from ...errors import InputError
 from ...material import BSDF, binding, guide_search
 from ...ops import Precision, backend
-from .. import directions, ranges, severity
+from .. import directions, estimators, ranges, severity
 from ..effort import Effort
 from ..forensics import extremes
 from ..forensics.causes import place_of
@@ -84,26 +85,10 @@ class Positivity(Law):
         if all("gradient" in problem for problem in finding.problems):
             return severity.Bias(0.0, 0.0, 0.0, finding.worst, "derivatives")
         there = where_found(subject, finding)
-        wo, mass = severity.views(there.sides)
-        many = np.repeat(wo, 512, axis=0)
-        rng = np.random.default_rng([seed, 10])
-        wi = directions.single(directions.uniform(rng, len(many)))
-        if not there.transmits:
-            wi = np.where(wi[:, 2:] * many[:, 2:] < 0.0, wi * [1.0, 1.0, -1.0], wi)
-        wrong = np.zeros((len(wo), 512), bool)
-        for precision in there.precisions:
-            s = there.sample(many, directions.numbers(rng, len(many)), precision=precision)
-            for values in (
-                there.eval(many, wi, precision=precision),
-                there.pdf(many, wi, precision)[:, None],
-                s.weight,
-            ):
-                wrong |= ~np.isfinite(values).all(1).reshape(wrong.shape)
-        if wrong.any() or any("is nan" in problem or "is inf" in problem for problem in finding.problems):
-            bad = wrong.mean(1)
-            theta = directions.angles(wo[int(np.argmax(bad))])[0]
-            where = f"wo at {theta:.3g} degrees" if bad.any() else finding.worst
-            return severity.Bias(float(bad.max()), float(mass @ bad), float(mass[bad > 0.01].sum()), where, "nan")
+        undefined = estimators.undefined_bias(there, seed)
+        if undefined.average or any("is nan" in problem or "is inf" in problem for problem in finding.problems):
+            where = undefined.where if undefined.average else finding.worst
+            return dataclasses.replace(undefined, where=where)
 
         def cut(o: np.ndarray, i: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             value = there.eval(o, i)
