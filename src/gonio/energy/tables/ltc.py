@@ -5,7 +5,7 @@
 W minimizes int |f |cos| / E - D|^p di over the whole sphere, also below the horizon, where f is 0 and D may not be:
 first with p = 3 as in the paper, from there with p = 1.5 and from there with p = 1.1, since integrals over lights miss
 at most the share of light that D puts elsewhere, which is p = 1, while p = 3 fits the peak of a lobe at the cost of its
-tail. Where the horizon cuts a lobe in half, p = 1.5 still puts up to an eighth more of the light elsewhere. The integral
+tail. Where the horizon cuts a lobe in half, p = 1.5 puts up to an eighth more of the light elsewhere. The integral
 is a sum over fixed points: directions that the material samples, the same mirrored at the horizon, and directions
 spread evenly. The steps are those of Gauss and Newton, damped (Levenberg and Marquardt), for all cosines of a roughness
 at once, from two starts: the fit of the rougher row, and the covariance of the lobe.
