@@ -74,11 +74,11 @@ def _stored(values):
 
 def _texel(stored, index, like):
     """Entries of a table, of the type of `like`."""
-    return stored.to(like)[index]
+    return (stored.to(like) if isinstance(like, torch.Tensor) else stored)[index]
 
 
 def _integers(x):
-    return x.to(torch.int64)
+    return x.to(torch.int64) if isinstance(x, torch.Tensor) else int(x)
 
 
 def _broadcast(*arrays):
