@@ -88,3 +88,10 @@ def test_options_of_other_tables_are_refused() -> None:
         go.bake("ggx", lut=["ltc"], layout="stretched")
     with pytest.raises(go.InputError, match="512 x 512"):
         go.bake("ggx", lut=["ltc"], resolution=512)
+
+
+def test_a_lobe_that_the_horizon_cuts_in_half_is_fitted_by_its_tail() -> None:
+    """With p = 1.5 as the last power, 0.42 of the light goes elsewhere."""
+    model = ltc.at(go.Conductor().lossless(), "alpha", 12 / 63)
+    row = ltc._row(model, np.array([0.9, 0.1, ltc.MIN_COSINE]), None, True)
+    assert row.misplaced[-1] < 0.39 and row.misplaced[0] < 0.01

@@ -24,6 +24,7 @@ DECLARED = {
     "slang": "float missing_c[11];",
     "msl": "array<float, 11> missing_c;",
     "godot": "float missing_c[11];",
+    "osl": "float missing_c[11];",
     "tsl": "    missing_c,",
     "numpy": "    missing_c: object",
 }

@@ -93,7 +93,7 @@ def test_numpy_says_what_gonio_says(name: str) -> None:
     _check(name, "numpy", np.asarray)
 
 
-@pytest.mark.parametrize("name", JUDGED)
+@pytest.mark.parametrize("name", [*JUDGED, "metal-by-colours", pytest.param("coat", marks=pytest.mark.slow)])
 def test_torch_says_what_gonio_says(name: str) -> None:
     torch = pytest.importorskip("torch", reason="NOT TRIED: no torch here (pip: torch)")
     _check(name, "torch", torch.tensor)

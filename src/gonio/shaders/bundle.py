@@ -41,14 +41,16 @@ class Bundle:
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write shader, manifest.json and one raw little-endian float32 file per table; returns their paths."""
+        """Write shader, manifest.json and one file per table, of raw little-endian float32 or of the form that the
+        language reads (`Language.table_file`); returns their paths."""
         folder = files.check_folder(folder, parents=True)
         contents = {
             self.manifest["shader"]: self.text.encode(),
             "manifest.json": json.dumps(self.manifest, indent=2).encode(),
         }
+        language = Language.family.get(self.manifest["lang"])
         for texture in self.manifest["textures"]:
-            contents[texture["file"]] = self.tables[texture["uniform"]].astype("<f4").tobytes()
+            contents[texture["file"]] = language.table_file(self.tables[texture["uniform"]])
         files.write_all(folder, contents)
         return [folder / file for file in contents]
 

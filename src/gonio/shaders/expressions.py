@@ -6,100 +6,19 @@ import re
 from collections.abc import Sequence
 
 from .layout import INDENT, common_head, wrap
-from .names import Names
+from .parameters import ParameterWriter
 from .program import Struct, flat, place
 from .source import returned_by
 from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
-from .values import Member, Record, Routine, Value, members, stem_of
+from .values import SIZES, Member, Record, Routine, Value, stem_of
 
 INLINE = 88  # characters: a longer part of an expression gets a separate line
 # selections of existing values, which never get a separate line
 SELECTED = ("parameter", "constant", "component", "swizzle", "element")
 
 
-class ExpressionWriter:
+class ExpressionWriter(ParameterWriter):
     """Writes the expressions of one routine, with the names of its parameters and local values."""
-
-    def __init__(self, names: Names, routine: Routine) -> None:
-        self.names, self.routine, self.language = names, routine, names.language
-        self.program = names.program
-        self.arguments = self.program.recorded[routine].arguments if routine in self.program.recorded else {}
-        self.used_names: set[str] = {*names.routines.values()}
-        self.parameter_names: dict[int, str] = {}
-        self.heads: list[tuple[str, str]] = []
-        self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
-        self.locals: dict[int, str] = {}
-        self.lines: list[str] = []
-        self.arrays: dict[str, int] = {}  # text of an array that exists -> its length
-        self.built: dict[tuple, str] = {}
-        self.holders: dict[str, Value] = {}  # name -> its current value
-        self.first_lines: dict[str, int] = {}  # name -> index of the line that declares it
-        self._parameters()
-
-    # ------------------------------------------------------------------ parameters
-
-    def _parameters(self) -> None:
-        routine, entry = self.routine, self.routine in self.program.entries.values()
-        used = [routine.parameters[i] for i in sorted(routine.used)]
-        derive = self.program.entries.get("derive") is routine
-        for argument, value in self.arguments.items():
-            mine = [p for p in used if place(p.static)[0] == argument]
-            struct = self.program.struct_of(value)
-            derived = self.program.derived_of(value)
-            if struct is not None or (derived is not None and isinstance(value, dict)):
-                plain = [p for p in mine if struct is not None and not place(p.static)[2]]
-                if struct is not None and (plain or entry):
-                    self._object(struct, "self", plain)
-                rest = [p for p in mine if p not in plain]
-                if derived is not None and (rest or (entry and not derive)):
-                    self._object(derived, "derived", rest)
-                continue
-            given = [p for p in routine.parameters if place(p.static)[0] == argument and (p in mine or entry)]
-            for member in self._members(given):
-                self._plain(member, given[member.first : member.first + max(member.length, 1)])
-
-    def _members(self, parameters: Sequence[Value]) -> list[Member]:
-        """The arguments by which parameters are given."""
-        return members([(flat(p.static), p.type) for p in parameters], self.program.arrays)
-
-    def _plain(self, member: Member, parameters: list[Value]) -> None:
-        """An argument of the function: a number, a vector, or an array of them."""
-        name = self.fresh(member.name)
-        self.heads.append(self.names.declared(member, name))
-        if member.length:
-            self.arrays[name] = member.length
-            self.parameter_names |= {p.order: f"{name}[{index}]" for index, p in enumerate(parameters)}
-            return
-        self.parameter_names[parameters[0].order] = name
-        if self.language.parameters_change:
-            self.holders[name] = parameters[0]
-
-    def _object(self, struct: Struct, name: str, parameters: list[Value]) -> None:
-        name = self.fresh(name) if struct.record.name not in self.objects else self.objects[struct.record.name][1]
-        if struct.record.name not in self.objects:
-            self.objects[struct.record.name] = (struct, name)
-            self.heads.append((self.names.note(struct.record), name))
-        for parameter in parameters:
-            self.parameter_names[parameter.order] = self._field(name, struct.record, flat(place(parameter.static)[1]))
-
-    def _field(self, owner: str, record: Record, field: str | int) -> str:
-        """The text of a struct's field, by its name or index."""
-        names = [name for name, _ in record.fields]
-        text, array, count = self.names.access(record, field if isinstance(field, int) else names.index(field))
-        if count:
-            self.arrays[f"{owner}.{array}"] = count
-        return f"{owner}.{text}"
-
-    def fresh(self, name: str) -> str:
-        """A name that is not used in this function."""
-        base = self.language.word(name)
-        result, count = base, 1
-        while result in self.used_names or result in self.language.reserved:
-            count += 1
-            # a digit without an underscore means a power: x2 is x squared; and GLSL reserves "__"
-            result = f"{base.rstrip('_')}_{count}"
-        self.used_names.add(result)
-        return result
 
     def _name_for(self, value: Value) -> str:
         if value.op == "call" and isinstance(value.type, Routine):
@@ -178,13 +97,15 @@ class ExpressionWriter:
         if op == "component":
             return f"{self.part(args[0], ATOM)}.{'xyzw'[value.static]}", ATOM
         if op == "swizzle":
+            if not self.language.swizzles:
+                return f"{self.language.type(value.type)}({', '.join(self._components(value))})", ATOM
             return f"{self.part(args[0], ATOM)}.{value.static}", ATOM
         if op == "element":
             return self._field(self.part(args[0], ATOM), args[0].static.record, value.static), ATOM
         if op == "splat":
             return self.splat(args[0], value.type), SIGN
         if op == "vector":
-            parts = [self.unparenthesized(a) for a in args]
+            parts = [text for a in args for text in self._components(a)]
             return f"{self.language.type(value.type)}({', '.join(parts)})", ATOM
         if op == "call" and stem_of(value.static) in self.language.native:
             return f"{self.names.routines[value.static]}({', '.join(self.splat(a, value.type) for a in args)})", ATOM
@@ -205,7 +126,22 @@ class ExpressionWriter:
         spread = wide or op in ("minimum", "maximum")
         kind = max((a.type for a in args), key=lambda t: t.startswith("vec"))
         parts = [self.splat(a, kind) if spread else self.unparenthesized(a) for a in args]
-        return template.format(*parts), ATOM
+        return template.format(*parts, prefix=self.names.placement.prefix), ATOM
+
+    def _components(self, value: Value) -> list[str]:
+        """An argument of a vector's constructor, component by component if the language requires it."""
+        if self.language.swizzles or value.type not in SIZES:
+            return [self.unparenthesized(value)]
+        vector, letters = value, "xyzw"[: SIZES[value.type]]
+        if value.op == "swizzle":
+            vector, letters = value.args[0], value.static
+        text = self.part(vector, ATOM)
+        if not re.fullmatch(r"[\w.]+", text):
+            text = self.fresh(self._name_for(vector))
+            line = self.language.local(self.names.note(vector.type), text, self.unparenthesized(vector))
+            self.lines += self.wrapped(line)
+            self.locals[vector.order] = text
+        return [f"{text}.{letter}" for letter in letters]
 
     def unparenthesized(self, value: Value) -> str:
         """The text of a function's argument."""
@@ -255,12 +191,13 @@ class ExpressionWriter:
 
     def spread(self, type_: str, text: tuple[str, int]) -> str:
         """The conversion of a float to a vector."""
-        inside = text[0] if "({1})" in self.language.spread or text[1] == ATOM else f"({text[0]})"
-        return self.language.spread.format(self.language.type(type_), inside)
+        template = self.language.spreads.get(type_, self.language.spread)
+        inside = f"({text[0]})" if "){1}" in template and text[1] != ATOM else text[0]
+        return template.format(self.language.type(type_), inside)
 
     def constant(self, value: Value) -> tuple[str, int]:
         if value.type in ("bool",) or value.type.startswith("bvec"):
-            text = "true" if value.static else "false"
+            text = self.language.truth[bool(value.static)]
             return (text if value.type == "bool" else f"{self.language.type(value.type)}({text})"), ATOM
         text = self.names.number(value)
         if value.type != "float":
@@ -313,7 +250,7 @@ class ExpressionWriter:
 
         initializer  whether the text stands in the braces of a declaration
         """
-        stem = parts[0].removesuffix("[0]")
+        stem = parts[0].removesuffix("[0]") if self.language.whole_members or not initializer else ""
         if self.arrays.get(stem) == len(parts) and parts == [f"{stem}[{index}]" for index in range(len(parts))]:
             return stem
         type_ = self.language.type(member.type)
@@ -329,12 +266,18 @@ class ExpressionWriter:
         texts = []
         for member in self.names.members(record):
             parts = [
-                self.splat(value, member.type) if value is not None else self._zero(member.type)
+                self._member(value, member.type) if value is not None else self._zero(member.type)
                 for value in values[member.first : member.first + max(member.length, 1)]
             ]
             braces = not self.language.struct_literal
             texts.append(self._array(member, parts, initializer=braces) if member.length else parts[0])
         return texts
+
+    def _member(self, value: Value, type_: str) -> str:
+        """The text of a struct's member among others."""
+        if self.language.whole_members or type_ not in ("vec2", "vec4") or value.op in ("constant", "vector"):
+            return self.splat(value, type_)
+        return f"{self.language.type(type_)}({', '.join(self._components(value))})"
 
     def _zero(self, type_: str) -> str:
         return "0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM))

@@ -61,12 +61,11 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
     for record in structs(made, names):
         lines = [*comment(record.doc), *_struct(record, names)]
         result.append(Block("struct", language.word(record.name), lines))
-    for table in made.tables:
-        result.append(Block("table", f"table_{table.name}", _table(made, names, table, bindings[id(table)]), table))
     if language.methods and any("lookup" in how for how in made.readings.values()):
         lines = INTERPOLATED.strip().format(name=names.public("interpolated")).splitlines()
         result.insert(0, Block("function", "interpolated", lines))
-    return result + _helpers(names, bodies) + bodies
+    tables = [Block("table", f"table_{t.name}", _table(made, names, t, bindings[id(t)]), t) for t in made.tables]
+    return result + _helpers(names, [*tables, *bodies]) + tables + bodies
 
 
 def _helpers(names: Names, bodies: Sequence[Block]) -> list[Block]:
@@ -101,9 +100,10 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
     channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
     readings = sorted(made.readings[id(table)])
     rule = "linear between texel centers, " if "lookup" in readings else ""
+    file = names.table(table) + language.table_suffix
     about = [
         f"// {size} texels, {channels}; {rule}clamped outside.",
-        f"// They are in {names.table(table)}.f32, which an output folder (-o DIR/) holds beside the shader.",
+        f"// They are in {file}, which an output folder (-o DIR/) holds beside the shader.",
     ]
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2

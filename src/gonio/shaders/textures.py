@@ -103,4 +103,4 @@ def _texel(names: Names, table: Table, places: list[str]) -> str:
         at.append("group")
     elif len(at) == 1:
         at.append("0")
-    return names.language.fetch(names.table(table, "table_"), at) + {1: ".r", 2: ".rg", 4: ""}[width(table)]
+    return names.language.texel(names.table(table, "table_"), at, width(table), axes(table), names.placement.prefix)

@@ -61,7 +61,7 @@ Language = Annotated[
         "--lang",
         "--language",
         metavar="NAME",
-        help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl; numpy, torch, jax: a Python file.",
+        help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl, osl; numpy, torch, jax: a Python file.",
         autocompletion=completion.languages,
     ),
 ]

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...members import Family, instances_of
 
 
@@ -19,6 +22,9 @@ class Language:
     choice               templates of `where`: for a scalar mask, and for a mask per component; {prefix} begins names
     helpers              functions that the templates call: name -> lines, written where a text needs them
     spread               template of a float, {1}, converted to a vector type, {0}
+    spreads              such templates of single types, where they differ
+    truth                false and true
+    swizzles             whether `v.xy` selects several components
     mix                  name of linear interpolation
     native               functions of the vocabulary that the language provides itself
     reserved             reserved names
@@ -26,12 +32,14 @@ class Language:
     parameters_change    whether a function may assign to a parameter
     struct_literal       whether `Name(a, b)` constructs a struct inside an expression
     array_literal        whether `array` is an expression, not only the value of a declaration
+    whole_members        whether braces that initialize a struct may name whole vectors and arrays
     end                  the end of a statement
     single               whether all values are float32
     standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
     methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
+    table_suffix         suffix of the file of a table in an output folder
     """
 
     family: ClassVar[Family[Language]]
@@ -59,6 +67,9 @@ class Language:
     choice: ClassVar[tuple[str, str]] = ("{0} ? {1} : {2}", "{0} ? {1} : {2}")
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     spread: ClassVar[str] = "{0}({1})"
+    spreads: ClassVar[Mapping[str, str]] = {}
+    truth: ClassVar[tuple[str, str]] = ("false", "true")
+    swizzles: ClassVar[bool] = True
     mix: ClassVar[str] = "mix"
     native: ClassVar[frozenset[str]] = frozenset({"normalize", "clamp"})
     reserved: ClassVar[frozenset[str]] = frozenset()
@@ -66,12 +77,14 @@ class Language:
     parameters_change: ClassVar[bool] = True
     struct_literal: ClassVar[bool] = True
     array_literal: ClassVar[bool] = True
+    whole_members: ClassVar[bool] = True
     groups: ClassVar[bool] = False
     end: ClassVar[str] = ";"
     single: ClassVar[bool] = True
     standalone: ClassVar[bool] = False
     methods: ClassVar[bool] = False
     templates: ClassVar[bool] = False
+    table_suffix: ClassVar[str] = ".f32"
 
     def type(self, name: str) -> str:
         """Name of a type in the language."""
@@ -124,6 +137,18 @@ class Language:
     def fetch(self, table: str, places: list[str]) -> str:
         """A texel by its index along each axis."""
         raise NotImplementedError(f"{type(self).__name__} has no fetch")
+
+    def texel(self, table: str, places: list[str], channels: int, shape: Sequence[int], prefix: str) -> str:
+        """The channels of a texel, 1, 2 or 4.
+
+        shape   numbers of texels along each axis, as `places`
+        prefix  begins the names of helpers
+        """
+        return self.fetch(table, places) + {1: ".r", 2: ".rg", 4: ""}[channels]
+
+    def table_file(self, texels: NDArray[np.float32]) -> bytes:
+        """The contents of the file of a table; x varies fastest, channels last."""
+        return texels.astype("<f4").tobytes()
 
     def offset(self, end: int, size: int) -> int:
         """Offset of a field of `size` bytes in a uniform buffer, after data that ends at `end`."""

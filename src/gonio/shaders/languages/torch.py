@@ -20,9 +20,11 @@ def _tensor(x, like):
 
 
 def _pair(function):
-    """A function of two tensors, one of which may be a number."""
+    """A function of two tensors or numbers; of two numbers the result is a number."""
     def apply(a, b):
         like = a if isinstance(a, torch.Tensor) else b
+        if not isinstance(like, torch.Tensor):
+            return function(*torch.tensor([a, b], dtype=torch.float64)).item()
         return function(_tensor(a, like), _tensor(b, like))
     return _each(apply)
 
@@ -33,15 +35,26 @@ def _root(x):
 
 
 def _select(mask, a, b):
+    if isinstance(mask, bool):
+        return a if mask else b
     if isinstance(a, torch.Tensor) or isinstance(b, torch.Tensor) or isinstance(a, bool):
         return torch.where(mask, a, b)
     exact = float(torch.tensor(a)) == a and float(torch.tensor(b)) == b  # then any type holds them
     return torch.where(mask, *((a, b) if exact else torch.tensor([a, b], dtype=torch.float64, device=mask.device)))
 
 
-exp, log, sin, cos, floor, isfinite, erf = map(_each, (torch.exp, torch.log, torch.sin, torch.cos, torch.floor,
-                                                       torch.isfinite, torch.erf))
-sqrt, where = _each(_root), _each(_select)
+def _single(function):
+    """A function of a tensor or a number."""
+    def apply(x):
+        if isinstance(x, torch.Tensor):
+            return function(x)
+        return function(torch.tensor(x, dtype=torch.float64)).item()
+    return _each(apply)
+
+
+exp, log, sin, cos, floor, isfinite, erf, sqrt = map(_single, (torch.exp, torch.log, torch.sin, torch.cos, torch.floor,
+                                                               torch.isfinite, torch.erf, _root))
+where = _each(_select)
 minimum, maximum, atan2, copysign = map(_pair, (torch.minimum, torch.maximum, torch.atan2, torch.copysign))
 
 
@@ -61,11 +74,11 @@ def _stored(values):
 
 def _texel(stored, index, like):
     """Entries of a table, of the type of `like`."""
-    return stored.to(like)[index]
+    return (stored.to(like) if isinstance(like, torch.Tensor) else stored)[index]
 
 
 def _integers(x):
-    return x.to(torch.int64)
+    return x.to(torch.int64) if isinstance(x, torch.Tensor) else int(x)
 
 
 def _broadcast(*arrays):
