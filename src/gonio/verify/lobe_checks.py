@@ -247,8 +247,8 @@ def fresnel(probe: Probe) -> Misses:
     index = _named_index(subject)
     through = power.through(wo)
     refracted = through & (np.abs(power.eta - 1.0) > FLAT)
-    if index is None or abs(index - 1.0) < FLAT or (through.any() and not refracted.any()):
-        return  # a thin slab transmits without refraction, and has another curve
+    if index is None or abs(index - 1.0) < FLAT or (subject.transmits and not refracted.any()):
+        return  # a thin slab transmits without refraction, or nothing if it is black, and has another curve
     if "delta" in subject.breaches:
         return  # declared, as of a film: its reflectance does not depend on this index alone
     cosine, ratio = np.abs(wo[:, 2]), np.where(wo[:, 2] > 0.0, index, 1.0 / index)

@@ -80,7 +80,7 @@ class Pdf(Law):
                         share = f"{claimed:.2g} of all samples {word} the surface"
                         text = f"the pdf claims {share}, where none occurs, {where}"
                         finding.notes[:] = finding.notes or [text]
-                excess = max(tested.total - 1.0, 0.0)
+                excess = max(tested.total - tested.error - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
                     largest = f"int pdf = {tested.total:.4g}, {where}"
@@ -179,11 +179,12 @@ def _widths(subject: Subject, effort: Effort) -> list[float]:
 
 
 class _Tested(NamedTuple):
-    """The chi-square test of one wo: its p-values, int pdf, and its cells on each side of the surface."""
+    """The chi-square test of one wo: its p-values, int pdf and its error, and its cells on each side of the surface."""
 
     wo: np.ndarray
     outcome: histogram.Outcome
     total: float
+    error: float
     cells: SampleCells
     sides: tuple[int, ...]
 
@@ -207,7 +208,9 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
             expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides
         )
         outcome = histogram.compare(expected, counts, i, grid)
-        tested.append(_Tested(grid.wo[i], outcome, float(expected.total[i]), cells, grid.sides))
+        tested.append(
+            _Tested(grid.wo[i], outcome, float(expected.total[i]), float(expected.error[i]), cells, grid.sides)
+        )
     return tested
 
 
