@@ -344,7 +344,7 @@ def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None
     for lang in LANGS:
         made = bundle(Odd(), lang, ("eval",))
         names = [f["name"] for f in made.manifest["fields"]]
-        assert names[0] == ("half" if lang in ("wgsl", "tsl") else "half_")
+        assert names[0] == ("half" if lang in ("wgsl", "tsl", "osl") else "half_")
         assert all(re.search(rf"\b(?:self|material)\.{name}\b", made.text) for name in names)
 
 
