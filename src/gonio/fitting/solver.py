@@ -297,10 +297,7 @@ def solve(
     for _ in range(steps):
         slope = np.where(ratio, numbers, 1.0)  # d number / d inner
         g, h = gradient * slope, hessian * np.outer(slope, slope)
-        # parameters at a bound with a gradient that points outside stay fixed in this step
-        stuck = ((numbers <= low) & (g > 0.0)) | ((numbers >= high) & (g < 0.0))
-        stuck[list(held)] = True
-        moves = np.flatnonzero(~stuck & (np.diag(h) > 0.0))
+        moves = np.flatnonzero(_moves(numbers, g, low, high, held) & (np.diag(h) > 0.0))
         if not len(moves):
             break
         scale = np.diag(h)[moves]
@@ -332,3 +329,10 @@ def solve(
         if drop < tolerance and moved < 1e-4:
             break
     return Solution(numbers, cost, accepted)
+
+
+def _moves(numbers: Floats, gradient: Floats, low: Floats, high: Floats, held: Sequence[int]) -> NDArray[np.bool_]:
+    """Which parameters a step may change: not those held, nor those at a bound with a gradient that points outside."""
+    stuck = ((numbers <= low) & (gradient > 0.0)) | ((numbers >= high) & (gradient < 0.0))
+    stuck[list(held)] = True
+    return np.asarray(~stuck)
