@@ -162,6 +162,9 @@ WRONG = [
     (MATERIAL, {"type": "phong"}, None, "key 'p' is missing", "add"),
     (MATERIAL, {"albedo": 1}, None, "key 'type' is missing", "type"),
     (MATERIAL, [], None, "expected an object", "{ }"),
+    (MATERIAL, "gold.json", None, "expected an object", '{"type": "json", "file": "gold.json"}'),
+    (MATERIAL + "/type", "gold.binary", None, "unknown type", '{"type": "measured", "file": "gold.binary"}'),
+    (MATERIAL + "/type", "xyz", None, "unknown type", "blinn-phong, bump, coat"),
     (MATERIAL, None, None, "got null", "leave the key out"),
     (
         MATERIAL,

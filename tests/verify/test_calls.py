@@ -89,6 +89,30 @@ def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) 
     assert verdict.grade == "broken" and "2" in verdict.cause
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "words"),
+    [
+        ("& active & asked, dr.inv_pi * wo.z", "& active & asked, dr.inv_pi * si.to_local(wo).z", "pdf on a tilted"),
+        ("mi.Color3f(0.5), mi.Color3f(0))", "mi.Color3f(si.uv.x), mi.Color3f(0))", "eval with other si.uv"),
+    ],
+)
+def test_a_plugin_is_asked_on_tilted_and_textured_surfaces(tmp_path: Path, right: str, wrong: str, words: str) -> None:
+    name = "calls_" + words.split()[-1].replace(".", "_")
+    assert right in PLUGIN
+    text = PLUGIN.replace(right, wrong).replace("NAME", name).replace("FACTOR", "1.0")
+    (tmp_path / f"{name}.py").write_text(text)
+    verdict = verify(f"{tmp_path}/{name}.py:{name}", quick=True, law="calls")["calls"]
+    assert verdict.failed and words in " ".join(verdict.why), verdict.why
+
+
+def test_a_sample_of_weight_0_with_the_stated_density_has_not_failed(tmp_path: Path) -> None:
+    text = PLUGIN.replace("& active & asked\n", "& active & asked & (wo.z > 0.5)\n")
+    text = text.replace("return bs, dr.select(bs.pdf > 0,", "return bs, dr.select((bs.pdf > 0) & (bs.wo.z > 0.5),")
+    assert text.count("0.5)") > PLUGIN.count("0.5)") + 1
+    (tmp_path / "ring.py").write_text(text.replace("NAME", "calls_ring").replace("FACTOR", "1.0"))
+    assert not verify(f"{tmp_path}/ring.py:calls_ring", quick=True, law="pdf").failures
+
+
 class RedAboveBlueBelow(go.BSDF):
     """A sheet that is printed on both sides."""
 

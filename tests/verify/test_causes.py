@@ -15,9 +15,10 @@ from gonio.material.parameters import Value
 from gonio.ops import abs, dot, safe_div, sqr, vec3, where
 from gonio.optics import frame
 from gonio.verify import verify
-from gonio.verify.forensics import crowding, mixture
+from gonio.verify.forensics import channels, crowding, mixture
 from gonio.verify.laws import laws
 from gonio.verify.laws import pdf as pdf_law
+from gonio.verify.laws import reciprocity as reciprocity_law
 from gonio.verify.subject import of
 
 from broken.facets import (
@@ -327,3 +328,48 @@ class OneSided(Weighed):
 def test_a_lobe_to_one_side_is_not_called_anisotropic() -> None:
     cause = verify(OneSided(), quick=True, law="isotropy")["isotropy"].cause
     assert "mirrored" in cause and "`isotropic`" not in cause
+
+
+class MeanOfChannels(RightDiffuse):
+    """Its rise toward grazing is that of the mean color."""
+
+    albedo: Value = go.spectrum((0.9, 0.1, 0.0), "albedo", low=0.0, high=1.0)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        color = self.albedo + (1.0 - ops.mean(self.albedo)) * (1.0 - wo.z) * (1.0 - wi.z)
+        return color * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)
+
+
+class DarkForTheViewer(Weighed):
+    """A facet lobe and a base that is darker for viewers near grazing, but not for lights."""
+
+    def _factor(self, wo: Any, wi: Any, m: Any) -> Any:
+        return 1.0 + 0.0 * wo.z
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        base = where((wo.z > 0.0) & (wi.z > 0.0), 0.1 * wi.z * wo.z, 0.0)
+        return super().eval(wo, wi, mode) + base
+
+
+def test_a_color_whose_channels_mix_is_named() -> None:
+    rng = np.random.default_rng(4)
+    wo, wi = (np.abs(w) / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, 64, 3)))
+    found = channels.mixed(of(MeanOfChannels()), wo, wi)
+    assert found is not None and "red values change with the green and blue of albedo" in found.words
+    assert channels.mixed(of(RightDiffuse()), wo, wi) is None
+
+
+def test_a_base_for_one_direction_only_is_named() -> None:
+    assert reciprocity_law._difference_is_even(of(DarkForTheViewer()), 1)
+    assert not reciprocity_law._difference_is_even(of(RightFacets()), 1)
+    assert not reciprocity_law._difference_is_even(of(FresnelOneWay()), 1)
+
+
+class FresnelOneWay(Weighed):
+    """The factor of its facets is that of the viewer: what is not reciprocal has the shape of the lobe."""
+
+    def _factor(self, wo: Any, wi: Any, m: Any) -> Any:
+        return 1.0 + 0.0 * wo.z
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return super().eval(wo, wi, mode) * (0.5 + 0.5 * abs(wo.z))

@@ -292,8 +292,9 @@ class _Trial:
             return ""
         off = np.abs(first.mean(0) - second.mean(0))
         noise = np.sqrt((first.var(0) + second.var(0)) / COUNT)
-        if np.any((off > SIGMAS * noise) & (off > LEAST)):
-            row = int(np.argmax(off / np.maximum(noise, 1e-12)))
+        wrong = (off > SIGMAS * noise) & (off > LEAST)
+        if wrong.any():
+            row = int(np.argmax(np.where(wrong, off / np.maximum(noise, 1e-12), 0.0)))
             of = ("the number of samples", "the mean cosine to the mirror direction", "the mean cos^2")[row]
             means = f"{of} is {first.mean(0)[row]:.3g}, not {second.mean(0)[row]:.3g}"
             return f"samples of {name} alone do not follow its pdf: {means}"

@@ -1,4 +1,4 @@
-"""Tables as OpenEXR pictures, for languages whose textures are files."""
+"""Tables as OpenEXR pictures, for languages whose textures are files; without Mitsuba, which shaders do not need."""
 
 from __future__ import annotations
 
