@@ -280,6 +280,15 @@ def test_loss_is_judged_where_the_adapter_means_none(tmp_path: Path) -> None:
     assert any("loses 0.5000 at 0 degrees, more than the claimed 0.1" in one for one in energy_of(file).why)
 
 
+def test_claim_of_a_shader_that_is_black_at_its_given_values_fails(tmp_path: Path) -> None:
+    file = written(tmp_path, "black.glsl", "vec3 brdf(vec3 L, vec3 V, float weight) { return vec3(weight); }")
+    adapter = "function = 'brdf'\nlossless_tolerance = 0.1\n[parameters.weight]\ndefault = 0\nlow = 0\nhigh = 0\n"
+    written(tmp_path, "black.glsl.toml", adapter)
+    verdict = energy_of(file)
+    assert verdict.status == "fail" and verdict.grade is Grade.BROKEN
+    assert any("white furnace loses 1.0000" in one for one in verdict.why)
+
+
 @pytest.mark.parametrize(("name", "status"), [("right", "pass"), ("squared", "fail")])
 def test_albedo_that_a_shader_states_is_judged(tmp_path: Path, name: str, status: str) -> None:
     file = written(tmp_path, "stated.glsl", LOSSY)

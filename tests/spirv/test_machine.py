@@ -82,6 +82,18 @@ def test_hlsl_equals_its_closed_form() -> None:
     np.testing.assert_allclose(value(text, language="hlsl"), np.minimum(2 * X, 1) * X + 3 + (X + 1) / 2, rtol=1e-6)
 
 
+def test_methods_of_hlsl_structs_are_called_by_their_struct_alone() -> None:
+    """A method that no object precedes does not compile, and the same name outside a struct is another function."""
+    text = """struct Lobe {
+    float width;
+    void widen(float by) { if (by > 0) { width *= by; } }
+    float half_width() { return 0.5 * width; }
+};
+float half_width(float x) { return 0.25 * x; }
+float f(float x) { Lobe lobe; lobe.width = x; lobe.widen(3.0); return lobe.half_width() + half_width(x); }"""
+    np.testing.assert_allclose(value(text, language="hlsl"), 1.75 * X, rtol=1e-6)
+
+
 def test_hlsl_of_2021_selects_by_a_function() -> None:
     text = "float f(float x) { return dot(select(float2(x, 1) > 0.5, float2(x, 2), float2(0, 0)), float2(1, 1)); }"
     np.testing.assert_allclose(value(text, language="hlsl"), np.where(X > 0.5, X, 0.0) + 2.0)

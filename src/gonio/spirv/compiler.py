@@ -94,13 +94,16 @@ def compile_text(
 
 
 _DEFINITION = re.compile(r"^[ \t]*(?:static[ \t]+)?(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
+_STRUCT = re.compile(r"^[ \t]*(?:struct|class)\s+\w+[^;{}()]*\{", re.MULTILINE)
+_BRACE = re.compile(r"[{}]")
 _KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
 
 
 def _calls(text: str) -> str:
     """Calls of every function of an HLSL text, since glslang drops those that nothing calls."""
     calls = []
-    for kind, name, arguments in _DEFINITION.findall(re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)):
+    plain = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
+    for kind, name, arguments in _DEFINITION.findall(_without_members(plain)):
         declared = [part.partition(":")[0].split() for part in arguments.split(",") if part.strip()]
         types = [words[-2] for words in declared if len(words) > 1]
         arrays = [words[-1].partition("[")[1:] for words in declared if len(words) > 1]
@@ -112,6 +115,19 @@ def _calls(text: str) -> str:
         )
         calls.append(f"{{ {variables} {name}({', '.join(f'a{place}' for place in range(len(types)))}); }}")
     return " ".join(calls)
+
+
+def _without_members(text: str) -> str:
+    """An HLSL text without the bodies of its structs, whose methods cannot be called by their names alone."""
+    outside, place = [], 0
+    for match in _STRUCT.finditer(text):
+        if match.start() < place:
+            continue
+        outside.append(text[place : match.start()])
+        depth, place = 1, match.end()
+        while depth and (brace := _BRACE.search(text, place)):
+            depth, place = depth + (1 if brace[0] == "{" else -1), brace.end()
+    return "".join([*outside, text[place:]])
 
 
 class _Sources:

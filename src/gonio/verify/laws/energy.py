@@ -78,9 +78,7 @@ class Energy(Law):
         masking = mismatch(subject) if effort.full else ""
         if masking:
             finding.problems.append(masking)
-        white = lossless_variant(subject)
-        if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
-            white = subject  # it has no albedo to set, but claims to be lossless
+        white = _judged_lossless(subject)
         if white is not None and subject.guided:  # a guide of its own would take seconds
             white = dataclasses.replace(white, drawn_by=subject.sampler)
         if white is not None:
@@ -103,7 +101,7 @@ class Energy(Law):
                 gained = estimators.gain_bias(white)
                 biases.append(dataclasses.replace(gained, where=f"{gained.where}, of the lossless variant"))
         others = [problem for problem in finding.problems if not problem.startswith(STATED)]
-        if others and (white := lossless_variant(subject)) is not None:
+        if others and (white := _judged_lossless(subject)) is not None:
             biases.append(estimators.loss_bias(white))
         if len(others) < len(finding.problems):
             biases.append(estimators.stated_bias(subject))
@@ -196,8 +194,9 @@ class Energy(Law):
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless_tolerance", None)
-        # a black material reflects nothing regardless of its claim
-        if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
+        # a claim speaks of the given values: others, such as a weight of 0, may leave nothing to reflect
+        judged = effort.full or value.max() > 0.0
+        if claim is not None and judged and lost[where] > claim + float(error.max()):
             finding.problems.append(
                 f"{LOST} {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
             )
@@ -223,6 +222,12 @@ class Energy(Law):
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}
                 finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
+
+
+def _judged_lossless(subject: Subject) -> Subject | None:
+    """The lossless variant; of a material without albedos to set that claims to lose nothing, itself."""
+    claimed = getattr(subject.model, "lossless_tolerance", None) is not None
+    return lossless_variant(subject) or (subject if claimed else None)
 
 
 def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
