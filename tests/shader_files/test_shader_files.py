@@ -267,6 +267,21 @@ float squared(float NoV) { return right(NoV) * right(NoV); }
 """
 
 
+def test_uniforms_with_initial_values_are_parameters_of_these_defaults(tmp_path: Path) -> None:
+    """As in the shaders that MaterialX writes."""
+    text = """
+uniform float share = 0.25;
+uniform vec3 tint = vec3(1.0, 0.5, 0.0);
+uniform bool doubled = true;
+const float scale = 2.0;
+vec3 brdf(vec3 L, vec3 V) { return (doubled ? scale : 1.0) * share * tint; }
+"""
+    file = written(tmp_path, "initial.glsl", text)
+    up = np.array([[0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(go.Shader(file).eval(up, up), [[0.5, 0.25, 0.0]], rtol=1e-6)
+    np.testing.assert_allclose(go.Shader(file, share=0.5, doubled=False).eval(up, up), [[0.5, 0.25, 0.0]], rtol=1e-6)
+
+
 def energy_of(file: str) -> Verdict:
     return go.verify(go.Shader(file), law="energy", quick=True).cards[0].verdicts[0]
 

@@ -16,7 +16,7 @@ from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
-from .module import Block, Function, Instruction, Module
+from .module import UNIFORM, Block, Function, Instruction, Module
 from .opcodes import REFUSED
 from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
 from .values import UNDEFINED, Value, both, either, negated, refuse, select, static, truth, wrapped
@@ -92,7 +92,7 @@ class Machine:
         kind = self.module.type(one.type)
         inside = kind.parts[0]
         name = self.module.names.get(one.result, "")
-        if len(one.operands) > 1:
+        if len(one.operands) > 1 and not (one.operands[0] == UNIFORM and name in self._given):
             return self.module.constants[one.operands[1]]
         if name in self._textures:
             return self._textures[name]

@@ -16,6 +16,7 @@ from .values import UNDEFINED, Value, refuse, wrapped
 
 SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
 MAGIC = 0x07230203
+UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
 MAX_BYTES = 1 << 26
 MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
 MAX_LEAVES = 1 << 16  # scalars in one value
@@ -85,7 +86,7 @@ class Module:
     sets: dict[int, str] = field(default_factory=dict)
     strings: dict[int, str] = field(default_factory=dict)
     refused: dict[int, InputError] = field(default_factory=dict)
-    defaults: dict[str, float] = field(default_factory=dict)
+    defaults: dict[str, Value] = field(default_factory=dict)
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""
@@ -182,6 +183,8 @@ class _Parser:
             self._append(one)
         elif name == "Variable":
             self.module.variables[result] = one
+            if operands[0] == UNIFORM and len(operands) > 1:
+                self.module.defaults[self.module.names.get(result, "")] = self.module.constants[operands[1]]
 
     def _append(self, one: Instruction) -> None:
         assert self.block is not None

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...spirv import Machine, Module
 from ...spirv.arithmetic import elementwise
 from ...spirv.images import Texture
-from ...spirv.module import Function
+from ...spirv.module import UNIFORM, Function
 from ...spirv.replay import Replayed
 from ...spirv.standard import normalize
 from ...spirv.values import Value, leaves, numeric
@@ -68,7 +68,7 @@ class Program:
         module = self.module
         for id, one in module.variables.items():
             storage, inside = module.type(one.type).length, module.type(one.type).parts[0]
-            if storage not in (0, 2, 9, 12) or len(one.operands) > 1:  # uniform constant, uniform, push, storage
+            if storage not in (UNIFORM, 2, 9, 12):  # and uniform block, push, storage
                 continue
             name = module.names.get(id, "")
             if module.type(inside).kind != "struct":
