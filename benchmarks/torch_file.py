@@ -4,11 +4,16 @@
 
 The file's `eval` is traced to one graph and compiled (`make_fx`, then `torch.compile`, which needs a C++ compiler); the
 directions lie component by component in memory, as Dr.Jit's do. Both take turns; processor time of this process.
+
+Dr.Jit keeps the memory of freed arrays and uses it again. glibc returns large blocks to the system, and clearing their
+pages anew takes as long as the evaluation itself; it is told to keep them here, as the allocators do that PyTorch's
+tuning guide recommends. `--fresh` leaves glibc as it is.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import statistics
 import time
 import types
@@ -25,8 +30,15 @@ from torch.fx.experimental.proxy_tensor import make_fx
 GOLD = go.Conductor.preset("Au", alpha=0.3)
 
 
-def main(count: int, rounds: int) -> None:
+M_TRIM_THRESHOLD, M_MMAP_MAX = -1, -4  # of glibc's malloc.h
+
+
+def main(count: int, rounds: int, fresh: bool) -> None:
     """Print the median time of both, and their ratio."""
+    if not fresh:
+        malloc = ctypes.CDLL(None).mallopt
+        kept = malloc(M_MMAP_MAX, 0) and malloc(M_TRIM_THRESHOLD, 2**31 - 1)
+        print("freed memory is used again" if kept else "this allocator takes no options")
     w = np.random.default_rng(1).normal(size=(2, 3, count)).astype(np.float32)
     w[:, 2] = np.abs(w[:, 2])
     w /= np.linalg.norm(w, axis=1, keepdims=True)
@@ -65,5 +77,6 @@ if __name__ == "__main__":
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--count", type=int, default=10_000_000)
     options.add_argument("--rounds", type=int, default=5)
+    options.add_argument("--fresh", action="store_true", help="each result in pages that the system clears anew")
     given = options.parse_args()
-    main(given.count, given.rounds)
+    main(given.count, given.rounds, given.fresh)

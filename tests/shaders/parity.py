@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 import gonio as go
@@ -123,13 +123,10 @@ def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generat
 # ------------------------------------------------------------------ Python
 
 
-def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ...]:
-    """What Python says in float64; each result as (N, channels) or (N,)."""
+def bound(model: go.BSDF, draws: Draws, column: Callable[[np.ndarray], Any]) -> tuple[Any, Callable[[np.ndarray], Any]]:
+    """(The model over the draws' parameters, what makes a direction of an array), both of columns by `column`."""
     kind = backend.types("float64")
     rows, drawn = iter(draws.fields.values()), {path.rpartition(".")[2] for path in draws.fields}
-
-    def column(x: np.ndarray) -> Any:
-        return kind.float(np.ascontiguousarray(x, dtype=np.float64))
 
     def vector(x: np.ndarray) -> Any:
         return {2: kind.vec2, 3: kind.vec3}[x.shape[1]](*[column(c) for c in x.T])
@@ -142,9 +139,15 @@ def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ..
         x = next(rows)
         return column(x[:, 0]) if x.shape[1] == 1 else vector(x)
 
-    bound: Any = binding.bind(model, convert)
+    return binding.bind(model, convert), vector
+
+
+def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ...]:
+    """What Python says in float64; each result as (N, channels) or (N,)."""
+    kind = backend.types("float64")
+    of, vector = bound(model, draws, lambda x: kind.float(np.ascontiguousarray(x, dtype=np.float64)))
     count = len(draws.wo)
-    found = getattr(bound, method)(vector(draws.wo), vector(draws.u if method == "sample" else draws.wi))
+    found = getattr(of, method)(vector(draws.wo), vector(draws.u if method == "sample" else draws.wi))
     results = found if isinstance(found, tuple) else (found,)
     return tuple(np.asarray(backend.to_numpy(r, count)) for r in results)
 

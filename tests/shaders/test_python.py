@@ -22,7 +22,8 @@ ROUNDING = np.finfo(float).eps
 COUNT = 2000
 # one of each kind of formula: tables, selections, spectra, delta lobes, the error function, angles
 SOME = ["oren-nayar", "mix-with-mirror", "kulla-conty", "shifted-gamma", "glass-turned"]
-JUDGED = [*SOME, pytest.param("kulla-conty-turned", marks=pytest.mark.slow)]
+QUICK = [*SOME, "metal-by-colours"]  # constants that are selected, besides
+JUDGED = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EVERY]
 
 
 def _loaded(text: str) -> Any:
@@ -93,7 +94,7 @@ def test_numpy_says_what_gonio_says(name: str) -> None:
     _check(name, "numpy", np.asarray)
 
 
-@pytest.mark.parametrize("name", [*JUDGED, "metal-by-colours", pytest.param("coat", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", JUDGED)
 def test_torch_says_what_gonio_says(name: str) -> None:
     torch = pytest.importorskip("torch", reason="NOT TRIED: no torch here (pip: torch)")
     _check(name, "torch", torch.tensor)

@@ -38,8 +38,6 @@ FEW = (
     "fourth.plugins.RegularizedForGood",
     "second.sound.CornerCube",
     "second.sound.Grating",
-    "fifth.microfacets.GGXClockwise",
-    "fifth.plugins.PhongComponent",
     "fifth.delta_and_thin.SwapMirror",
 )
 
@@ -60,6 +58,18 @@ def test_a_mistake_is_caught_and_a_sound_material_passes(name: str) -> None:
     case = by_name(name)
     report = verify(case.target, quick=True)  # type: ignore[arg-type]
     assert report.passed == case.sound, f"{case.fault}\n{report}"
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "words"),
+    [
+        ("fifth.microfacets.GGXClockwise", "isotropy", "if axes and directions turn together"),
+        ("fifth.plugins.PhongComponent", "calls", "samples of component 0 alone do not follow its pdf"),
+    ],
+)
+def test_what_one_law_alone_tells(name: str, law: str, words: str) -> None:
+    verdict = verify(by_name(name).target, quick=True, law=law)[law]  # type: ignore[arg-type]
+    assert verdict.failed and words in " ".join(verdict.why), verdict.why
 
 
 @pytest.mark.slow

@@ -87,5 +87,6 @@ def _broadcast(*arrays):
 
 
 def _stack(arrays):
-    return torch.stack(arrays, dim=-1)
+    """(..., channels), each channel in memory of its own, so that a compiled file writes whole vectors of it."""
+    return torch.stack(arrays, dim=0).movedim(0, -1)
 '''
