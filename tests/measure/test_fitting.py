@@ -13,8 +13,8 @@ from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.fitting import batch, data, solver
 from gonio.fitting.certainty import degrees_of_freedom
-from gonio.fitting.fit import fit, modelled, moving_of
-from gonio.fitting.parameters import free_of, start_of
+from gonio.fitting.fit import fit, modelled, moving_of, notes_on
+from gonio.fitting.parameters import Free, free_of, start_of
 from gonio.fitting.starts import starts_of
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
@@ -304,3 +304,32 @@ def test_a_fit_is_a_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(go.MachineError, match="pandas is not installed"):
         found.to_frame()
+
+
+def test_a_tint_of_0_does_not_hide_that_channels_mix() -> None:
+    """At specular_tint 0 a channel of the base color changes no other; at the values of the fit it does."""
+    disney = go.model("disney")()
+    free = free_of(disney, {})
+    assert solver.columns_of(disney, free)[:3] == [[0], [1], [2]]
+    assert solver.columns_of(go.Lambert(), free_of(go.Lambert(), {})) == [[0, 1, 2]]
+
+
+def test_parameters_of_which_only_a_combination_acts_are_named_with_those_that_follow_them() -> None:
+    """metallic, specular, its tint and the color have a family of equal values, in which sheen follows a little."""
+    disney = go.model("disney")(
+        (0.6, 0.3, 0.15), metallic=0.3, specular=0.6, specular_tint=0.3, sheen=0.4, clearcoat=0.6, clearcoat_gloss=0.7
+    )
+    small = table(disney, noise=0.0, shape=(12, 12, 18))
+    found = fit(small, "disney", param={"roughness": 0.5, "subsurface": 0.0})
+    note = next(note for note in found.notes if "only a combination" in note)
+    assert all(name in note for name in ("base_color.r", "metallic", "specular", "specular_tint", " and sheen:"))
+    held = fit(small, "disney", param={"roughness": 0.5, "subsurface": 0.0, "metallic": 0.3})
+    np.testing.assert_allclose(held.values, truth(disney, held.names), atol=2e-3)
+    assert "clearcoat_gloss" in held.names and not any("combination" in note for note in held.notes)
+
+
+def test_all_parameters_that_are_tied_stand_in_one_note() -> None:
+    free = [Free(name, "float", 0.0, 1.0, False) for name in "abcd"]
+    coupling = np.array([[1, 0.99, 0.5, 0], [0.99, 1, -0.995, 0], [0.5, -0.995, 1, 0], [0, 0, 0, 1]])
+    notes = notes_on(free, np.full(4, 0.5), np.zeros(4, bool), coupling, tuple("abcd"))
+    assert notes == ["a, b and c are tied (largest correlation -0.995): fix one of them"]

@@ -68,3 +68,9 @@ def test_the_text_of_a_fit_states_intervals():
     found = fit.fit(table(go.Lambert((0.4, 0.2, 0.1)), noise=0.02, seed=1), "lambert")
     low, high = found.interval[0]
     assert f"albedo.r = {found.values[0]:.5g}, {low:.5g} to {high:.5g}" in str(found)
+
+
+def test_an_exact_fit_has_no_profile():
+    """Its residuals are rounding, in which the search for a rise of that size would not end."""
+    sure = Certainty(np.array([[0.81]]), [], np.array([[0.81]]))
+    assert np.isnan(profiles(Wall(50.0), np.zeros(1), 0.0, sure, np.array([0.9]), 1e-8)).all()  # type: ignore[arg-type]

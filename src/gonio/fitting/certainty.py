@@ -12,33 +12,38 @@ from ..measure.tables.base import Floats
 from .solver import BLOCK, Linearized
 
 NULL = 1e-8  # of the largest eigenvalue: float32 derivatives have relative errors of 1e-6
-PART = 1e-3  # squared component of a unit vector from which a parameter counts as part of the direction
+PART = 1e-3  # squared component of a unit vector from which a parameter always counts as part of the direction
+LEAST = 1e-6  # and below which it never does
+ROUNDED = 1e-6  # relative error of J^T J
 
 
-def null_space(hessian: Floats) -> Floats:
-    """Projector onto the null space of J^T J, (K, K), with parameters scaled to a unit diagonal.
+def undetermined_groups(hessian: Floats) -> list[list[int]]:
+    """Indices of undetermined parameters, grouped where the data determine only a combination, from J^T J (K, K).
 
-    An eigenvalue counts as 0 within the rounding of float32 derivatives.
+    They have a part in the null space of J^T J, with parameters scaled to a unit diagonal; an eigenvalue counts as 0
+    within the rounding of float32 derivatives. That rounding also turns the null space, by its ratio to the next
+    eigenvalue: a part within it, or below LEAST, is none.
     """
     size = np.sqrt(np.maximum(np.diag(hessian), 0.0))
-    told = size > 0.0
-    s = np.where(told, size, 1.0)
+    s = np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(hessian / np.outer(s, s))
-    empty = vectors[:, values < NULL * max(float(values.max(initial=0.0)), 1e-300)]
-    return np.asarray(empty @ empty.T)
+    largest = max(float(values.max(initial=0.0)), 1e-300)
+    empty = values < NULL * largest
+    angle = ROUNDED * largest / float(values[~empty].min(initial=largest))
+    projector = vectors[:, empty] @ vectors[:, empty].T
+    return connected(np.abs(projector) > min(PART, max(LEAST, angle**2)))
 
 
-def groups_of(projector: Floats) -> list[list[int]]:
-    """Undetermined parameters, grouped where the data determine a combination; from the projector of `null_space`."""
-    tied = np.abs(projector) > PART
-    left = set(np.flatnonzero(np.diag(projector) > PART).tolist())
+def connected(joined: NDArray[np.bool_]) -> list[list[int]]:
+    """Groups of indices that pairs join directly or by others, from a symmetric (K, K); those joined to themselves."""
+    left = set(np.flatnonzero(np.diag(joined)).tolist())
     groups: list[list[int]] = []
     while left:
         group: set[int] = set()
         more = {min(left)}
         while more:
             group |= more
-            more = {j for i in more for j in np.flatnonzero(tied[i]).tolist()} & left - group
+            more = {j for i in more for j in np.flatnonzero(joined[i]).tolist()} & left - group
         groups.append(sorted(group))
         left -= group
     return groups
@@ -131,7 +136,7 @@ def certainty(hessian: Floats, scores: Floats) -> Certainty:
     s = np.where(scale > 0.0, scale, 1.0)
     inverse = np.linalg.pinv(hessian / np.outer(s, s), rcond=NULL) / np.outer(s, s)
     matrix = inverse @ np.einsum("ni,nj->ij", scores, scores) @ inverse
-    undetermined = groups_of(null_space(hessian))
+    undetermined = undetermined_groups(hessian)
     for number in [one for group in undetermined for one in group]:
         matrix[number, :] = matrix[:, number] = 0.0
         matrix[number, number] = np.inf

@@ -22,7 +22,7 @@ from ..material import BSDF
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
-from .certainty import certainty, degrees_of_freedom, information
+from .certainty import certainty, connected, degrees_of_freedom, information
 from .data import GRAZING, Data, data_of
 from .models import modelled as modelled
 from .models import moving_of as moving_of
@@ -303,8 +303,7 @@ def notes_on(
     notes, at = [], 0
     for group in undetermined:
         if len(group) > 1:
-            listed = ", ".join(names[k] for k in group[:-1]) + f" and {names[group[-1]]}"
-            notes.append(f"the data determine only a combination of {listed}: fix one of them")
+            notes.append(f"the data determine only a combination of {_listed(names, group)}: fix one of them")
     together = {k for group in undetermined if len(group) > 1 for k in group}
     for one in free:
         for k in range(at, at + one.count):
@@ -313,11 +312,16 @@ def notes_on(
             elif numbers[k] <= one.low or numbers[k] >= one.high:
                 notes.append(f"{names[k]} ends at {numbers[k]:.4g}, a bound of its range")
         at += one.count
-    size = np.abs(coupling)
-    for i, j in itertools.combinations(range(len(names)), 2):
-        if size[i, j] > TIED and not (unknown[i] or unknown[j]):
-            notes.append(f"{names[i]} and {names[j]} are tied (correlation {coupling[i, j]:.3f}): fix one of them")
+    size = np.where(unknown[:, None] | unknown, 0.0, np.abs(coupling))
+    for group in (one for one in connected(size > TIED) if len(one) > 1):
+        pair = max(itertools.combinations(group, 2), key=lambda two: size[two])
+        which = "correlation" if len(group) == 2 else "largest correlation"
+        notes.append(f"{_listed(names, group)} are tied ({which} {coupling[pair]:.3f}): fix one of them")
     return notes
+
+
+def _listed(names: Sequence[str], group: Sequence[int]) -> str:
+    return ", ".join(names[k] for k in group[:-1]) + f" and {names[group[-1]]}"
 
 
 def _notes_on_data(data: Data) -> list[str]:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..material import BSDF, tree
 from ..materials.combined.sum import Sum
 from ..measure.tables.base import Floats
-from .certainty import groups_of, null_space
+from .certainty import undetermined_groups
 from .data import Data
 from .parameters import Free, free_of, start_of
 from .solver import Problem, normal_equations
@@ -101,7 +101,7 @@ def without_duplicates(
     owner = [one for one in moving for _ in range(one.count)]
     numbers = random_starts(start_of(material, moving), moving)[0]
     notes: list[str] = []
-    for group in groups_of(null_space(_generic(material, moving, numbers))):
+    for group in undetermined_groups(_generic(material, moving, numbers)):
         same = list(dict.fromkeys(owner[k].path for k in group))
         retained = next((path for path in same if path in wanted), same[0])
         for path in same:

@@ -63,8 +63,8 @@ def free_of(material: BSDF, fixed: Mapping[str, object], free: tuple[str, ...] =
     moving = []
     for leaf in leaves:
         parameter = leaf.parameter
-        stays = parameter.kind == "angle" or (parameter.high == 1.0 and parameter.default == 1.0)
-        if leaf.path in fixed or (stays and leaf.path not in free) or parameter.kind == "angle":
+        factor = parameter.high == 1.0 and parameter.default == 1.0 and not leaf.owner.fits_factors
+        if leaf.path in fixed or (factor and leaf.path not in free) or parameter.kind == "angle":
             continue
         moving.append(_free(leaf.path, parameter))
     if not moving:
@@ -89,6 +89,14 @@ def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
         numbers = np.broadcast_to(np.asarray(value, float), (one.count,))
         values += list(np.clip(numbers, one.low, one.high))
     return np.array(values)
+
+
+def inner_of(free: list[Free], numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values within all ranges, none of them at an end and no two alike; near `numbers` where a range is wide."""
+    low, high, _ = ranges(free)
+    reach = np.minimum(high - low, WIDE)
+    begin = np.clip(numbers - 0.5 * reach, low, high - reach)
+    return np.asarray(begin + reach * np.random.default_rng(3).uniform(0.2, 0.8, len(numbers)))
 
 
 def ranges(free: list[Free]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from ..measure.tables.base import Floats
-from .certainty import Certainty
+from .certainty import Certainty, connected
 from .parameters import ranges
 from .solver import Residuals, solve
 
@@ -28,6 +28,8 @@ POINTS = 14  # of a profile, on each side
 NEAR = 0.005  # relative error of the square root of the rise at which an end is accepted
 UNEQUAL = 0.3  # relative difference of the rises at both ends from which a profile is computed
 FIRST = 0.02  # first step from a value without a finite standard error: part of the range, or of the logarithm's unit
+ALIKE = 0.999  # correlation from which parameters count as one: fits along their valley would be slow and tell nothing
+EXACT = 1e-3  # root mean square residual below which the rounding of 32 bits hides the rise of a sum over many values
 SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
 
 
@@ -40,7 +42,7 @@ class Costs(Residuals, Protocol):
 def profiles(problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float) -> Floats:
     """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
 
-    A parameter of a group of which the data determine only a combination has no profile (NaN).
+    Parameters of which the data determine only a combination, or nearly so, have no profile (NaN).
 
     numbers    solution, (K,)
     cost       its sum of squares
@@ -50,8 +52,11 @@ def profiles(problem: Costs, numbers: Floats, cost: float, sure: Certainty, quan
     """
     low, high, ratio = ranges(problem.free)
     ends = np.full((len(numbers), 2), np.nan)
+    if scale < EXACT**2:
+        return ends
     known = np.isfinite(sure.errors) & (np.diag(sure.inverse) > 0.0)
-    tied = {k for group in sure.undetermined if len(group) > 1 for k in group}
+    alike = connected(np.abs(sure.coupling) > ALIKE)
+    tied = {k for group in (*sure.undetermined, *alike) if len(group) > 1 for k in group}
     own = np.divide(np.diag(sure.covariance), np.diag(sure.inverse), where=known, out=np.full(len(numbers), scale))
     own[~known] = np.median(own[known]) if known.any() else scale
     for k in range(len(numbers)):

@@ -19,7 +19,7 @@ from ..material import BSDF
 from ..measure.tables.base import Floats
 from ..ops import backend
 from .data import Data
-from .parameters import CHANNELS, Free, ranges, start_of, with_drjit
+from .parameters import CHANNELS, Free, inner_of, ranges, start_of, with_drjit
 
 Array = backend.Array
 BLOCK = 1 << 13  # rows that BLAS sums at a time; it shares more among its threads, whose number changes the last bits
@@ -130,25 +130,31 @@ class Problem:
 
     def _of_parameters(self) -> list[list[int]]:
         """Groups of parameters that share one derivative: each by itself, or the three channels of a color."""
-        dr, types = backend.drjit(), backend.types("float32")
         groups: list[list[int]] = []
         at = 0
-        probe = self.data.some(64)
-        wo, wi = (backend.vector_of(w, 3, types) for w in (probe.wo, probe.wi))
         for one in self.free:
             together = list(range(at, at + one.count))
             at += one.count
-            if len(together) > 1:
-                values = [backend.float_of(float(x), types) for x in start_of(self.material, self.free)]
-                dr.enable_grad(values[together[0]])
-                f = with_drjit(self.material, self.free, values, types).eval(wo, wi)
-                dr.forward_from(values[together[0]])
-                others = np.abs([backend.to_numpy(dr.grad(f[c]), len(probe)) for c in (1, 2)])
-                if others.max() > 0.0:  # the channels of this color mix
-                    groups += [[column] for column in together]
-                    continue
-            groups.append(together)
+            groups += [[column] for column in together] if self._mix(together) else [together]
         return groups
+
+    def _mix(self, channels: list[int]) -> bool:
+        """Whether the first of a color's channels changes the values of the others: at the material's own values, or
+        within all ranges, since a tint of 0 hides that it mixes."""
+        if len(channels) == 1:
+            return False
+        dr, types = backend.drjit(), backend.types("float32")
+        probe = self.data.some(64)
+        wo, wi = (backend.vector_of(w, 3, types) for w in (probe.wo, probe.wi))
+        start = start_of(self.material, self.free)
+        for numbers in (start, inner_of(self.free, start)):
+            values = [backend.float_of(float(x), types) for x in numbers]
+            dr.enable_grad(values[channels[0]])
+            f = with_drjit(self.material, self.free, values, types).eval(wo, wi)
+            dr.forward_from(values[channels[0]])
+            if np.abs([backend.to_numpy(dr.grad(f[c]), len(probe)) for c in (1, 2)]).max() > 0.0:
+                return True
+        return False
 
     @property
     def count(self) -> int:

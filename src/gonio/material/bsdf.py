@@ -69,6 +69,7 @@ class BSDF(Material):
     stochastic  whether eval, pdf and weight are random estimates whose expectation is the exact value
     reads_wavelengths  whether it needs the rays' wavelengths, as `wavelengths` of its bound copy
     reads_surface  whether it needs dp/du.x, dp/dv.x and dp/dv.y at a hit, as `surface` of its bound copy
+    fits_factors  whether fits free parameters whose default and maximum are 1, which elsewhere are redundant factors
     lossless_tolerance  the largest loss allowed in a white furnace (F = 1, every albedo 1); None makes no claim
     """
 
@@ -79,6 +80,7 @@ class BSDF(Material):
     limits: ClassVar[tuple[Limit, ...]] = ()
     stochastic: ClassVar[bool] = False
     only_rgb: ClassVar[bool] = False
+    fits_factors: ClassVar[bool] = False
     reads_wavelengths: ClassVar[bool] = False
     wavelengths: ClassVar[Spectrum | None] = None  # nm, one per channel, on copies bound in spectral variants
     reads_surface: ClassVar[bool] = False

@@ -36,6 +36,7 @@ class _ShaderFile(BSDF):
     inside: ClassVar[Path | None] = None
     fields: ClassVar[dict[str, tuple[str, ...]]] = {}
     only_rgb: ClassVar[bool] = True
+    fits_factors: ClassVar[bool] = True  # a uniform may be anything: clearcoatGloss is 1 by default, and no factor
 
     @property
     def transmits(self) -> bool:

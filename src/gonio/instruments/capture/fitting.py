@@ -11,7 +11,7 @@ import numpy as np
 
 from ...catalog.material import MaterialLike
 from ...fitting import fit as tables
-from ...fitting.certainty import groups_of, null_space
+from ...fitting.certainty import undetermined_groups
 from ...fitting.data import Data
 from ...fitting.fit import Fit
 from ...fitting.parameters import ranges, start_of, with_values
@@ -156,7 +156,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     covariance = inverse @ (spread + prior) @ inverse
     # few tiles per parameter make residuals too small, so pixel noise is the lower bound
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
-    undetermined = groups_of(null_space(hessian + prior))
+    undetermined = undetermined_groups(hessian + prior)
     variance[[number for group in undetermined for number in group]] = np.inf
     errors = np.sqrt(variance)
     own = slice(0, problem.own)

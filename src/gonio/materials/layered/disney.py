@@ -82,6 +82,7 @@ class Disney(BSDF):
     clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
 
+    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default, and no factor
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
         Limit({"clearcoat": 0.0}, mutes=("clearcoat_gloss",)),

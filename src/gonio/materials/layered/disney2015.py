@@ -69,6 +69,7 @@ class DisneyBSDF(BSDF):
 
     name: ClassVar[str] = "disney2015"
     reads_wavelengths: ClassVar[bool] = True
+    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default, and no factor
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
     metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
