@@ -147,6 +147,14 @@ def cause(material: go.BSDF, law: str) -> str:
 
 
 @pytest.mark.sample(4)
+class EncodedUnderVarnish(RightDiffuse):
+    """A color that the formula decodes, under a white reflection that does not depend on it."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        both = ops.pow(self.albedo, 2.2) * 0.8 + 0.1 * (1.0 - wo.z)
+        return both * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)
+
+
 @pytest.mark.parametrize(
     ("mistake", "law", "words"),
     [
@@ -171,6 +179,7 @@ def cause(material: go.BSDF, law: str) -> str:
         (MoreAtGrazing, "energy", "1.02 times that where wo's angle to the normal is beyond"),
         (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),
+        (EncodedUnderVarnish, "linearity", "albedo^2.2, within"),
         (SwappedAxes, "isotropy", "alpha_x and alpha_y exchanged"),
         (RoughnessSquared, "gradients", "1 / (2 rim)"),
         (Wavy, "weight", ""),

@@ -17,6 +17,8 @@ from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of
 
 EXACT, SINGLE = 1e-9, 1e-4
+GRAYS = (0.125, 0.3125, 0.5, 0.875)  # colors at which values are compared
+POWERS = np.geomspace(0.2, 6.0, 4001)  # of a color that values may follow
 
 
 class Linearity(Law):
@@ -81,20 +83,31 @@ class Linearity(Law):
         if name == "mix":
             return
         wo, wi = pairs(subject, 4096, seed)
-        low, high, middle = (subject.replace(**{name: v}).eval(wo, wi).mean(1) for v in (0.125, 0.875, 0.3125))
-        lit = (low > 1e-9 * high.max()) & (high > 0.0)
-        mix = channels.mixed(subject, wo, wi)
-        if lit.sum() < 64:
-            if mix is not None:
-                yield mix
-            return
-        powers = (np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5))
-        power = float(np.median(powers[0]))
-        if abs(power - 1.0) > 0.01 and all(np.percentile(np.abs(p / power - 1.0), 97.0) < SPREAD for p in powers):
+        power = _power_of(np.stack([subject.replace(**{name: x}).eval(wo, wi).mean(1) for x in GRAYS]))
+        if power is not None:
             text = f"values follow {name}^{power:.3g}, within 1e-3: a color decoded or multiplied twice?"
             yield Cause(text, f"{name}^{power:.3g}")
+        mix = channels.mixed(subject, wo, wi)
         if mix is not None:
             yield mix
+
+
+def _power_of(rows: np.ndarray) -> float | None:
+    """The p other than 1 for which all pairs follow a + b x^p, from values at GRAYS (4, N); None if there is none.
+
+    a and b, which differ from pair to pair, cancel in the ratio of two differences of values.
+    """
+    first, *inner, last = rows
+    lit = np.abs(last - first) > 1e-6 * np.abs(rows).max()
+    if lit.sum() < 64:
+        return None
+    begin, *between, end = np.power.outer(np.asarray(GRAYS), POWERS)
+    found = []
+    for row, ratio in zip(inner, ((x - begin) / (end - begin) for x in between), strict=True):  # ratios fall with p
+        found.append(np.interp((first - row)[lit] / (last - first)[lit], -ratio, POWERS))
+    power = float(np.median(found[0]))
+    same = all(np.percentile(np.abs(each / power - 1.0), 97.0) < SPREAD for each in found)
+    return power if same and abs(power - 1.0) > 0.01 else None
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
