@@ -28,6 +28,9 @@ def _smooth_draws(name: str) -> Draws:
         if np.ptp(column) > 0.0:
             kept &= (column > column.min()) & (column < column.max())
     fields = {path: rows[kept].astype(float) for path, rows in draws.fields.items()}
+    for rows in fields.values():  # nor two equal widths, at which the smaller one changes
+        if rows.shape[1] == 2:
+            rows[:, 1] *= np.where(rows[:, 0] == rows[:, 1], 0.99, 1.0)
     return Draws(*(x[kept].astype(float) for x in draws[:3]), fields)
 
 
