@@ -577,3 +577,14 @@ def test_a_material_of_a_file_without_a_type_is_told_the_one_it_needs(file: str,
     with pytest.raises(go.InputError, match="key 'type' is missing") as refused:
         go.render(scene_folder)
     assert refused.value.hint == f'add "type": "{kind}"'
+
+
+def test_each_of_several_errors_comes_with_its_hint(scene_folder: Path) -> None:
+    described = json.loads((scene_folder / "scene.json").read_text())
+    described["integrator"] = {"type": "pth"}
+    described["scene"]["shapes"][0]["material"] = {"type": "conducter"}
+    (scene_folder / "scene.json").write_text(json.dumps(described))
+    with pytest.raises(go.InputError) as refused:
+        go.render(scene_folder)
+    told = str(refused.value)
+    assert all(f"did you mean '{name}'?" in told for name in ("path", "conductor")), told

@@ -172,14 +172,16 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
 
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
-    """The first error with location, expectation and hint, and the next few with one line each."""
+    """The first error with location, expectation and hint, and the next few with one line each, hint in parentheses."""
     problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
         where, what, hint = _one(detail, raw)
         problems.setdefault(where, (what, hint))
     (where, (what, hint)), *others = problems.items()
     lines = [what]
-    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: MAX_SHOWN - 1]]
+    lines += [
+        f"also {file}#{place}: {text}{f' ({tip})' if tip else ''}" for place, (text, tip) in others[: MAX_SHOWN - 1]
+    ]
     if len(others) >= MAX_SHOWN:
         lines.append(f"and {len(others) - MAX_SHOWN + 1} more")
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
