@@ -88,6 +88,8 @@ def test_gradients_are_those_of_drjit(name: str, language: str) -> None:
     A sum of many terms in reverse mode is rounded in another order, so a tenth may exceed the second.
     """
     pytest.importorskip(language, reason=f"NOT TRIED: no {language} here (pip: {language})")
+    if name.startswith(("openpbr", "disney2015")):
+        pytest.skip("NOT TRIED: Dr.Jit compiles the reverse mode by 50 inputs for more than 10 minutes")
     draws, made = _smooth_draws(name), bundle(EVERY[name], language)
     for method in ("eval", "pdf"):
         truths = _by_drjit(EVERY[name], draws, method)

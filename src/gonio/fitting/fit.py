@@ -259,7 +259,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
     mean = cost / max(3 * len(data), 1)
     degrees = degrees_of_freedom(parts, data.row, sure.inverse)
-    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean)
+    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean, 3 * len(data))
     unknown = ~(np.isfinite(sure.errors) | np.isfinite(ends).all(axis=1))
     told = notes_on(problem.free, numbers, unknown, sure.coupling, names, sure.undetermined)
     return Fit(

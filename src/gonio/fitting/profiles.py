@@ -30,6 +30,7 @@ UNEQUAL = 0.3  # relative difference of the rises at both ends from which a prof
 FIRST = 0.02  # first step from a value without a finite standard error: part of the range, or of the logarithm's unit
 ALIKE = 0.999  # correlation from which parameters count as one: fits along their valley would be slow and tell nothing
 EXACT = 1e-3  # root mean square residual below which the rounding of 32 bits hides the rise of a sum over many values
+LARGE = 4e6  # derivatives of a problem from which only parameters without a finite standard error have a profile
 SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
 
 
@@ -39,15 +40,19 @@ class Costs(Residuals, Protocol):
     def cost(self, numbers: Floats) -> float: ...
 
 
-def profiles(problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float) -> Floats:
+def profiles(
+    problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float, values: int
+) -> Floats:
     """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
 
-    Parameters of which the data determine only a combination, or nearly so, have no profile (NaN).
+    Parameters of which the data determine only a combination, or nearly so, have no profile (NaN). Of a large problem
+    only those have one whose standard error is infinite: each profile solves it some fifty times.
 
     numbers    solution, (K,)
     cost       its sum of squares
     sure       standard errors and the pseudoinverse of J^T J
     quantiles  of Student's distribution, (K,)
+    values     number of values that the problem explains
     scale      mean squared residual: s if the data determine no parameter; else an undetermined one has the median s
     """
     low, high, ratio = ranges(problem.free)
@@ -64,7 +69,8 @@ def profiles(problem: Costs, numbers: Floats, cost: float, sure: Certainty, quan
             continue
         rise = quantiles[k] ** 2 * own[k]
         half = quantiles[k] * sure.errors[k]
-        if not rise > 0.0 or (known[k] and _is_even(problem, numbers, k, half, sure.inverse, cost)):
+        large = values * len(numbers) > LARGE
+        if not rise > 0.0 or (known[k] and (large or _is_even(problem, numbers, k, half, sure.inverse, cost))):
             continue
         step = half if known[k] else FIRST * (numbers[k] if ratio[k] else _span(numbers[k], low[k], high[k]))
         for side, bound in ((0, low[k]), (1, high[k])):
