@@ -13,12 +13,13 @@ const lamps = {
 };
 
 /** The rows of RGBA from the bottom, as an array of numbers. */
-export async function draw({ how, url, lamp, values, later, options, physical, sky, blocked }) {
+export async function draw({ how, url, model, lamp, values, later, options, physical, sky, blocked }) {
   renderer ??= new THREE.WebGLRenderer();
   renderer.shadowMap.enabled = Boolean(blocked);
   const three = () => new THREE.MeshPhysicalMaterial({ metalness: 1, roughness: 0.4, ...physical });
-  const bundle = how === "three" ? null : await load(url);
-  const made = { three, material: () => material(bundle, values, options), patch: () => patch(three(), bundle, values, options) }[how]();
+  const bundle = how === "three" ? null : await load(url, model);
+  const patched = () => patch(three(), bundle, values, options);
+  const made = { three, material: () => material(bundle, values, options), patch: patched }[how]();
   const scene = new THREE.Scene();
   const plane = new THREE.Mesh(new THREE.PlaneGeometry(12, 12), made);
   if (options?.tangents) plane.geometry.computeTangents();
@@ -30,18 +31,18 @@ export async function draw({ how, url, lamp, values, later, options, physical, s
   scene.add(plane, light);
   if (light.target) scene.add(light.target);
   if (blocked) {
-    const block = new THREE.Mesh(new THREE.PlaneGeometry(0.6, 0.6), new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
+    const unseen = new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, colorWrite: false, depthWrite: false });
+    const block = new THREE.Mesh(new THREE.PlaneGeometry(0.6, 0.6), unseen);
     block.position.set(0.5, 1, 1.5);
     block.lookAt(1, 2, 3);
     block.castShadow = true;
-    block.layers.set(0);
     scene.add(block);
   }
   if (sky) {
-    const half = new THREE.DataTexture(new Float32Array([0.5, 0.7, 1, 1]), 1, 1, THREE.RGBAFormat, THREE.FloatType);
-    half.mapping = THREE.EquirectangularReflectionMapping;
-    half.needsUpdate = true;
-    scene.environment = half;
+    const even = new THREE.DataTexture(new Float32Array([0.5, 0.7, 1, 1]), 1, 1, THREE.RGBAFormat, THREE.FloatType);
+    even.mapping = THREE.EquirectangularReflectionMapping;
+    even.needsUpdate = true;
+    scene.environment = even;
   }
   const camera = new THREE.PerspectiveCamera(40, 1, 0.1, 100);
   camera.position.z = 4;

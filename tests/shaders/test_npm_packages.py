@@ -56,6 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         bundle(metal, "glsl", ["eval"], placement=Placement("g_")).write(place / name)
         bundle(metal, "wgsl", ["eval"], placement=Placement("", 2, 3)).write(place / f"{name}-wgsl")
     bundle(GOLD, "glsl", ["eval"]).write(place / "unprefixed")
+    bundle([*METALS.values()], "glsl", ["eval"], placement=Placement("g_")).write(place / "both")
     return place
 
 
@@ -139,6 +140,21 @@ def test_values_are_given_at_first_and_later(page: Any, how: str) -> None:
         assert np.allclose(drawn(page, how=how, url="gold", lamp="point", **values), right, rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.slow
+def test_a_table_may_have_three_dimensions(page: Any, folder: Path) -> None:
+    metal = go.KullaConty(GOLD)
+    made = bundle(metal, "glsl", ["eval"], placement=Placement("g_"))
+    assert {texture["dimension"] for texture in made.manifest["textures"]} == {2, 3}
+    made.write(folder / "turned")
+    pixels = drawn(page, how="patch", url="turned", lamp="point")
+    assert np.allclose(pixels, expected(metal, "point"), rtol=1e-3, atol=1e-6)
+
+
+def test_a_folder_may_hold_several_materials(page: Any) -> None:
+    pixels = drawn(page, how="material", url="both", model="kulla-conty", lamp="point")
+    assert np.allclose(pixels, expected(METALS["tables"], "point"), rtol=1e-3, atol=1e-6)
+
+
 def test_a_field_may_be_a_map_of_three_js(page: Any) -> None:
     halved = {"physical": {"color": 0x808080}, "options": {"fields": {"albedo": "diffuseColor.rgb"}}}
     gray = ((0x80 / 255.0 + 0.055) / 1.055) ** 2.4
@@ -158,7 +174,8 @@ def test_shadows_fall(page: Any, how: str) -> None:
     pixels = drawn(page, how=how, url="gold", lamp="directional", blocked=True)
     dark, right = pixels.max(axis=-1) == 0.0, expected(GOLD, "directional")
     assert 0.01 < dark.mean() < 0.3
-    assert np.isclose(pixels, right, rtol=1e-3).all(axis=-1).mean() > 0.5
+    assert np.all(pixels < 1.001 * right + 1e-6)  # less at the shadow's edge
+    assert np.isclose(pixels, right, rtol=1e-3).all(axis=-1).mean() > 0.7
 
 
 def test_the_example_of_the_documentation_draws(page: Any, folder: Path) -> None:
@@ -182,6 +199,7 @@ def test_the_example_of_the_documentation_draws(page: Any, folder: Path) -> None
         ({"values": {"roughness": 0.5}}, "roughness: no parameter that varies in this shader of Conductor"),
         ({"values": {"alpha": 1.5}}, "alpha: 1.5 given, from 0 to 1 expected"),
         ({"values": {"eta": [1.0, 2.0]}}, "eta: 1,2 given, 1 or 3 numbers expected"),
+        ({"url": "both", "model": "gold"}, "name one of conductor, kulla-conty, not gold"),
         ({"url": "unprefixed"}, "gonio emit --prefix g_"),
         ({"url": "gold-wgsl"}, "gonio emit --lang glsl"),
         ({"url": "nowhere"}, "404"),

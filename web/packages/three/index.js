@@ -86,6 +86,7 @@ export function patch(physical, bundle, values = {}, { tangents = false, fields:
  * @param {Object<string, number | number[]>} values by the parameter's path; others become the bundle's
  */
 export function set(made, values) {
+  if (!held.has(made)) throw new Error(`${made.name || made.type}: not a material that material or patch returned`);
   const { manifest, struct } = held.get(made);
   Object.assign(struct, vectors(manifest, values));
 }
