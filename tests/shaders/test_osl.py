@@ -16,6 +16,7 @@ import parity
 import pytest
 from gonio.shaders import Bundle, bundle
 from gonio.shaders.languages import languages
+from gonio.shaders.table_files import FORMATS
 from variants import EVERY, GLASS, GOLD
 
 OSL = languages()["osl"]
@@ -100,11 +101,11 @@ def _run(folder: Path, cases: dict[str, Bundle], draws: dict[str, parity.Draws])
     for name, made in cases.items():
         columns = draws[name].columns().T[..., None]
         picture = folder / f"{name}-inputs.exr"
-        picture.write_bytes(OSL.table_file(columns))
+        picture.write_bytes(FORMATS[OSL.tables].write(columns))
         given = {"inputs": picture.name, "count": COUNT, "numbers": len(columns)}
         judge = JUDGE.format(**given, lines="\n    ".join(_lines(made, draws[name])))
         for texture in made.manifest["textures"]:
-            (folder / texture["file"]).write_bytes(OSL.table_file(made.tables[texture["uniform"]]))
+            (folder / texture["file"]).write_bytes(FORMATS[OSL.tables].write(made.tables[texture["uniform"]]))
         (folder / f"{name}.osl").write_text(made.text + judge)
         jobs.append({"shader": f"{name}.osl", "width": COUNT, "height": ROWS})
     (folder / "jobs.json").write_text(json.dumps(jobs))

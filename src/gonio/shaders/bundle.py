@@ -24,6 +24,7 @@ from .names import Names
 from .placement import Placement
 from .program import Program
 from .python_file import python_file
+from .table_files import FORMATS
 from .textures import pixels
 
 
@@ -41,16 +42,14 @@ class Bundle:
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write shader, manifest.json and one file per table, of raw little-endian float32 or of the form that the
-        language reads (`Language.table_file`); returns their paths."""
+        """Write shader, manifest.json and a file per table in the form of `Placement.tables`; returns their paths."""
         folder = files.check_folder(folder, parents=True)
         contents = {
             self.manifest["shader"]: self.text.encode(),
             "manifest.json": json.dumps(self.manifest, indent=2).encode(),
         }
-        language = Language.family.get(self.manifest["lang"])
         for texture in self.manifest["textures"]:
-            contents[texture["file"]] = language.table_file(self.tables[texture["uniform"]])
+            contents[texture["file"]] = FORMATS[texture["file_format"]].write(self.tables[texture["uniform"]])
         files.write_all(folder, contents)
         return [folder / file for file in contents]
 
@@ -71,7 +70,7 @@ def bundle(
 
     arrays     whether numbered derived constants are arrays: the page passes them to its pixels one by one
     on         paths of weights that stay fields of a lean shader although they are switched off
-    placement  prefix of the names, group and first number of the bindings
+    placement  prefix of the names, group and first number of the bindings, form of the files of tables
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
@@ -92,8 +91,8 @@ def _file(
     models: Sequence[MaterialLike], language: Language, functions: Sequence[str], lean: bool, place: Placement
 ) -> Bundle:
     """A file that runs by itself, which holds its tables."""
-    if place.prefix or place.first_binding:
-        what = f"a prefix or a binding given, and {language.name} is a file of its own"
+    if place.prefix or place.first_binding or place.tables:
+        what = f"a prefix, a binding or a form of tables given, and {language.name} is a file of its own"
         raise InputError(what, "emit: lang", "import it under a name")
     if len(models) != 1:
         what = f"{len(models)} materials given, and a file in {language.name} holds one"

@@ -70,6 +70,7 @@ def emit(
     prefix         begins all global names, so that shaders written apart fit into one module
     group          of the bindings of tables: WGSL's @group, HLSL's register space
     first_binding  number of the first table's binding
+    tables         form of the files of tables, which the text names: "raw", "exr" or "ktx2"; see `Placement`
     fit            instead the albedos as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
     ibl            instead the split sum of image-based lighting
     budget         the most exact terms, table or fit within so many operations; 0 is no limit

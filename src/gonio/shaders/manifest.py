@@ -101,7 +101,8 @@ def texture(table: Table, names: Names, bindings: Mapping[int, int]) -> dict[str
         "size": list(axes(table)),
         "channels": width(table),
         "format": {1: "r32float", 2: "rg32float", 4: "rgba32float"}[width(table)],
-        "file": f"{names.table(table)}{names.language.table_suffix}",
+        "file": names.file(table),
+        "file_format": names.placement.form(names.language),
         "group": names.placement.group,
         "binding": bindings[id(table)],
     }

@@ -62,6 +62,10 @@ class Names:
         stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
         return f"{self.placement.prefix}{start}{stem}"
 
+    def file(self, table: Table) -> str:
+        """The name of a table's file."""
+        return self.table(table) + self.placement.files(self.language).suffix
+
     def struct(self, record: Record) -> str:
         """The public name of a struct."""
         return self.public(self.language.word(record.name))

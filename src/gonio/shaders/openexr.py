@@ -1,4 +1,4 @@
-"""Tables as OpenEXR pictures, for languages whose textures are files; without Mitsuba, which shaders do not need."""
+"""Tables as OpenEXR pictures, for OSL and for engines; without Mitsuba, which shaders do not need."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHANNELS = {1: "Y", 2: "RG", 4: "RGBA"}
-FLOAT = 2  # type of a channel of float32
+TYPES = {2: 1, 4: 2}  # of a channel, by its bytes: half, float
 
 
-def openexr(pixels: NDArray[np.float32]) -> bytes:
-    """An uncompressed OpenEXR file of (rows, columns, channels) float32, with 1, 2 or 4 channels.
+def openexr(pixels: NDArray[np.floating]) -> bytes:
+    """An uncompressed OpenEXR file of (rows, columns, channels) float32 or float16, with 1, 2 or 4 channels.
 
     Source: "OpenEXR File Layout", openexr.com.
     """
     height, width, count = pixels.shape
     order = sorted(zip(CHANNELS[count], range(count), strict=True))  # a file has its channels in alphabetical order
-    channels = b"".join(name.encode() + b"\0" + struct.pack("<iIii", FLOAT, 0, 1, 1) for name, _ in order) + b"\0"
+    kind = struct.pack("<iIii", TYPES[pixels.dtype.itemsize], 0, 1, 1)
+    channels = b"".join(name.encode() + b"\0" + kind for name, _ in order) + b"\0"
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     attributes = {
         ("channels", "chlist"): channels,
@@ -31,12 +32,14 @@ def openexr(pixels: NDArray[np.float32]) -> bytes:
         ("screenWindowWidth", "float"): struct.pack("<f", 1.0),
     }
     header = struct.pack("<2I", 20000630, 2)  # the magic number and the version
-    for (name, kind), value in attributes.items():
-        header += name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+    for (name, type_), value in attributes.items():
+        header += name.encode() + b"\0" + type_.encode() + b"\0" + struct.pack("<i", len(value)) + value
     header += b"\0"
-    size = 4 * width * count  # bytes of a row
+    size = pixels.dtype.itemsize * width * count  # bytes of a row
     first = len(header) + 8 * height
     offsets = first + (8 + size) * np.arange(height, dtype="<u8")
-    rows = pixels[..., [place for _, place in order]].transpose(0, 2, 1).astype("<f4")  # channel after channel
+    rows = (
+        pixels[..., [place for _, place in order]].transpose(0, 2, 1).astype(pixels.dtype.newbyteorder("<"))
+    )  # channel after channel
     lines = [struct.pack("<2i", y, size) + row.tobytes() for y, row in enumerate(rows)]
     return header + offsets.tobytes() + b"".join(lines)

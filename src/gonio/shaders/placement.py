@@ -1,4 +1,4 @@
-"""The place of a shader in a module with other code: a prefix of its names, and the bindings of its tables."""
+"""The place of a shader in a module with other code: a prefix of its names, the bindings and files of its tables."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import re
 from dataclasses import dataclass
 from typing import TypedDict
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .languages import Language
+from .table_files import CHOICES, FORMATS, TableFormat
 
 LOCATION = "emit"
 
@@ -18,6 +19,7 @@ class PlacementKeywords(TypedDict, total=False):
     prefix: str
     group: int
     first_binding: int
+    tables: str
 
 
 @dataclass(frozen=True)
@@ -27,14 +29,16 @@ class Placement:
     prefix         begins all global names: functions, structs, constants, tables
     group          of the tables' bindings: WGSL's `@group`, HLSL's register space, a descriptor set
     first_binding  number of the first table's binding
+    tables         form of the files of tables: "raw", "exr" or "ktx2"; "" is the language's own, in most "raw"
     """
 
     prefix: str = ""
     group: int = 0
     first_binding: int = 0
+    tables: str = ""
 
     def check(self, language: Language) -> None:
-        """Raise InputError for a prefix or a group that the language does not accept."""
+        """Raise InputError for a prefix, a group or a form of tables that the language does not accept."""
         start = self.prefix
         if start and (not re.fullmatch(r"[A-Za-z]\w*", start, re.ASCII) or "__" in start or start.startswith("gl_")):
             hint = "a letter, then letters, digits and single underscores, such as g_; not gl_, which GLSL reserves"
@@ -45,3 +49,16 @@ class Placement:
         if self.group and not language.groups:
             what = f"group {self.group} given, and {language.title or language.name} has no groups of bindings"
             raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl, slang or glsl-vulkan")
+        if self.tables and self.tables not in CHOICES:
+            raise InputError(f"unknown form '{self.tables}'", f"{LOCATION}: tables", did_you_mean(self.tables, CHOICES))
+        if self.tables and language.tables not in CHOICES:
+            what = f"{self.tables} given, and {language.title or language.name} reads tables in a form of its own"
+            raise InputError(what, f"{LOCATION}: tables", "leave it out")
+
+    def form(self, language: Language) -> str:
+        """The name of the form of the files of tables."""
+        return self.tables or language.tables
+
+    def files(self, language: Language) -> TableFormat:
+        """The form of the files of tables."""
+        return FORMATS[self.form(language)]

@@ -100,10 +100,9 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
     channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
     readings = sorted(made.readings[id(table)])
     rule = "linear between texel centers, " if "lookup" in readings else ""
-    file = names.table(table) + language.table_suffix
     about = [
         f"// {size} texels, {channels}; {rule}clamped outside.",
-        f"// They are in {file}, which an output folder (-o DIR/) holds beside the shader.",
+        f"// They are in {names.file(table)}, which an output folder (-o DIR/) holds beside the shader.",
     ]
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2

@@ -21,11 +21,14 @@ SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 
 
 class Place(Options):
-    """The place of a shader in a module with other code."""
+    """The place of a shader in a module with other code, and the files of its tables."""
 
     prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
     group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, not in GLSL ES.")] = 0
     first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
+    tables: Annotated[
+        str, Option(metavar="raw|exr|ktx2", help="Form of the tables' files in a folder; by default raw float32.")
+    ] = ""
 
 
 class Content(Options):
@@ -86,13 +89,13 @@ def emit(
 ) -> None:
     """Write a material, traced from its own source, as code in GLSL, WGSL, HLSL, Python or a language of yours.
 
-    -o may be given twice. A name that ends in / is a folder; its tables are raw float32.
+    -o may be given twice. A name that ends in / is a folder; its tables are raw float32, or as --tables names them.
 
     \b
     Examples:
       gonio emit conductor --preset Au
       gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
-      gonio emit kulla-conty -p base=conductor -o shaders/
+      gonio emit kulla-conty -p base=conductor -o shaders/ --tables ktx2
       gonio emit openpbr -p coat_weight=1 --lean
       gonio emit conductor dielectric --prefix g_ --lang wgsl --group 1 --first-binding 4
       gonio emit conductor --preset Au --constants
@@ -116,7 +119,7 @@ def emit(
     if check:
         _write_pairs(made.texts(model), check, content.functions, single, folders)
         return
-    at = Placement(place.prefix, place.group, place.first_binding)
+    at = Placement(**vars(place))
     shader, errors = written_for(made.texts(model), lang, Choice(**vars(content)), at)
     for line in errors:
         print(line, file=sys.stderr)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...members import Family, instances_of
 
 
@@ -39,7 +36,7 @@ class Language:
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
     methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
-    table_suffix         suffix of the file of a table in an output folder
+    tables               the usual form of the files of tables, of `table_files.FORMATS`
     """
 
     family: ClassVar[Family[Language]]
@@ -84,7 +81,7 @@ class Language:
     standalone: ClassVar[bool] = False
     methods: ClassVar[bool] = False
     templates: ClassVar[bool] = False
-    table_suffix: ClassVar[str] = ".f32"
+    tables: ClassVar[str] = "raw"
 
     def type(self, name: str) -> str:
         """Name of a type in the language."""
@@ -145,10 +142,6 @@ class Language:
         prefix  begins the names of helpers
         """
         return self.fetch(table, places) + {1: ".r", 2: ".rg", 4: ""}[channels]
-
-    def table_file(self, texels: NDArray[np.float32]) -> bytes:
-        """The contents of the file of a table; x varies fastest, channels last."""
-        return texels.astype("<f4").tobytes()
 
     def offset(self, end: int, size: int) -> int:
         """Offset of a field of `size` bytes in a uniform buffer, after data that ends at `end`."""

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..openexr import openexr
+from ..table_files import FORMATS
 from .base import Language
 
 # keywords, words that the specification reserves, and the functions and closures of stdosl.h; parameters may hide the
@@ -71,8 +68,8 @@ class OSL(Language):
         "not": "(1.0 - {0})",
     }
     choice = ("{0} ? {1} : {2}", "select({2}, {1}, {0})")
-    # The renderers disagree on which row of a picture has t = 0: a table's rows are stored twice, the second time in
-    # reverse order, so that both conventions read the same texel.
+    # a table's rows are stored twice, the second time in reverse order, so that both conventions of renderers on which
+    # row of a picture has t = 0 read the same texel (`table_files.py`)
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "exponential": (
             "// e^x = 2^n e^r: |r| <= log(2) / 2, by Taylor's series.",
@@ -131,7 +128,7 @@ class OSL(Language):
     array_literal = False
     whole_members = False  # OSL 1.14 compiles them to code that stops
     swizzles = False
-    table_suffix = ".exr"
+    tables = "exr-mirrored"
 
     def array(self, type_: str, parts: list[str]) -> str:
         return f"{{ {', '.join(parts)} }}"
@@ -143,7 +140,7 @@ class OSL(Language):
         return f"{type_} {name}() {{ return {{ {', '.join(parts)} }}; }}"
 
     def binding(self, name: str, dimension: int, place: int) -> list[str]:
-        return [f'#define {name} "{name.replace("table_", "", 1)}{self.table_suffix}"']
+        return [f'#define {name} "{name.replace("table_", "", 1)}{FORMATS[self.tables].suffix}"']
 
     def texel(self, table: str, places: list[str], channels: int, shape: Sequence[int], prefix: str) -> str:
         kind = {1: "float", 2: "vector2", 4: "vector4"}[channels]
@@ -151,11 +148,6 @@ class OSL(Language):
         width, height, *depth = shape
         row = f"{y} + {height} * ({z[0]})" if z else y
         return f"{prefix}read_{kind}({table}, {x}, {row}, {width}, {height * (depth[0] if depth else 1)})"
-
-    def table_file(self, texels: NDArray[np.float32]) -> bytes:
-        """An OpenEXR picture whose layers lie below each other, and all rows once more in reverse order."""
-        rows = texels.reshape(-1, *texels.shape[-2:])
-        return openexr(np.concatenate([rows, rows[::-1]]))
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
         """With the headers of OSL that declare the types in use."""

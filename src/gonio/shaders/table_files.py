@@ -1,0 +1,56 @@
+"""The files of tables in an output folder: raw numbers, OpenEXR, KTX 2.0."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from .ktx2 import ktx2
+from .openexr import openexr
+
+Texels = NDArray[np.floating]  # x varies fastest, channels last
+
+
+class TableFormat(NamedTuple):
+    """The form of a table's file.
+
+    suffix  of the file's name
+    write   contents of the file of (rows, columns, channels) or (layers, rows, columns, channels)
+    dtype   type of a number in it
+    """
+
+    suffix: str
+    write: Callable[[Texels], bytes]
+    dtype: DTypeLike = np.float32
+
+
+def _raw(texels: Texels) -> bytes:
+    """Little-endian numbers without a header."""
+    return texels.astype(texels.dtype.newbyteorder("<")).tobytes()
+
+
+def _rows(texels: Texels) -> Texels:
+    """The layers below each other, as a picture has no third axis."""
+    return texels.reshape(-1, *texels.shape[-2:])
+
+
+def _picture(texels: Texels) -> bytes:
+    return openexr(_rows(texels))
+
+
+def _mirrored(texels: Texels) -> bytes:
+    """A picture whose rows follow once more in reverse order: renderers disagree about which row has t = 0."""
+    rows = _rows(texels)
+    return openexr(np.concatenate([rows, rows[::-1]]))
+
+
+FORMATS = {
+    "raw": TableFormat(".f32", _raw),
+    "exr": TableFormat(".exr", _picture),
+    "ktx2": TableFormat(".ktx2", ktx2),
+    "exr-mirrored": TableFormat(".exr", _mirrored),  # of OSL
+}
+CHOICES = ("raw", "exr", "ktx2")  # of a user
