@@ -13,20 +13,24 @@ from ...errors import InputError, did_you_mean
 from ..options import output_option
 from .base import SUPPORT, verb
 
-KINDS = ("scene", "report")
+KINDS = ("scene", "report", "manifest")
 
 
 @verb(SUPPORT, place=1)
 def schema(
-    kind: Annotated[str, Argument(metavar="scene|report", help="Schema of scene files, or of reports.")] = "scene",
+    kind: Annotated[
+        str,
+        Argument(metavar="scene|report|manifest", help="Of scene files, reports, or shaders' manifests."),
+    ] = "scene",
     output: Annotated[Path | None, output_option("FILE", "File to write; printed by default.")] = None,
 ) -> None:
-    """Print the JSON Schema of scene files or reports, which editors use for completion and programs for validation.
+    """Print the JSON Schema of scene files, reports or manifests, for completion in editors and validation by programs.
 
     \b
     Examples:
       gonio schema -o scene.schema.json
       gonio schema report
+      gonio schema manifest
     """
     if kind not in KINDS:
         raise InputError(f"no schema of '{kind}'", "", did_you_mean(kind, KINDS))
@@ -38,6 +42,10 @@ def schema(
         from ...verify.ci import schema as report
 
         text = report.text()
+    elif kind == "manifest":
+        from ...shaders import schema as manifest
+
+        text = manifest.text()
     else:
         from ... import scene
 
