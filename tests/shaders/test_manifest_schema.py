@@ -61,6 +61,7 @@ def row(x: Scalar) -> Scalar:
 
 def test_it_describes_modules_and_functions() -> None:
     check(bundle([go.KullaConty(GOLD), go.Lambert()], "wgsl", placement=Placement(tables="ktx2")).manifest)
+    check(shader("lambert", "glsl", Choice("eval"), Placement(half=True))[0].manifest)
     check(functions_bundle([(row, {"x": "float"})], "glsl", "Rows").manifest)
 
 

@@ -51,7 +51,7 @@ def test_constants_that_the_writer_folds_are_folded_in_the_reference() -> None:
 
 def test_half_of_the_rows_have_other_parameters_within_their_ranges() -> None:
     material = go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.4)
-    values = parameters(bundle(material, "wgsl"), 400, 1)
+    values = parameters(bundle(material, "wgsl").manifest, 400, 1)
     np.testing.assert_allclose(values["alpha"][:, ::2], np.repeat([[0.3], [0.1]], 200, axis=1), rtol=1e-6)
     other = values["alpha"][:, 1::2]
     assert other.min() == 0.0 and other.max() == 1.0 and np.mean(other < 1e-4) > 0.1

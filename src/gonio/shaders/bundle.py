@@ -34,7 +34,7 @@ class Bundle:
 
     text      the shader: structs, helpers, functions; no version line, no main
     manifest  the interface of the shader: plain dicts, lists, numbers; see docs/emit.md
-    tables    uniform name -> float32 array in the order of upload (x fastest), channels last
+    tables    uniform name -> float32 or float16 array in the order of upload (x fastest), channels last
     """
 
     text: str
@@ -84,14 +84,14 @@ def bundle(
     manifests = [module.add(made, numbers) for made, numbers in sources]
     text = texts.joined(module.head, module.blocks, language, place.prefix)
     described = manifests[0] if len(manifests) == 1 else of_several(manifests, language)
-    return Bundle(text, described, {name: pixels(table) for name, table in module.tables.items()})
+    return Bundle(text, described, {name: pixels(table, place.bits) for name, table in module.tables.items()})
 
 
 def _file(
     models: Sequence[MaterialLike], language: Language, functions: Sequence[str], lean: bool, place: Placement
 ) -> Bundle:
     """A file that runs by itself, which holds its tables."""
-    if place.prefix or place.first_binding or place.tables:
+    if place.prefix or place.first_binding or place.tables or place.half:
         what = f"a prefix, a binding or a form of tables given, and {language.name} is a file of its own"
         raise InputError(what, "emit: lang", "import it under a name")
     if len(models) != 1:

@@ -12,6 +12,8 @@ from ..errors import InputError
 from ..owner import public
 from . import curves, tiers
 from .bundle import Bundle, bundle
+from .half import bounded
+from .languages import Language
 from .placement import Placement, PlacementKeywords
 
 
@@ -71,6 +73,7 @@ def emit(
     group          of the bindings of tables: WGSL's @group, HLSL's register space
     first_binding  number of the first table's binding
     tables         form of the files of tables, which the text names: "raw", "exr" or "ktx2"; see `Placement`
+    half           tables of 16 bits per number; the text states the measured error, also of parameters in 16 bits
     fit            instead the albedos as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
     ibl            instead the split sum of image-based lighting
     budget         the most exact terms, table or fit within so many operations; 0 is no limit
@@ -88,8 +91,10 @@ def shader(
 ) -> tuple[Bundle, list[str]]:
     """The shader, and lines on the measured errors of an approximation."""
     lines: list[str] = []
+    several = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
+    if placement.half and (choice.fit or choice.ibl or Language.family.get(str(lang)).standalone):
+        raise InputError("half precision asked for", "emit: half", "it goes with whole materials in a shader language")
     if choice.approximates:
-        several = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
         choice.check(len(several))
         model = material(several[0])
         if choice.fit:
@@ -97,7 +102,11 @@ def shader(
         if choice.ibl:
             made, chosen = tiers.split_sum(model, lang, placement, choice.budget)
             return made, [str(tier) for tier in chosen]
-        models, chosen = tiers.cheapest(model, choice.budget)
+        cheapest, chosen = tiers.cheapest(model, choice.budget)
+        several = [cheapest]
         lines = [str(tier) for tier in chosen]
-    made = bundle(models, lang, choice.functions, lean=choice.lean, constants=choice.constants, placement=placement)
+    members = [material(one) for one in several]
+    made = bundle(members, lang, choice.functions, lean=choice.lean, constants=choice.constants, placement=placement)
+    if placement.half:
+        made = bounded(made, members)
     return made, lines

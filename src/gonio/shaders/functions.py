@@ -84,7 +84,7 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
         "operations": counts,
         "textures": [texture(table, names, bindings) for table in made.tables],
     }
-    tables = {names.table(table, "table_"): pixels(table) for table in made.tables}
+    tables = {names.table(table, "table_"): pixels(table, place.bits) for table in made.tables}
     return Bundle(texts.joined(head, texts.blocks(made, names, bindings), language, place.prefix), manifest, tables)
 
 

@@ -100,7 +100,7 @@ def texture(table: Table, names: Names, bindings: Mapping[int, int]) -> dict[str
         "dimension": 3 if len(axes(table)) == 3 else 2,
         "size": list(axes(table)),
         "channels": width(table),
-        "format": {1: "r32float", 2: "rg32float", 4: "rgba32float"}[width(table)],
+        "format": f"{'rgba'[: width(table)]}{names.placement.bits}float",
         "file": names.file(table),
         "file_format": names.placement.form(names.language),
         "group": names.placement.group,

@@ -64,7 +64,7 @@ class Names:
 
     def file(self, table: Table) -> str:
         """The name of a table's file."""
-        return self.table(table) + self.placement.files(self.language).suffix
+        return self.table(table) + self.placement.suffix(self.language)
 
     def struct(self, record: Record) -> str:
         """The public name of a struct."""

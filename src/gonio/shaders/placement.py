@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from ..errors import InputError, did_you_mean
 from .languages import Language
-from .table_files import CHOICES, FORMATS, TableFormat
+from .table_files import CHOICES, FORMATS
 
 LOCATION = "emit"
 
@@ -20,6 +20,7 @@ class PlacementKeywords(TypedDict, total=False):
     group: int
     first_binding: int
     tables: str
+    half: bool
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,14 @@ class Placement:
     group          of the tables' bindings: WGSL's `@group`, HLSL's register space, a descriptor set
     first_binding  number of the first table's binding
     tables         form of the files of tables: "raw", "exr" or "ktx2"; "" is the language's own, in most "raw"
+    half           whether tables have 16 bits per number
     """
 
     prefix: str = ""
     group: int = 0
     first_binding: int = 0
     tables: str = ""
+    half: bool = False
 
     def check(self, language: Language) -> None:
         """Raise InputError for a prefix, a group or a form of tables that the language does not accept."""
@@ -59,6 +62,12 @@ class Placement:
         """The name of the form of the files of tables."""
         return self.tables or language.tables
 
-    def files(self, language: Language) -> TableFormat:
-        """The form of the files of tables."""
-        return FORMATS[self.form(language)]
+    def suffix(self, language: Language) -> str:
+        """The end of the name of a table's file."""
+        form = self.form(language)
+        return ".f16" if self.half and form == "raw" else FORMATS[form].suffix
+
+    @property
+    def bits(self) -> int:
+        """Bits of a number in a table."""
+        return 16 if self.half else 32

@@ -11,7 +11,7 @@ fault of the writer or of the reader.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from ..spirv.module import Function
 from ..spirv.values import leaves, numeric
 from . import program as programs
 from .bundle import Bundle
+from .manifest import Json
 
 LANGUAGES = ("glsl", "hlsl", "wgsl")  # those that are read
 TINY = 1e-100  # in 64 bits, smaller values may be what underflow left
@@ -56,10 +57,10 @@ class Original:
     def __init__(self, material: BSDF, made: Bundle, wo: Array, wi: Array, u: Array, seed: int = 0) -> None:
         self.given = {"wo": wo.T, "wi": wi.T, "u": u.T}
         self.count = len(wo)
-        self.fields = parameters(made, self.count, seed)
+        self.fields = parameters(made.manifest, self.count, seed)
         names = [name for name in programs.FUNCTIONS if name in made.manifest["functions"]]
         with np.errstate(all="ignore"):
-            self.values = _recorded(material, names, self.given, self.fields)
+            self.values = values_of(recorded(material, names), names, self.given, self.fields)
 
     def difference(self, made: Bundle) -> list[Difference]:
         """The largest relative difference of each function of the text.
@@ -71,7 +72,7 @@ class Original:
         return [_largest(name, written, read[name], self.count) for name, written in self.values.items()]
 
 
-def parameters(made: Bundle, count: int, seed: int) -> dict[str, Array]:
+def parameters(manifest: Mapping[str, Json], count: int, seed: int) -> dict[str, Array]:
     """A value of each field of the struct per row, by path: (N,) or (components, N), in 32 bits.
 
     Even rows have the material's values, odd rows random ones: a fifth at the ends of the range, half close to its
@@ -79,9 +80,9 @@ def parameters(made: Bundle, count: int, seed: int) -> dict[str, Array]:
     depend on stays.
     """
     random = np.random.default_rng([seed, 3])
-    kinds = {one["path"]: one for one in made.manifest["parameters"]}
+    kinds = {one["path"]: one for one in manifest["parameters"]}
     values = {}
-    for field in made.manifest["fields"]:
+    for field in manifest["fields"]:
         own = np.asarray(field["value"], float).reshape(-1, 1)
         rows = np.repeat(own, count, axis=1)
         kind = kinds[field["path"]]
@@ -195,13 +196,14 @@ def _called(
 # ---------------------------------------------------------------------- what was written
 
 
-def _recorded(
-    material: BSDF, names: list[str], given: dict[str, Array], fields: dict[str, Array]
-) -> dict[str, list[Array]]:
-    """The values of the recording, with constants of 32 bits."""
+def recorded(material: BSDF, names: Sequence[str], bits: int = 32, without: Sequence[str] = ()) -> graph.Graph:
+    """The recording of a material's functions, with constants of 32 bits and tables of 32 or 16.
+
+    without  paths of parameters that are off and shape the code, as in `Program`
+    """
     tables: dict[int, Table] = {}
-    recorded = programs.recorded(recording.symbols(material), tuple(names), True)
-    for function in recorded.functions:
+    made = programs.recorded(recording.symbols(material, without), tuple(names), True)
+    for function in made.functions:
         for node in function.nodes:
             _fold(node)
         for node in function.nodes:
@@ -210,9 +212,16 @@ def _recorded(
                 node.static = _single(node.static)
             elif node.op in ("lookup", "fetch"):
                 table, channel = node.static
-                node.static = tables.setdefault(id(table), _rounded(table)), channel
+                node.static = tables.setdefault(id(table), _rounded(table, bits)), channel
+    return made
+
+
+def values_of(
+    made: graph.Graph, names: Sequence[str], given: Mapping[str, Array], fields: Mapping[str, Array]
+) -> dict[str, list[Array]]:
+    """The values of a recording's functions, component by component."""
     values = {f"self_{path.replace('.', '_')}": column for path, column in fields.items()}
-    result = recorded.evaluate(**values, **given)
+    result = made.evaluate(**values, **given)
     return {name: _numbers(one) for name, one in zip(names, result, strict=True)}
 
 
@@ -231,9 +240,9 @@ def _single(value: object) -> object:
     return float(np.float32(value)) if isinstance(value, float) else value
 
 
-def _rounded(table: Table) -> Table:
-    """A table in 32 bits."""
-    return Table(table.name, table.values.astype(np.float32).astype(float))
+def _rounded(table: Table, bits: int) -> Table:
+    """A table in 32 or 16 bits."""
+    return Table(table.name, table.values.astype(f"f{bits // 8}").astype(float))
 
 
 def _numbers(value: object) -> list[Array]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from .ktx2 import ktx2
 from .openexr import openexr
@@ -18,13 +18,11 @@ class TableFormat(NamedTuple):
     """The form of a table's file.
 
     suffix  of the file's name
-    write   contents of the file of (rows, columns, channels) or (layers, rows, columns, channels)
-    dtype   type of a number in it
+    write   contents of the file of (rows, columns, channels) or (layers, rows, columns, channels) float32 or float16
     """
 
     suffix: str
     write: Callable[[Texels], bytes]
-    dtype: DTypeLike = np.float32
 
 
 def _raw(texels: Texels) -> bytes:
@@ -48,7 +46,7 @@ def _mirrored(texels: Texels) -> bytes:
 
 
 FORMATS = {
-    "raw": TableFormat(".f32", _raw),
+    "raw": TableFormat(".f32", _raw),  # .f16 of half precision
     "exr": TableFormat(".exr", _picture),
     "ktx2": TableFormat(".ktx2", ktx2),
     "exr-mirrored": TableFormat(".exr", _mirrored),  # of OSL

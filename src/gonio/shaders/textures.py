@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InputError
 from ..ops.table import Table
 from .names import Names
 
@@ -29,12 +30,19 @@ def groups(table: Table) -> int:
     return -(-table.channels // width(table))
 
 
-def pixels(table: Table) -> np.ndarray:
-    """The texture's contents in the order of upload, x fastest, channels last; float32."""
+def pixels(table: Table, bits: int = 32) -> np.ndarray:
+    """The texture's contents in the order of upload, x fastest, channels last; float32, or float16 for 16 bits.
+
+    Raises InputError for numbers that overflow.
+    """
+    number = np.dtype(f"f{bits // 8}")
+    if np.abs(table.values).max(initial=0.0) > np.finfo(number).max:
+        what = f"table {table.name} holds {np.abs(table.values).max():g}, more than {bits} bits"
+        raise InputError(what, "emit: half", "write it in 32 bits")
     padded = np.zeros((*table.shape, groups(table) * width(table)))
     padded[..., : table.channels] = table.values
     split = padded.reshape(*table.shape, groups(table), width(table))
-    return np.ascontiguousarray(np.moveaxis(split, -2, 0), dtype=np.float32).reshape(*reversed(axes(table)), -1)
+    return np.ascontiguousarray(np.moveaxis(split, -2, 0), dtype=number).reshape(*reversed(axes(table)), -1)
 
 
 def reader(names: Names, table: Table) -> list[str]:

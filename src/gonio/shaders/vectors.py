@@ -36,7 +36,7 @@ def vectors(
         raise InputError(f"{count!r} given, a whole number from 1 to {LIMIT:,} expected", "emit: check")
     fields = dict(numbers_of(model))
     rng = np.random.default_rng(seed)
-    wo, wi = _pairs(rng, count, bool(model.transmits))
+    wo, wi = pairs(rng, count, bool(model.transmits))
     u = np.minimum(rng.random((count, 3)).astype(np.float32), np.float32(0.99999994)).astype(float)
     made: dict[str, Json] = {"version": 1, "model": model.name, "seed": seed, "fields": fields}
     made |= {"wo": wo.tolist(), "wi": wi.tolist(), "u": u.tolist()}
@@ -56,7 +56,7 @@ def vectors(
     return made
 
 
-def _pairs(rng: np.random.Generator, count: int, below: bool) -> tuple[np.ndarray, np.ndarray]:
+def pairs(rng: np.random.Generator, count: int, below: bool) -> tuple[np.ndarray, np.ndarray]:
     """Unit directions, rounded to float32; on the upper side unless light is transmitted."""
     wo, wi = _unit(rng.normal(size=(2, count, 3)))
     grazes, mirrored = np.arange(count) % 10 == 1, np.arange(count) % 10 == 2

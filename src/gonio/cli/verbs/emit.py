@@ -29,6 +29,9 @@ class Place(Options):
     tables: Annotated[
         str, Option(metavar="raw|exr|ktx2", help="Form of the tables' files in a folder; by default raw float32.")
     ] = ""
+    half: Annotated[
+        bool, Option("--half", help="Tables of 16 bits; the text states the error, also of parameters in 16 bits.")
+    ] = False
 
 
 class Content(Options):
