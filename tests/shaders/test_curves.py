@@ -81,6 +81,12 @@ def test_a_budget_chooses_cheaper_terms_of_a_material() -> None:
         tiers.cheapest(GOLD, 20)
 
 
+def test_the_error_of_cheaper_glass_is_that_of_transmission_too() -> None:
+    model, found = tiers.cheapest(go.Dielectric(1.5, 0.3), 300)
+    assert model.masking == "smith-separable" and found[0].cost < 0.5 * found[1].cost
+    assert 1.0 < found[0].error < 3.0 and found[0].mean < 0.01  # of reflection alone 0.37
+
+
 def test_a_material_without_facets_has_no_split_sum() -> None:
     with pytest.raises(go.InputError, match="Lambert has no split sum"):
         tiers.split_sum(go.Lambert(), "glsl")

@@ -54,7 +54,7 @@ def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
     largest channel at each pair, which counts as 1e-3 of the mean at least. The chosen form comes first.
     Raises InputError if none is within the budget.
     """
-    wo, wi = _pairs()
+    wo, wi = _pairs(bool(model.transmits))
     reference = np.asarray(model.eval(wo, wi), float)
     tiers: list[tuple[Tier, BSDF]] = []
     for name, variant in _variants(model):
@@ -84,8 +84,11 @@ def _variants(model: BSDF) -> Iterator[tuple[str, BSDF]]:
         yield name or "the material itself", tree.replace(model, dict(pairs)) if pairs else model
 
 
-def _pairs() -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of directions above the surface: a half of them within the lobe of a mirror."""
+def _pairs(below: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of directions: a half of them within the lobe of a mirror.
+
+    below  whether half of the directions wi are mirrored to the other side, where light is transmitted
+    """
     u = r_sequence(PAIRS, 4, 0.5)
     z = np.sqrt(u[:, [0, 2]])
     phi = 2.0 * np.pi * u[:, [1, 3]]
@@ -94,6 +97,8 @@ def _pairs() -> tuple[np.ndarray, np.ndarray]:
     wo, wi = both[:, 0], both[:, 1].copy()
     near = wo[::2] * (-1.0, -1.0, 1.0) + 0.3 * wi[::2]
     wi[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
+    if below:
+        wi[np.arange(PAIRS) % 4 >= 2, 2] *= -1.0
     return wo, wi
 
 
