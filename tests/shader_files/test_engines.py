@@ -219,6 +219,126 @@ vec3 BRDF_specularGGXAnisotropy(float a, float s, vec3 n, vec3 v, vec3 l, vec3 h
     assert value("anisotropic", metal=1.0, strength=0.3) == pytest.approx(0.6 * 0.5 * 0.3, rel=1e-6)
 
 
+# headers with the names that our program calls, and a formula of our own: color (1 + table + ltc) + coat's roughness
+OPENPBR = """
+struct OpenPBR_ResolvedInputs { vec3 base_color; float base_metalness; float base_diffuse_roughness;
+    float specular_roughness; float specular_ior; float coat_weight; float coat_roughness; float coat_ior;
+    float fuzz_weight; float fuzz_roughness; };
+struct OpenPBR_PreparedBsdf { OpenPBR_ResolvedInputs given; vec3 view; };
+const vec3 OpenPBR_BaseRgbWavelengths_nm = vec3(600.0, 500.0, 400.0);
+const float OpenPBR_VacuumIor = 1.0;
+OpenPBR_ResolvedInputs openpbr_make_default_resolved_inputs() {
+    return OpenPBR_ResolvedInputs(vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+}
+OpenPBR_PreparedBsdf openpbr_prepare(OpenPBR_ResolvedInputs i, vec3 t, vec3 nm, float ior, vec3 view) {
+    return OpenPBR_PreparedBsdf(i, view);
+}
+vec3 openpbr_eval(OpenPBR_PreparedBsdf p, vec3 light) {
+    float table = OPENPBR_SAMPLE_3D_TEXTURE(0, vec3(0.5)).r + OPENPBR_SAMPLE_2D_TEXTURE(6, vec2(0.5)).r;
+    float fuzz = p.given.fuzz_weight * OPENPBR_SAMPLE_2D_TEXTURE(7, vec2(0.5)).z;
+    return atan2(light.z, 1.0) * (p.given.base_color * (1.0 + table + fuzz) + p.given.coat_weight * p.given.coat_roughness);
+}
+vec3 openpbr_get_sum_of_diffuse_specular(vec3 value) { return value; }
+"""
+OPENPBR_TABLES = {
+    "ideal_dielectric_energy_complement": 32**3,
+    "ideal_dielectric_avg_energy_complement": 32**2,
+    "ideal_dielectric_reflection_ratio": 32**2,
+    "opaque_dielectric_energy_complement": 32**3,
+    "opaque_dielectric_avg_energy_complement": 32**2,
+    "ideal_metal_energy_complement": 32**2,
+    "ideal_metal_avg_energy_complement": 32,
+}
+
+
+def test_openpbr_bsdf_reads_its_tables(tmp_path: Path) -> None:
+    try:
+        compiler()
+    except Exception as error:
+        pytest.skip(f"NOT TRIED: {error}")
+    data = tmp_path / "openpbr" / "impl" / "data"
+    data.mkdir(parents=True)
+    (tmp_path / "openpbr" / "openpbr.h").write_text(OPENPBR)
+    (tmp_path / "openpbr" / "impl" / "openpbr_bsdf.h").write_text("")
+    for name, count in OPENPBR_TABLES.items():
+        text = ", ".join(["13107"] * count)  # 0.2
+        (data / f"openpbr_{name}_data.h").write_text(f"/* 3 axes */\n{text} // of 32 entries\n")
+    ltc = data / "openpbr_ltc_data.h"
+    ltc.write_text("vec3(0.5, -1.5e-1, 0.25),\n" * 32**2)
+    (file,) = shaders.adopt_package(tmp_path / "openpbr", tmp_path / "out")
+    made = go.Shader(file, color=0.5, roughness=0.5, coat=0.5, coatRoughness=0.2, fuzz=1.0)
+    wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.8, 0.0, 0.6]])
+    assert made.eval(wo, wi, precision="float64")[0, 0] == pytest.approx(np.arctan(0.6) * (0.5 * 1.65 + 0.1), rel=1e-5)
+    ltc.write_text("vec3(0.5, 0.5, 0.25),\n")
+    with pytest.raises(InputError, match="3 numbers, 3072 expected"):
+        shaders.adopt_package(tmp_path / "openpbr", tmp_path / "again")
+
+
+# modules with the names that our program imports, and formulas of our own
+BEVY = {
+    "bevy_pbr/src/render/pbr_lighting.wgsl": """
+#define_import_path bevy_pbr::lighting
+struct Layer { N: vec3f, R: vec3f, NdotV: f32, perceptual_roughness: f32, roughness: f32, }
+struct LightingInput {
+#ifdef STANDARD_MATERIAL_CLEARCOAT
+    layers: array<Layer, 2>,
+#else
+    layers: array<Layer, 1>,
+#endif
+    V: vec3f, diffuse_color: vec3f, metallic: f32, F0_dielectric: vec3f, F0_metallic: vec3f, F_ab: vec2f,
+#ifdef STANDARD_MATERIAL_ANISOTROPY
+    anisotropy: f32, Ta: vec3f, Ba: vec3f,
+#endif
+}
+struct Derived { NdotL: f32, }
+fn derive_lighting_input(N: vec3f, V: vec3f, L: vec3f) -> Derived { return Derived(dot(N, L)); }
+fn Fd_Burley(surface: ptr<function, LightingInput>, derived: ptr<function, Derived>) -> f32 {
+    return (*surface).layers[0].NdotV;
+}
+fn F_AB(rough: f32, NdotV: f32) -> vec2f { return vec2f(rough, NdotV); }
+fn perceptualRoughnessToRoughness(rough: f32) -> f32 { return rough * rough; }
+fn specular(surface: ptr<function, LightingInput>, derived: ptr<function, Derived>, alpha: f32, k: f32) -> vec3f {
+    return alpha * mix((*surface).F0_dielectric, (*surface).F0_metallic, (*surface).metallic) + (*surface).F_ab.x;
+}
+#ifdef STANDARD_MATERIAL_ANISOTROPY
+fn specular_anisotropy(surface: ptr<function, LightingInput>, derived: ptr<function, Derived>, L: vec3f, alpha: f32,
+                       k: f32) -> vec3f {
+    return vec3f((*surface).anisotropy * dot((*surface).Ta, L));
+}
+#endif
+fn specular_clearcoat(surface: ptr<function, LightingInput>, derived: ptr<function, Derived>, coat: f32, alpha: f32,
+                      k: f32) -> vec2f {
+    return vec2f(coat * 0.5, alpha);
+}
+""",
+    "bevy_pbr/src/render/pbr_functions.wgsl": """
+#define_import_path bevy_pbr::pbr_functions
+fn calculate_diffuse_color(color: vec3f, metal: f32, s: f32, d: f32) -> vec3f { return color * (1.0 - metal); }
+fn calculate_F0_dielectric(reflectance: vec3f) -> vec3f { return 0.16 * reflectance; }
+""",
+    "bevy_render/src/maths.wgsl": "#define_import_path bevy_render::maths\n",
+}
+
+
+def test_bevy_lights_its_material(tmp_path: Path) -> None:
+    for name, text in BEVY.items():
+        (tmp_path / "bevy" / "crates" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "bevy" / "crates" / name).write_text(text)
+    files = {one.stem: one for one in shaders.adopt_package(tmp_path / "bevy", tmp_path / "out")}
+    assert set(files) == {"bevy-standard", "bevy-coat", "bevy-anisotropic"}
+    wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.8, 0.0, 0.6]])
+
+    def value(name: str, **more: float) -> float:
+        made = go.Shader(files[f"bevy-{name}"], color=0.5, rough=0.5, metal=0.25, reflectance=0.5, **more)
+        return float(made.eval(wo, wi, precision="float64")[0, 0])
+
+    base, gloss = 0.5 * 0.75 * 0.8, 0.25 * (0.75 * 0.08 + 0.25 * 0.5) + 0.5
+    assert value("standard") == pytest.approx(0.6 * (base + gloss), rel=1e-6)
+    coated = (base + gloss * 0.8) * 0.8 + 0.36
+    assert value("coat", coat=0.4, coatRough=0.6) == pytest.approx(0.6 * coated, rel=1e-6)
+    assert value("anisotropic", strength=0.3) == pytest.approx(0.6 * (base + 0.3 * 0.8), rel=1e-6)
+
+
 def test_program_of_the_package_is_the_material(three: Path, tmp_path: Path) -> None:
     written = shaders.adopt_package(three, tmp_path / "three")
     assert "three-standard.glsl" in {one.name for one in written}
@@ -277,5 +397,7 @@ def test_table_of_another_size_is_refused(three: Path, tmp_path: Path) -> None:
 
 def test_every_adapter_names_its_program() -> None:
     for engine in engines.engines().values():
-        for adapter in engine.folder.glob("*.glsl.toml"):
+        adapters = list(engine.folder.glob("*.toml"))
+        assert adapters
+        for adapter in adapters:
             assert adapter.with_suffix("").is_file()

@@ -17,7 +17,10 @@ from .base import MATERIALS, verb
 def adopt(
     file: Annotated[
         Path,
-        Argument(metavar="FILE", help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf; or an engine's package."),
+        Argument(
+            metavar="FILE",
+            help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf; or an engine's package or checkout.",
+        ),
     ],
     *,
     output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
@@ -27,7 +30,7 @@ def adopt(
     """Write the adapter of a shader, FILE.toml: which function is the BRDF, and what its arguments mean.
 
     It is a first one by names of functions, arguments and uniforms; the guesses are printed. The folder of an engine's
-    npm package gives shaders that include the package's text, with their adapters.
+    npm package, or of a checkout of one, gives shaders that include its text, with their adapters.
 
     \b
     Examples:

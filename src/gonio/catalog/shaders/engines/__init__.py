@@ -3,7 +3,8 @@
     adopt_package("node_modules/three", "three")     writes three-standard.glsl, its adapter, and the tables it reads
 
 A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
-of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`).
+of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`). An engine that is not
+on npm is recognized by a file of its repository (`MARK`).
 """
 
 from __future__ import annotations
@@ -26,15 +27,22 @@ MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
 
 
 class Engine(NamedTuple):
-    """An engine: the name of its package on npm, our programs, and its tables by file name."""
+    """An engine: the name of its package on npm, our programs, and its tables by file name.
+
+    mark  of an engine that is not on npm: a file of its repository, by which a checkout is recognized
+    """
 
     package: str
     folder: Path
     tables: Callable[[Path], dict[str, np.ndarray]]
+    mark: str
 
 
 class Package(NamedTuple):
-    """A package that a user has: its name and version by its package.json, and its folder."""
+    """A package that a user has: its name and version by its package.json, and its folder.
+
+    A checkout has the name of its engine, and no version.
+    """
 
     name: str
     version: str
@@ -44,12 +52,18 @@ class Package(NamedTuple):
 def engines() -> dict[str, Engine]:
     """All engines by the names of their packages."""
     modules = [importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__)]
-    return {one.PACKAGE: Engine(one.PACKAGE, Path(one.__path__[0]), one.tables) for one in modules}
+    return {
+        one.PACKAGE: Engine(one.PACKAGE, Path(one.__path__[0]), one.tables, getattr(one, "MARK", "")) for one in modules
+    }
 
 
 def package_in(folder: str | os.PathLike[str]) -> Package:
-    """The package in a folder. Raises InputError if none of an engine is there."""
-    path = Path(os.path.expanduser(folder)) / "package.json"
+    """The package or checkout in a folder. Raises InputError if none of an engine is there."""
+    place = Path(os.path.expanduser(folder))
+    for engine in engines().values():
+        if engine.mark and (place / engine.mark).is_file():
+            return Package(engine.package, "", place)
+    path = place / "package.json"
     hint = f"the folder of {', '.join(engines())}, such as node_modules/three"
     try:
         if path.stat().st_size > MAX_DESCRIPTION:
@@ -66,9 +80,10 @@ def package_in(folder: str | os.PathLike[str]) -> Package:
 
 
 def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]) -> list[Path]:
-    """Write the materials of a package of an engine into a folder: each a .glsl with its adapter.
+    """Write the materials of a package of an engine into a folder: each a .glsl or .wgsl with its adapter.
 
-    folder  the package as npm installs it, such as node_modules/three; it is read again whenever a material is used
+    folder  the package as npm installs it, such as node_modules/three, or a checkout of an engine that is not on npm;
+            it is read again whenever a material is used
     target  the folder to write, made if missing; the shaders name the package relative to it
     Returns the shaders, one per material. Raises InputError if the package is none that Gonio knows.
     """
@@ -78,7 +93,7 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
     tables = engine.tables(package.folder)
     there = os.path.relpath(package.folder.resolve(), place.resolve()).replace(os.sep, "/")
     place.mkdir(parents=True, exist_ok=True)
-    for source in sorted(engine.folder.glob("*.glsl*")):
+    for source in _programs(engine.folder):
         text = source.read_text(encoding="utf-8")
         if source.suffix == ".toml":
             text = text.replace('"package/', f'"{there}/')
@@ -87,4 +102,9 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
         data = io.BytesIO()
         np.save(data, table, allow_pickle=False)
         files.write_whole(place / f"{name}.npy", data.getvalue())
-    return [place / one.stem for one in sorted(engine.folder.glob("*.glsl.toml"))]
+    return [place / one.stem for one in _programs(engine.folder) if one.suffix == ".toml"]
+
+
+def _programs(folder: Path) -> list[Path]:
+    """Our shaders and adapters in an engine's folder."""
+    return sorted(one for one in folder.iterdir() if one.is_file() and one.suffix != ".py")

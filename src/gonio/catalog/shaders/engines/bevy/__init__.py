@@ -1,0 +1,15 @@
+"""Bevy: the lighting of its StandardMaterial by a directional light, from the WGSL of a checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+PACKAGE = "bevy"
+MARK = "crates/bevy_pbr/src/render/pbr_lighting.wgsl"
+
+
+def tables(package: Path) -> dict[str, np.ndarray]:
+    """None: without DFG_LUT the shaders approximate the table of the split sum by a polynomial."""
+    return {}
