@@ -236,7 +236,8 @@ OpenPBR_PreparedBsdf openpbr_prepare(OpenPBR_ResolvedInputs i, vec3 t, vec3 nm, 
 vec3 openpbr_eval(OpenPBR_PreparedBsdf p, vec3 light) {
     float table = OPENPBR_SAMPLE_3D_TEXTURE(0, vec3(0.5)).r + OPENPBR_SAMPLE_2D_TEXTURE(6, vec2(0.5)).r;
     float fuzz = p.given.fuzz_weight * OPENPBR_SAMPLE_2D_TEXTURE(7, vec2(0.5)).z;
-    return atan2(light.z, 1.0) * (p.given.base_color * (1.0 + table + fuzz) + p.given.coat_weight * p.given.coat_roughness);
+    float coat = p.given.coat_weight * p.given.coat_roughness;
+    return atan2(light.z, 1.0) * (p.given.base_color * (1.0 + table + fuzz) + coat);
 }
 vec3 openpbr_get_sum_of_diffuse_specular(vec3 value) { return value; }
 """

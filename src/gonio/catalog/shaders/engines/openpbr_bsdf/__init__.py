@@ -29,11 +29,11 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE]-?\d+)?")
 
 def tables(package: Path) -> dict[str, np.ndarray]:
     """The tables of energies, of 1 to 3 axes and one channel, and that of the fuzz, of 2 axes and three channels."""
-    found = {}
+    energies = {}
     for name, axes in _ENERGIES.items():
         shape = (*(SIZE,) * axes, 1) if axes > 1 else (1, SIZE, 1)  # the library reads its rows as textures of one row
-        found[name] = _numbers(package, name, shape) / UNORM
-    return {**found, "ltc": _numbers(package, "ltc", (SIZE, SIZE, 3))}
+        energies[name] = _numbers(package, name, shape) / UNORM
+    return {**energies, "ltc": _numbers(package, "ltc", (SIZE, SIZE, 3))}
 
 
 def _numbers(package: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
