@@ -9,6 +9,9 @@ PACKAGES is a folder with one folder per release, each with its package.json, su
 
     npm pack three@0.187.0 && mkdir three-0.187.0 && tar xzf three-0.187.0.tgz -C three-0.187.0 --strip-components=1
 
+An engine that is not on npm has a folder PAGE-VERSION: bevy-0.19.0, a checkout; materialx-1.39.5, the shaders that
+programs/materialx_generate.py wrote.
+
 What is measured of an engine, and the causes: docs/engine_cases.
 """
 
@@ -17,6 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import shutil
 import sys
 import tempfile
 import textwrap
@@ -26,7 +30,7 @@ from typing import Any
 import gonio as go
 import matplotlib
 from engine_cases import engines
-from engine_cases.base import COSINES, ROUGHNESSES, Engine, furnace, material
+from engine_cases.base import COSINES, ROUGHNESSES, Engine, furnace, material, shader
 from gonio.catalog import shaders
 from gonio.verify.severity import percent
 from gonio.verify.verdict import Verdict
@@ -38,9 +42,9 @@ import matplotlib.pyplot as plt
 FOLDER = Path(__file__).parent / "report-cards" / "engines"
 STORED = FOLDER / "cards.json"
 SEED = 1
-OVERVIEW = """Shaders of engines that are on npm, judged by the laws of [`gonio verify`](../../verify.md) and by white
-furnaces. Gonio contains no text of theirs: `gonio adopt node_modules/three` writes a program that includes the
-package's own ([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function
+OVERVIEW = """Shaders of engines, judged by the laws of [`gonio verify`](../../verify.md) and by white furnaces. Gonio
+contains no text of theirs: `gonio adopt` of a package or checkout writes a program that includes the engine's own
+([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function
 or table, and how to see it without Gonio. The laws are those of a path tracer: a rasterizer need not be reciprocal, and
 several causes are deliberate. Corrections are welcome.
 """
@@ -59,6 +63,11 @@ def releases(packages: Path, only: set[str]) -> dict[str, list[shaders.Package]]
             continue
         if not only or package.name in only:
             found.setdefault(package.name, []).append(package)
+    for engine in engines().values():
+        if engine.origin != "npm" and (not only or engine.package in only):
+            for folder in packages.glob(f"{engine.page}-*/"):
+                version = folder.name.removeprefix(f"{engine.page}-")
+                found.setdefault(engine.package, []).append(shaders.Package(engine.package, version, folder))
     return {name: sorted(every, key=lambda one: _order(one.version)) for name, every in found.items()}
 
 
@@ -70,20 +79,25 @@ def measured(engine: Engine, package: shaders.Package) -> dict[str, Any]:
     """All figures of a release."""
     with tempfile.TemporaryDirectory(prefix="gonio-engine-") as place:
         folder = Path(place)
-        shaders.adopt_package(package.folder, folder)
+        if engine.made:
+            shutil.copytree(package.folder, folder, dirs_exist_ok=True)
+        else:
+            shaders.adopt_package(package.folder, folder)
         return {
             "furnaces": {
                 one.title: [furnace(material(folder, one.material, **one.parameters(r))) for r in ROUGHNESSES]
                 for one in engine.furnaces
             },
             "trials": engine.trials(folder),
-            "laws": {name: _judged(folder, name) for name in engine.materials},
+            "laws": {name: _judged(folder, name, engine.laws) for name in engine.materials},
         }
 
 
-def _judged(folder: Path, name: str) -> dict[str, Any]:
+def _judged(folder: Path, name: str, laws: tuple[str, ...]) -> dict[str, Any]:
     stem, _, settings = name.partition("(")  # "three-standard(metal=0)"
-    (card,) = go.verify(f"{folder / stem}.glsl{'(' * bool(settings)}{settings}", quick=True, seed=SEED).cards
+    (card,) = go.verify(
+        f"{shader(folder, stem)}{'(' * bool(settings)}{settings}", quick=True, seed=SEED, law=laws or None
+    ).cards
     return {
         v.law: {
             "status": v.status,
@@ -137,7 +151,7 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
     lines = [
         f"# {engine.title}",
         "",
-        f"`{engine.package}` {shown} of npm; [repository]({engine.home}).",
+        f"`{engine.package}` {shown} of {engine.origin}; [repository]({engine.home}).",
         "Written by `python docs/make_engine_cards.py`; all figures are in [cards.json](cards.json).",
         "",
         engine.intro,
@@ -210,13 +224,12 @@ def _cell(one: dict[str, str]) -> str:
 
 def _again(engine: Engine, version: str) -> list[str]:
     stem = engine.page
-    lines = [
-        "## Again",
-        "",
-        f"    npm install {engine.package}@{version}",
-        f"    gonio adopt node_modules/{engine.package} -o {stem}",
-        *(f"    gonio verify {_operand(stem, name)}" for name in engine.materials),
-    ]
+    get = engine.again.format(version=version) or (
+        f"npm install {engine.package}@{version}\ngonio adopt node_modules/{engine.package} -o {stem}"
+    )
+    suffix = f".{engine.language}"
+    lines = ["## Again", "", *(f"    {line}" for line in get.split("\n"))]
+    lines += [f"    gonio verify {_operand(stem, name, suffix)}" for name in engine.materials]
     if engine.programs:
         links = ", ".join(f"[{name}](programs/{name})" for name in engine.programs)
         printed = sorted((FOLDER / "programs").glob(f"{stem}-*.txt"))
@@ -225,9 +238,9 @@ def _again(engine: Engine, version: str) -> list[str]:
     return lines
 
 
-def _operand(folder: str, name: str) -> str:
+def _operand(folder: str, name: str, suffix: str) -> str:
     stem, _, settings = name.partition("(")
-    return f'"{folder}/{stem}.glsl({settings}"' if settings else f"{folder}/{stem}.glsl"
+    return f'"{folder}/{stem}{suffix}({settings}"' if settings else f"{folder}/{stem}{suffix}"
 
 
 def _wrapped(text: str, indent: str = "") -> str:
@@ -252,6 +265,7 @@ def overview(stored: dict[str, Any]) -> str:
             f"| [{engine.title}]({engine.page}.md) | {', '.join(results)} | {metal:.3f} | "
             f"{max(gain, 0.0):.3f} ({title[:1].lower()}{title[1:]}) | {', '.join(failed) or 'none'} |"
         )
+    lines += ["", "The models of the BRDF Explorer, which are no engine's, have a [table](brdf-explorer.md)."]
     return "\n".join(lines) + "\n"
 
 

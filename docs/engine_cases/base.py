@@ -40,6 +40,11 @@ class Engine(NamedTuple):
     sections   figures by version -> further sections of the page
     causes     (material, law) or (material, law, version) -> cause and remedy
     programs   files of report-cards/engines/programs that show it without Gonio
+    origin     where a release comes from, as the page words it
+    again      for an engine that is not on npm: the commands that make the folder of shaders, `{version}` in them
+    made       the folder of a release holds the shaders and adapters themselves
+    language   suffix of the shaders
+    laws       the laws to judge by, all if empty
     """
 
     package: str
@@ -54,11 +59,21 @@ class Engine(NamedTuple):
     sections: Callable[[dict[str, dict[str, float]]], str]
     causes: Mapping[tuple[str, ...], str]
     programs: tuple[str, ...]
+    origin: str = "npm"
+    again: str = ""
+    made: bool = False
+    language: str = "glsl"
+    laws: tuple[str, ...] = ()
 
 
 def material(folder: Path, name: str, **parameters: float) -> Any:
     """A material of an adopted package."""
-    return go.Shader(folder / f"{name}.glsl", **parameters)
+    return go.Shader(shader(folder, name), **parameters)
+
+
+def shader(folder: Path, name: str) -> Path:
+    """The file of a material."""
+    return next(one for one in (folder / f"{name}.glsl", folder / f"{name}.wgsl") if one.is_file())
 
 
 def furnace(one: BSDF, cosines: tuple[float, ...] = COSINES) -> list[float]:

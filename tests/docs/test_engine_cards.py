@@ -27,6 +27,18 @@ def test_pages_are_made_of_the_stored_figures() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_page_of_the_explorer_is_made_of_its_stored_verdicts() -> None:
+    done = subprocess.run([sys.executable, DOCS / "make_explorer_card.py", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_polynomial_of_bevy_accounts_for_its_white_metal() -> None:
+    for figures in (release["trials"] for release in CARDS["bevy"].values()):
+        for name, expected in figures.items():
+            if name.startswith("expected_"):
+                assert figures[f"shader_{name.removeprefix('expected_')}"] == pytest.approx(expected, abs=0.01)
+
+
 def test_figures_of_the_thread_about_rough_metals_are_met() -> None:
     stated = {"0.5_0.5": (0.90, 1.00), "0.75_0.5": (0.84, 1.00), "1_0.5": (0.72, 0.94), "1_1": (0.58, 0.89)}
     before, after = (CARDS["three"][version]["trials"] for version in ("0.185.1", "0.187.0"))
