@@ -190,9 +190,10 @@ def _furnace_table(title: str, results: dict[str, Any]) -> list[str]:
 
 def _failures(engine: Engine, results: dict[str, Any]) -> list[str]:
     laws = list(next(iter(next(iter(results.values()))["laws"].values())))
+    only = f", by {', '.join(engine.laws)} alone" if engine.laws else ""
     lines = [
-        f"`gonio verify --quick`, seed {SEED}, at the default values and over all ranges. The grades are explained",
-        "[here](../../verify.md#severity-of-a-failure).",
+        f"`gonio verify --quick`, seed {SEED}, at the default values and over all ranges{only}. The grades are",
+        "explained [here](../../verify.md#severity-of-a-failure).",
         "",
         f"| material | release | {' | '.join(laws)} |",
         "|---" * (len(laws) + 2) + "|",
