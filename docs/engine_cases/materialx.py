@@ -88,7 +88,7 @@ ENGINE = Engine(
     causes=CAUSES,
     programs=(),
     origin="PyPI",
-    again="pip install MaterialX=={version}\npython programs/materialx_generate.py materialx",
+    again="pip install MaterialX=={version}\npython docs/report-cards/engines/programs/materialx_generate.py materialx",
     made=True,
     laws=("positivity", "reciprocity", "energy"),
 )
