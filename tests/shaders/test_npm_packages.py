@@ -56,6 +56,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         bundle(metal, "glsl", ["eval"], placement=Placement("g_")).write(place / name)
         bundle(metal, "wgsl", ["eval"], placement=Placement("", 2, 3)).write(place / f"{name}-wgsl")
     bundle(GOLD, "glsl", ["eval"]).write(place / "unprefixed")
+    for name, form in {"half": Placement("g_", half=True), "ktx2": Placement("g_", tables="ktx2")}.items():
+        bundle(METALS["tables"], "glsl", ["eval"], placement=form).write(place / name)
     bundle([*METALS.values()], "glsl", ["eval"], placement=Placement("g_")).write(place / "both")
     return place
 
@@ -202,6 +204,8 @@ def test_the_example_of_the_documentation_draws(page: Any, folder: Path) -> None
         ({"url": "both", "model": "gold"}, "name one of conductor, kulla-conty, not gold"),
         ({"url": "unprefixed"}, "gonio emit --prefix g_"),
         ({"url": "gold-wgsl"}, "gonio emit --lang glsl"),
+        ({"url": "half"}, "f16 is no table of 32-bit numbers: write it without --half"),
+        ({"url": "ktx2"}, "is no table of 32-bit numbers"),
         ({"url": "nowhere"}, "404"),
     ],
 )

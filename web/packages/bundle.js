@@ -16,7 +16,10 @@ export async function read(url, lang, model) {
   const manifest = whole.materials ? member(whole.materials, model, folder) : whole;
   if (!manifest.functions.eval) throw new Error(`${folder} has no eval: write it by gonio emit --functions eval`);
   const text = await (await answer(folder + manifest.shader)).text();
-  const floats = async ({ uniform, file }) => {
+  const floats = async ({ uniform, file, format, file_format }) => {
+    if (file_format !== "raw" || !format.endsWith("32float")) {
+      throw new Error(`${folder}${file} is no table of 32-bit numbers: write it without --half and --tables`);
+    }
     return [uniform, littleEndian(await (await answer(folder + file)).arrayBuffer())];
   };
   return { manifest, text, tables: Object.fromEntries(await Promise.all(manifest.textures.map(floats))) };

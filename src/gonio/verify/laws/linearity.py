@@ -102,11 +102,11 @@ def _power_of(rows: np.ndarray) -> float | None:
     if lit.sum() < 64:
         return None
     begin, *between, end = np.power.outer(np.asarray(GRAYS), POWERS)
-    found = []
+    powers = []
     for row, ratio in zip(inner, ((x - begin) / (end - begin) for x in between), strict=True):  # ratios fall with p
-        found.append(np.interp((first - row)[lit] / (last - first)[lit], -ratio, POWERS))
-    power = float(np.median(found[0]))
-    same = all(np.percentile(np.abs(each / power - 1.0), 97.0) < SPREAD for each in found)
+        powers.append(np.interp((first - row)[lit] / (last - first)[lit], -ratio, POWERS))
+    power = float(np.median(powers[0]))
+    same = all(np.percentile(np.abs(each / power - 1.0), 97.0) < SPREAD for each in powers)
     return power if same and abs(power - 1.0) > 0.01 else None
 
 
