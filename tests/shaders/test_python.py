@@ -22,7 +22,7 @@ ROUNDING = np.finfo(float).eps
 COUNT = 2000
 # one of each kind of formula: tables, selections, spectra, delta lobes, the error function, angles
 SOME = ["oren-nayar", "mix-with-mirror", "kulla-conty", "shifted-gamma", "glass-turned"]
-QUICK = [*SOME, "metal-by-colours"]  # constants that are selected, besides
+QUICK = [*SOME, "metal-by-colours", "sheen-charlie"]  # besides, constants that are selected, and in places of tables
 JUDGED = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EVERY]
 
 
@@ -69,7 +69,9 @@ def _called(file: Any, manifest: Any, method: str, draws: Draws, number: Any) ->
 
 
 def _check(name: str, language: str, number: Any) -> None:
-    """Each value within 8 roundings, or 8 times what one rounding of the inputs changes; 1 in 100 may exceed it."""
+    """Each value within 8 roundings, or 8 times what one rounding of the inputs changes; 1 in 100 may exceed it, and 3
+    in 100 in JAX, whose exp and log are rounded otherwise."""
+    share = 3e-2 if language == "jax" else 1e-2
     made, draws = bundle(EVERY[name], language), _draws(name)
     file = _loaded(made.text)
     for method in ("eval", "pdf", "sample"):
@@ -85,7 +87,7 @@ def _check(name: str, language: str, number: Any) -> None:
             wrong = ~(np.abs(value - truth) <= allowed) & ~(np.isnan(value) & np.isnan(truth)) & (value != truth)
             if method == "pdf":  # that of a guide depends on the azimuth, which the normal itself does not have
                 wrong[np.any([np.all(v[:, :2] == 0.0, axis=1) for v in (draws.wo, draws.wi)], axis=0)] = False
-            assert wrong.mean() <= 1e-2, (method, place, wrong.mean(), np.nanmax(np.abs(value - truth)))
+            assert wrong.mean() <= share, (method, place, wrong.mean(), np.nanmax(np.abs(value - truth)))
 
 
 @pytest.mark.sample(1)

@@ -39,8 +39,8 @@ def _stored(values):
 
 
 def _texel(stored, index, like):
-    """Entries of a table, of the type of `like`."""
-    return jnp.asarray(stored, dtype=like.dtype)[index]
+    """Entries of a table, of the type of `like`, which is a number where the place is constant."""
+    return jnp.asarray(stored, dtype=getattr(like, "dtype", float))[index]
 
 
 def _integers(x):
