@@ -17,6 +17,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))  # `book`
 sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
+import gonio as go
 from gonio import ops
 from gonio.bridge import engine
 
@@ -133,3 +134,12 @@ def as_found() -> Iterator[None]:
         left = dr.thread_count()
         dr.set_thread_count(threads)
         pytest.fail(f"left Dr.Jit with {left} threads, found it with {threads}")
+
+
+@pytest.fixture
+def own_ndfs() -> Iterator[None]:
+    """Distributions that a test registers are gone after it, so that no other test meets them."""
+    before = set(go.NDF.family.all())
+    yield
+    for name in set(go.NDF.family.all()) - before:
+        go.NDF.family.remove(name)

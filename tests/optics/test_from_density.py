@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gonio as go
@@ -66,14 +66,6 @@ MADE: dict[str, Callable[[], NDF]] = {
 }
 
 
-@pytest.fixture
-def registered() -> Iterator[None]:
-    before = set(go.NDF.family.all())
-    yield
-    for name in set(go.NDF.family.all()) - before:
-        go.NDF.family.remove(name)
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.3, 0.3), (1.0, 1.0), (0.1, 0.6)], ids=str)
 @pytest.mark.parametrize("name", ["ggx", "beckmann", "student-t"])
@@ -121,7 +113,7 @@ def test_normals_follow_their_densities(name: str, alpha: tuple[float, float]) -
         assert weight.max() < 1.3 * area and np.mean(weight == 0.0) < 0.19
 
 
-def test_a_material_needs_no_more_than_d(registered: None) -> None:
+def test_a_material_needs_no_more_than_d(own_ndfs: None) -> None:
     metal = go.Conductor.preset("Au", alpha=0.4, ndf=GTR)
     wo, u = np.tile(at(55, 20), (100_000, 1)), np.random.default_rng(SEED).random((100_000, 3))
     drawn = metal.sample(wo, u, precision="float64")
@@ -147,7 +139,7 @@ def test_tables_are_found_while_a_loop_is_recorded() -> None:
     assert total.numpy()[0] == pytest.approx(2.0 * right.Lambda(v, alpha).numpy()[0], rel=1e-12)
 
 
-def test_two_widths_are_those_of_a_stretched_surface_or_the_first(registered: None) -> None:
+def test_two_widths_are_those_of_a_stretched_surface_or_the_first(own_ndfs: None) -> None:
     class Round(go.NDF):
         def D(self, m: Any, alpha: Any) -> Any:
             mean = ops.sqrt(alpha.x * alpha.y)
@@ -183,13 +175,13 @@ def _member(**formulas: Any) -> type[NDF]:
     ],
     ids=["nothing", "arguments", "pair", "power", "if", "attribute", "infinite", "azimuth"],
 )
-def test_what_is_missing_or_wrong_is_one_error(formulas: dict[str, Any], words: list[str], registered: None) -> None:
+def test_what_is_missing_or_wrong_is_one_error(formulas: dict[str, Any], words: list[str], own_ndfs: None) -> None:
     with pytest.raises(InputError) as caught:
         go.Conductor(ndf=_member(**formulas))
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-def test_a_density_that_is_not_normalized_is_told(registered: None) -> None:
+def test_a_density_that_is_not_normalized_is_told(own_ndfs: None) -> None:
     class Doubled(go.NDF):
         def D(self, m: Any, alpha: Any) -> Any:
             return 2.0 * distribution("ggx").D(m, alpha)

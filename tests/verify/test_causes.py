@@ -307,7 +307,7 @@ def test_light_that_meets_a_pigment_twice_is_no_mistake_and_a_colour_that_is_squ
     assert verify(Squared(), quick=True, law="linearity")["linearity"].failed
 
 
-def test_masking_that_is_not_that_of_the_distribution_is_told() -> None:
+def test_masking_that_is_not_that_of_the_distribution_is_told(own_ndfs: None) -> None:
     from gonio.optics.ndf.ggx import GGX
     from gonio.verify.forensics import masking
 

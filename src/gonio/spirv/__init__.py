@@ -1,6 +1,6 @@
-"""Shaders read: GLSL and HLSL to SPIR-V by glslang (`compiler`), SPIR-V to a checked module (`module`), WGSL to such a
-module (`wgsl`), and its instructions run with the vocabulary of `gonio.ops` (`machine`), on Dr.Jit values or on symbols
-of a recording.
+"""Shaders read: GLSL and HLSL to SPIR-V by glslang (`compiler`), Slang by its own (`slang`), SPIR-V to a checked module
+(`module`), WGSL to such a module (`wgsl`), and its instructions run with the vocabulary of `gonio.ops` (`machine`), on
+Dr.Jit values or on symbols of a recording.
 
     module = parse(compile_text("float sqr(float x) { return x * x; }", "sqr.glsl"))
     Machine(module).call("sqr", [x])

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError, MachineError
+from . import slang
 from .guards import Context, context, guarded, is_guarded
 from .literals import shader_in
 from .module import SOURCE
@@ -69,7 +70,7 @@ def compile_text(
     """The SPIR-V of a text.
 
     name      of the file, for messages
-    language  "glsl" or "hlsl"
+    language  "glsl", "hlsl" or "slang"
     defines   macros; a `main` of the text is renamed, and globals are assigned in one of ours
     folders   where #include may read
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
@@ -82,6 +83,8 @@ def compile_text(
         if not _DEFINE.fullmatch(macro):
             raise InputError(f"'{macro}' is no name of a macro", "defines", "NAME=VALUE")
     head = "".join(f"#define {macro} {' '.join(value.split())}\n" for macro, value in macros.items())
+    if language == "slang":
+        return _run(head + slang.program(expanded, _uses(expanded), name), name, language, sources)
     if language == "glsl":
         old = "".join(f"#define {a} {b}\n" for a, b in _OLD.items() if re.search(rf"\b{a}\b", expanded))
         entry = "\n#undef main\nvoid main() {}\n"
@@ -94,13 +97,18 @@ def compile_text(
 
 
 _DEFINITION = re.compile(r"^[ \t]*(?:static[ \t]+)?(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
-_STRUCT = re.compile(r"^[ \t]*(?:struct|class)\s+\w+[^;{}()]*\{", re.MULTILINE)
+_STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension)\s+\w+[^;{}()]*\{", re.MULTILINE)
 _BRACE = re.compile(r"[{}]")
 _KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
 
 
 def _calls(text: str) -> str:
     """Calls of every function of an HLSL text, since glslang drops those that nothing calls."""
+    return " ".join(f"{{ {arguments} {call}; }}" for _, arguments, call in _uses(text))
+
+
+def _uses(text: str) -> list[tuple[str, str, str]]:
+    """(type of the result, declarations of arguments, call) of every function of an HLSL or Slang text."""
     calls = []
     plain = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
     for kind, name, arguments in _DEFINITION.findall(_without_members(plain)):
@@ -113,8 +121,8 @@ def _calls(text: str) -> str:
             f"{one} a{place}{''.join(array)};" if any(array) else f"{one} a{place} = ({one})0;"
             for place, (one, array) in enumerate(zip(types, arrays, strict=True))
         )
-        calls.append(f"{{ {variables} {name}({', '.join(f'a{place}' for place in range(len(types)))}); }}")
-    return " ".join(calls)
+        calls.append((kind, variables, f"{name}({', '.join(f'a{place}' for place in range(len(types)))})"))
+    return calls
 
 
 def _without_members(text: str) -> str:
@@ -239,11 +247,12 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
         target = "-G" if language == "glsl" else "-V"  # HLSL has no form for OpenGL
         options = [target, "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
         options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
+        command = slang.command(source, output) if language == "slang" else [compiler(), *options, str(source)]
         try:
             done = subprocess.run(
-                _limited([compiler(), *options, str(source)]),
+                _limited(command),
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                timeout=2 * SECONDS, cwd=folder, env=_environment(compiler()),
+                timeout=2 * SECONDS, cwd=folder, env=_environment(command[0]),
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             raise InputError(f"the compiler took over {2 * SECONDS} s", name, "shorten the shader") from None
@@ -254,14 +263,13 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
 
 def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sources: _Sources) -> InputError:
     """The compiler's first message, with the user's file and line."""
-    messages = []
-    for line in done.stdout.decode("utf-8", "replace").splitlines():
+    printed = done.stdout.decode("utf-8", "replace")
+    messages = [(_place(sources, name, number, line), text) for number, line, text in slang.messages(printed)]
+    for line in printed.splitlines():
         match = re.match(r"(?:ERROR|error): (?:([^:\n]*):(\d+): )?(.*)", line)
         if match is None or "compilation errors" in line or not match[3]:
             continue
-        number = int(match[1]) if match[1] and match[1].isdecimal() else 0
-        file = sources.names[number] if number < len(sources.names) else name
-        messages.append((f"{file}:{match[2]}" if match[2] else file, match[3].strip()))
+        messages.append((_place(sources, name, match[1] or "", match[2] or ""), match[3].strip()))
     if not messages:
         what = f"the compiler ended with code {done.returncode}" if done.returncode > 0 else "the compiler crashed"
         return InputError(f"{what}, without a message", name, "a limit of time or memory: shorten the shader")
@@ -270,3 +278,10 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
         return InputError(_MISSING % sources.missing[int(missing[1])], where, _FOLDER)
     more = f" (and {len(messages) - 1} more)" if len(messages) > 1 else ""
     return InputError(f"{what}{more}", where, "correct the line")
+
+
+def _place(sources: _Sources, name: str, number: str, line: str) -> str:
+    """The user's file and line, from the compiler's number of a file."""
+    place = int(number) if number.isdecimal() else 0
+    file = sources.names[place] if place < len(sources.names) else name
+    return f"{file}:{line}" if line else file

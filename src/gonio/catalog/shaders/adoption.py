@@ -25,7 +25,7 @@ def adopt(file: str | Path) -> Adopted:
     """The adapter of a shader without one. Raises InputError for files that cannot be read."""
     path = Path(os.path.expanduser(file))
     if not names_shader(str(path)) or not path.is_file():
-        raise InputError(f"'{file}' is no shader", "FILE", "a .glsl, .frag, .hlsl, .wgsl, .spv or .brdf")
+        raise InputError(f"'{file}' is no shader", "FILE", "a .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf")
     program = read(path, None)
     adapter = program.adapter
     lines = [

@@ -29,7 +29,7 @@ from .adapter import Adapter
 from .material import _SampledShaderFile, _ShaderFile
 from .program import Declared, Program
 
-_LANGUAGES = {".hlsl": "hlsl", ".wgsl": "wgsl"}  # others are GLSL
+_LANGUAGES = {".hlsl": "hlsl", ".slang": "slang", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
 MAX_TABLE = 1 << 28
 MAX_CLASSES = 64  # in memory

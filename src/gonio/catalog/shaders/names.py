@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-SUFFIXES = (".glsl", ".frag", ".hlsl", ".wgsl", ".spv", ".brdf")
+SUFFIXES = (".glsl", ".frag", ".hlsl", ".slang", ".wgsl", ".spv", ".brdf")
 
 
 def names_shader(text: str) -> bool:

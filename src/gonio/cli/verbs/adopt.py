@@ -19,7 +19,7 @@ def adopt(
         Path,
         Argument(
             metavar="FILE",
-            help="A shader: .glsl, .frag, .hlsl, .wgsl, .spv or .brdf; or the folder of an engine.",
+            help="A shader: .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf; or the folder of an engine.",
         ),
     ],
     *,
