@@ -71,6 +71,24 @@ def test_emitted_slang_is_read_back(tmp_path: Path) -> None:
 
 
 @needs_slang
+def test_functions_of_every_form_leave_the_brdf_readable(tmp_path: Path) -> None:
+    """Modifiers, attributes, default values, arrays, structs, namespaces and old generics, which nothing calls."""
+    others = """
+    struct Pair { float3 a; float b; };
+    Pair both(Pair given, float scale = 2.0) { given.b *= scale; return given; }
+    void fill(out float values[3], inout Pair pair) { values[0] = 1; values[1] = 2; values[2] = 3; pair.b = 1; }
+    namespace other { float half_of(float x) { return 0.5 * x; } }
+    __generic<T : __BuiltinFloatingPointType>
+    T twice(T x) { return x + x; }
+    [ForceInline] float one() { return 1; }
+    """
+    file = written(
+        tmp_path, others + TEXT.replace("void twice(", "void doubled(").replace("float3 brdf", "public float3 brdf")
+    )
+    assert np.isfinite(go.Shader(file).eval([0.0, 0.0, 1.0], [0.6, 0.0, 0.8])).all()
+
+
+@needs_slang
 def test_a_mistake_is_told_with_file_and_line(tmp_path: Path) -> None:
     file = written(tmp_path, TEXT.replace("roughness * roughness", "roughnes * roughness"))
     with pytest.raises(InputError, match="undefined identifier 'roughnes'") as refused:

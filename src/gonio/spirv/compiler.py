@@ -96,8 +96,10 @@ def compile_text(
     return _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
 
 
-_DEFINITION = re.compile(r"^[ \t]*(?:static[ \t]+)?(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
-_STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension)\s+\w+[^;{}()]*\{", re.MULTILINE)
+_MODIFIERS = r"^[ \t]*(?:(?:static|inline|precise|public|internal|private|export|\[\w+\])\s+)*"
+_DEFINITION = re.compile(_MODIFIERS + r"(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
+_GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # of Slang: its type is known only where it is called
+_STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension|namespace)\s+\w+[^;{}()]*\{", re.MULTILINE)
 _BRACE = re.compile(r"[{}]")
 _KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
 
@@ -111,8 +113,8 @@ def _uses(text: str) -> list[tuple[str, str, str]]:
     """(type of the result, declarations of arguments, call) of every function of an HLSL or Slang text."""
     calls = []
     plain = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
-    for kind, name, arguments in _DEFINITION.findall(_without_members(plain)):
-        declared = [part.partition(":")[0].split() for part in arguments.split(",") if part.strip()]
+    for kind, name, arguments in _DEFINITION.findall(_without_members(_GENERIC.sub(" ", plain))):
+        declared = [re.split("[:=]", part)[0].split() for part in arguments.split(",") if part.strip()]
         types = [words[-2] for words in declared if len(words) > 1]
         arrays = [words[-1].partition("[")[1:] for words in declared if len(words) > 1]
         if kind in _KEYWORDS or name in _KEYWORDS or any(re.match("Texture|Sampler", one) for one in types):

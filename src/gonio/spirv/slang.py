@@ -47,7 +47,7 @@ def program(text: str, calls: list[tuple[str, str, str]], name: str) -> str:
     shared, body = [], []
     for place, (kind, arguments, call) in enumerate(calls):
         if kind == "void":
-            outputs = re.findall(r"(\w+) (a\d+)", arguments)
+            outputs = re.findall(r"(\w+) (a\d+) =", arguments)  # no arrays
             shared += [f"groupshared {one} gonio_{place}_{argument};" for one, argument in outputs]
             stores = " ".join(f"gonio_{place}_{argument} = {argument};" for _, argument in outputs)
             body.append(f"{{ {arguments} {call}; {stores} }}")
