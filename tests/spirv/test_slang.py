@@ -81,11 +81,23 @@ def test_functions_of_every_form_leave_the_brdf_readable(tmp_path: Path) -> None
     __generic<T : __BuiltinFloatingPointType>
     T twice(T x) { return x + x; }
     [ForceInline] float one() { return 1; }
+    func three(x : float, y : float = 1.0) -> float { return x + 2 * y; }
+    func nothing() { }
     """
     file = written(
         tmp_path, others + TEXT.replace("void twice(", "void doubled(").replace("float3 brdf", "public float3 brdf")
     )
     assert np.isfinite(go.Shader(file).eval([0.0, 0.0, 1.0], [0.6, 0.0, 0.8])).all()
+
+
+@needs_slang
+def test_func_is_read(tmp_path: Path) -> None:
+    (file := tmp_path / "flat.slang").write_text(
+        "uniform float rough;\nfunc half_of(x : float) -> float { return 0.5 * x; }\n"
+        "public func brdf(L : float3, V : float3, N : float3) -> float3 { return float3(half_of(rough), 0.1, 0.2); }\n"
+    )
+    value = go.Shader(file, rough=0.6).eval([0.0, 0.0, 1.0], [0.6, 0.0, 0.8], precision="float64")
+    np.testing.assert_allclose(value, [[0.24, 0.08, 0.16]], rtol=1e-6)
 
 
 @needs_slang

@@ -98,6 +98,7 @@ def compile_text(
 
 _MODIFIERS = r"^[ \t]*(?:(?:static|inline|precise|public|internal|private|export|\[\w+\])\s+)*"
 _DEFINITION = re.compile(_MODIFIERS + r"(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
+_FUNC = re.compile(r"\bfunc\s+(\w+)\s*\(([^(){};]*)\)\s*(?:->\s*(\w+)\s*)?\{")  # Slang: func f(x : float) -> float
 _GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # of Slang: its type is known only where it is called
 _STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension|namespace)\s+\w+[^;{}()]*\{", re.MULTILINE)
 _BRACE = re.compile(r"[{}]")
@@ -112,7 +113,7 @@ def _calls(text: str) -> str:
 def _uses(text: str) -> list[tuple[str, str, str]]:
     """(type of the result, declarations of arguments, call) of every function of an HLSL or Slang text."""
     calls = []
-    plain = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
+    plain = _FUNC.sub(_c_style, re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL))
     for kind, name, arguments in _DEFINITION.findall(_without_members(_GENERIC.sub(" ", plain))):
         declared = [re.split("[:=]", part)[0].split() for part in arguments.split(",") if part.strip()]
         types = [words[-2] for words in declared if len(words) > 1]
@@ -125,6 +126,13 @@ def _uses(text: str) -> list[tuple[str, str, str]]:
         )
         calls.append((kind, variables, f"{name}({', '.join(f'a{place}' for place in range(len(types)))})"))
     return calls
+
+
+def _c_style(match: re.Match[str]) -> str:
+    """The head of a `func` as C writes it."""
+    parts = [re.split("[:=]", part) for part in match[2].split(",") if part.strip()]
+    arguments = ", ".join(f"{part[1].strip()} {part[0].strip()}" for part in parts if len(part) > 1)
+    return f"{match[3] or 'void'} {match[1]}({arguments}) {{"
 
 
 def _without_members(text: str) -> str:
