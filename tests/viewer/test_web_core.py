@@ -125,7 +125,7 @@ def test_preset_shows_its_linear_reflectance(page: Page) -> None:
     eta, k = np.array(gold.eta), np.array(gold.k)
     f0 = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)  # course sheet, eq. 11 and 12
     shown = page.control("Preset").locator(".hint").text_content()
-    assert shown == "F0 " + " ".join(f"{v:.2f}" for v in f0)
+    assert shown == "F0 " + " ".join(f"{100.0 * v:.0f}" for v in f0) + " %"
 
 
 @pytest.mark.slow

@@ -206,7 +206,7 @@ export class ChoiceControl extends Base<string> {
     this.numbers.hidden = !shade;
     if (shade) {
       this.patch.style.background = hexOf(shade);
-      this.numbers.textContent = `F0 ${shade.map((v) => v.toFixed(2)).join(" ")}`;
+      this.numbers.textContent = `F0 ${shade.map((v) => (100 * v).toFixed(0)).join(" ")} %`;
       this.numbers.title = `Reflectance at normal incidence, linear RGB: ${shade.map((v) => short(v)).join(", ")}`;
     }
     return this;
