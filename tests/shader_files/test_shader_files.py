@@ -350,3 +350,16 @@ def test_energy_of_values_that_are_not_finite_has_the_grade_of_nan(tmp_path: Pat
     verdict = energy_of(written(tmp_path, "root.glsl", "vec3 brdf(vec3 L, vec3 V) { return vec3(sqrt(L.z - 0.2)); }"))
     assert verdict.status == "fail" and verdict.grade is Grade.NAN
     assert verdict.bias is not None and 0.1 < verdict.bias.average < 0.4
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_powers_of_emitted_text_hold_in_both_precisions(tmp_path: Path, precision: str) -> None:
+    """`power` of emitted text reads the exponent of a number from its bits; 32 bits had lost the mantissa."""
+    phong = go.model("blinn-phong")(ks=0.5, p=20.0)
+    (file := tmp_path / "phong.glsl").write_text(go.emit(phong, "glsl", functions=["eval"]))
+    read = go.Shader(file, kd=0.5, ks=0.5, p=20.0)
+    w = np.random.default_rng(3).normal(size=(2, 200, 3))
+    w[..., 2] = np.abs(w[..., 2])
+    wo, wi = w / np.linalg.norm(w, axis=-1, keepdims=True)
+    values = [one.eval(wo, wi, precision=precision) for one in (read, phong)]
+    np.testing.assert_allclose(*values, rtol=2e-5, atol=1e-7)

@@ -29,7 +29,8 @@ Inputs = Mapping[str, Mapping[str, Value]]
 
 
 class Replayed:
-    """A function of named scalars and tuples of scalars, recorded for each choice of those that are plain numbers.
+    """A function of named scalars and tuples of scalars, recorded for each choice of those that are plain numbers, and
+    apart for 32 and 64 bits, in which a power of two is taken from its exponent otherwise.
 
     function  of mappings from names to values, as `Program.run`
     """
@@ -43,14 +44,15 @@ class Replayed:
         scalars = list(_scalars(inputs))
         if any(isinstance(scalar, graph.Node) for _, scalar in scalars):
             return self.function(**inputs)
-        key = tuple((name, type(one), one) if static(one) else (name,) for name, one in scalars)
+        single = any(ops.is_single(one) for _, one in scalars)
+        key = (single, *((name, type(one), one) if static(one) else (name,) for name, one in scalars))
         if key not in self._recorded:
-            self._recorded[key] = self._record(inputs)
+            self._recorded[key] = self._record(inputs, single)
             while len(self._recorded) > MAX_RECORDED:
                 self._recorded.pop(next(iter(self._recorded)))
         return _run(self._recorded[key], [scalar for _, scalar in scalars if not static(scalar)])
 
-    def _record(self, inputs: Inputs) -> graph.Function:
+    def _record(self, inputs: Inputs, single: bool) -> graph.Function:
         def formula(symbols: Mapping[str, Value]) -> Value:
             given = {
                 group: {name: _filled(value, f"{group}.{name}", symbols) for name, value in values.items()}
@@ -59,7 +61,7 @@ class Replayed:
             return self.function(**given)
 
         symbols = {name: graph.symbol("float") for name, scalar in _scalars(inputs) if not static(scalar)}
-        return ops.record(formula, name="shader", into=graph.Graph(), symbols=symbols).entry
+        return ops.record(formula, name="shader", into=graph.Graph(single=single), symbols=symbols).entry
 
 
 def _scalars(inputs: Inputs) -> Iterator[tuple[str, Value]]:
