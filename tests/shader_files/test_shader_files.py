@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gonio.catalog import notation, operands, shaders
 from gonio.errors import InputError
+from gonio.fitting.parameters import free_of
 from gonio.scene.materials import described
 from gonio.spirv.compiler import compiler
 from gonio.spirv.replay import Replayed
@@ -279,7 +280,7 @@ vec3 brdf(vec3 L, vec3 V) { return (doubled ? scale : 1.0) * share * tint; }
     file = written(tmp_path, "initial.glsl", text)
     up = np.array([[0.0, 0.0, 1.0]])
     np.testing.assert_allclose(go.Shader(file).eval(up, up), [[0.5, 0.25, 0.0]], rtol=1e-6)
-    np.testing.assert_allclose(go.Shader(file, share=0.5, doubled=False).eval(up, up), [[0.5, 0.25, 0.0]], rtol=1e-6)
+    np.testing.assert_allclose(go.Shader(file, share=0.4, doubled=False).eval(up, up), [[0.4, 0.2, 0.0]], rtol=1e-6)
 
 
 def energy_of(file: str) -> Verdict:
@@ -363,3 +364,13 @@ def test_powers_of_emitted_text_hold_in_both_precisions(tmp_path: Path, precisio
     wo, wi = w / np.linalg.norm(w, axis=-1, keepdims=True)
     values = [one.eval(wo, wi, precision=precision) for one in (read, phong)]
     np.testing.assert_allclose(*values, rtol=2e-5, atol=1e-7)
+
+
+def test_a_fit_frees_a_uniform_that_is_1(tmp_path: Path) -> None:
+    """A uniform of 1 may be anything; of Gonio's own metals it is a factor on another color, which fits hold."""
+    (file := tmp_path / "gloss.glsl").write_text(
+        "uniform float gloss;\nvec3 brdf(vec3 L, vec3 V, vec3 N) { return vec3(0.1 + 0.2 * gloss * dot(N, L)); }\n"
+    )
+    Path(f"{file}.toml").write_text("[parameters.gloss]\ndefault = 1.0\nlow = 0.0\nhigh = 1.0\n")
+    assert [one.path for one in free_of(go.Shader(file), {})] == ["gloss"]
+    assert "albedo" not in [one.path for one in free_of(go.Conductor(), {})]
