@@ -19,6 +19,7 @@ from pathlib import Path
 
 from ..errors import InputError, MachineError
 from . import slang
+from .excerpts import functions_in
 from .guards import Context, context, guarded, is_guarded
 from .literals import shader_in
 from .module import SOURCE
@@ -66,6 +67,7 @@ def compile_text(
     language: str = "glsl",
     defines: Mapping[str, str] | None = None,
     folders: Sequence[Path] = (),
+    read: list[Path] | None = None,
 ) -> bytes:
     """The SPIR-V of a text.
 
@@ -73,10 +75,15 @@ def compile_text(
     language  "glsl", "hlsl" or "slang"
     defines   macros; a `main` of the text is renamed, and globals are assigned in one of ours
     folders   where #include may read
+    read      gets the files that are included
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
     """
     sources = _Sources(name, folders, defines or {})
-    expanded = sources.expanded(text, name, 0)
+    try:
+        expanded = sources.expanded(text, name, 0)
+    finally:
+        if read is not None:
+            read += map(Path, sources.names[1:])
     expanded = _VERSION.sub("", expanded)
     macros = {**({"main": "gonio_main"} if language == "glsl" else {}), **(defines or {})}
     for macro in macros:
@@ -177,6 +184,8 @@ class _Sources:
             content, start = path.read_text(encoding="utf-8", errors="replace"), 1
             if path.suffix == ".js":
                 _, content, start, _ = shader_in(content, literal, path.name)
+            elif literal:
+                content, start = functions_in(content, literal, str(path))
             if is_guarded(content) and not literal:
                 self.once.setdefault(path, []).append(under)
             content = self._varied(content, match[2], f"{name}:{line}")
@@ -208,7 +217,7 @@ class _Sources:
         names = match[1].split(",") if (match := _RENAMED.fullmatch(rest)) else []
         if not names or len(names) % 2:
             what = f"'{rest[:64]}' after an include"
-            raise InputError(what, where, "a file, or FILE.js#NAME; then [0..3] or (OLD,NEW)")
+            raise InputError(what, where, "a file, FILE.js#NAME or FILE.glsl#FUNCTION; then [0..3] or (OLD,NEW)")
         for old, new in zip(names[::2], names[1::2], strict=True):
             content = self._replaced(content, old, new, where)
         return content

@@ -17,7 +17,7 @@ from typing import NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 
-from ..catalog import operands, outside
+from ..catalog import operands, outside, shaders
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, Parameter, model, tree
 from ..ops import backend
@@ -247,9 +247,10 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
     parameters  "name=value" each, for every model that has it; InputError if none has
     """
     files = [file for target in (*targets, *parameters) for file in outside.files_in(target)]
-    if not files:
+    texts = [file for target in targets if (file := shaders.file_in(target)) is not None]
+    if not files and not texts:
         return _of_targets(targets, parameters)
-    code = Code(files, partial(_of_targets, targets, parameters))
+    code = Code(files, partial(_of_targets, targets, parameters), texts)
     return replace(code.run(), code=code)
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Generic, TypeVar
 
-from ..catalog import outside
+from ..catalog import outside, shaders
 from ..errors import GonioError
 
 POLL_SECONDS = 0.03
@@ -35,13 +35,16 @@ class Code(Generic[Made]):
     """Python files that the user named, those that they import from their own folders, and the object made from them.
 
     make   loads the files
+    texts  shaders that the user named: watched with what they include, but their folders are no place to import from
     files  all of these files, as of the last run
     """
 
-    def __init__(self, named: Iterable[Path], make: Callable[[], Made]):
+    def __init__(self, named: Iterable[Path], make: Callable[[], Made], texts: Iterable[Path] = ()):
         self._make = make
-        self._named = frozenset(path.resolve() for path in named)
-        self._folders = {path.parent for path in self._named}
+        python = frozenset(path.resolve() for path in named)
+        self._folders = {path.parent for path in python}
+        self._texts = frozenset(path.absolute() for path in texts)
+        self._named = python | self._texts
         self._modules: list[str] = []
         self.files = self._named
         self.stamps: dict[Path, Stamp] = {}
@@ -89,7 +92,8 @@ class Code(Generic[Made]):
         places = {name: Path(file).resolve() for name, file in files.items() if file}
         own = {name: place for name, place in places.items() if self._is_own(place)}
         self._modules = list(own)
-        self.files = self._named | set(own.values()) | more
+        texts = {file for text in self._texts for file in shaders.files_read(text)}
+        self.files = self._named | set(own.values()) | texts | more
         self.stamps = {path: self.stamps[path] if path in self.stamps else _stamp(path) for path in self.files}
 
     def _is_own(self, place: Path) -> bool:
@@ -111,6 +115,8 @@ class Code(Generic[Made]):
             named = next((path for path in self.files if str(path) in error.where), None)
             if named and not line:
                 place = error.where.replace(str(named), named.name)
+            elif any(error.where.startswith(path.name) for path in self.files):
+                place = error.where
             elif not named and error.where:
                 place = f"{place}: {error.where}"
             return GonioError(error.what, place, error.hint)

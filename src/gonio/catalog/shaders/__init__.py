@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .names import SUFFIXES as SUFFIXES
+from .names import file_in as file_in
 from .names import names_shader as names_shader
 
 if TYPE_CHECKING:
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
     from .engines import package_in as package_in
     from .files import Shader as Shader
     from .files import class_of as class_of
+    from .files import files_read as files_read
 else:
     _HOMES = {
-        **dict.fromkeys(("Shader", "class_of"), ".files"),
+        **dict.fromkeys(("Shader", "class_of", "files_read"), ".files"),
         **dict.fromkeys(("Package", "adopt_package", "package_in"), ".engines"),
         "adopt": ".adoption",
     }

@@ -1,4 +1,4 @@
-"""Shader files as material classes, made once per saved version.
+"""Shader files as material classes, made once per saved version of the shader and of all that it includes.
 
 cls = class_of("my.glsl")      # a class with the shader's parameters
 Shader("my.glsl", roughness=0.3)
@@ -55,7 +55,14 @@ def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:
     return material
 
 
-_classes: dict[tuple[str, str, str], tuple[object, type[BSDF]]] = {}
+_Stamp = tuple[tuple[str, int, int], ...]
+_classes: dict[tuple[str, str, str], tuple[_Stamp, type[BSDF]]] = {}
+
+
+def files_read(shader: Path) -> frozenset[Path]:
+    """What a shader was last made from: it, its adapter, includes and textures. Empty if it was never made."""
+    stamps = [stamp for (path, _, _), (stamp, _) in _classes.items() if Path(path) == shader.absolute()]
+    return frozenset(Path(name) for stamp in stamps for name, _, _ in stamp)
 
 
 def class_of(text: str, inside: Path | None = None, function: str = "") -> type[BSDF]:
@@ -65,20 +72,34 @@ def class_of(text: str, inside: Path | None = None, function: str = "") -> type[
     function  the BRDF, in place of the one that the adapter names or that is guessed
     """
     path = Path(os.path.expanduser(text.strip())).absolute()
-    adapter_file = next((one for one in (Path(f"{path}.toml"), path.with_suffix(".toml")) if one.is_file()), None)
+    adapters_ = Path(f"{path}.toml"), path.with_suffix(".toml")
+    adapter_file = next((one for one in adapters_ if one.is_file()), None)
+    own = [path, *(one for one in adapters_ if one == adapter_file)]
     try:
-        stamp = tuple((one.stat().st_mtime_ns, one.stat().st_size) for one in (path, adapter_file) if one is not None)
+        first = _stamp(own)
     except (OSError, ValueError) as error:
         raise InputError(f"no file '{text}'", text, str(getattr(error, "strerror", "") or "")) from None
     key = str(path), str(inside), function
     known = _classes.pop(key, None)
-    if known is None or known[0] != stamp:
+    if known is None or known[0][: len(first)] != first or not _is_current(known[0]):
         program = read(path, adapter_file, inside, function)
-        known = stamp, _made(path, program, inside)
+        known = first + _stamp([one for one in program.files if one not in own]), _made(path, program, inside)
     _classes[key] = known
     while len(_classes) > MAX_CLASSES:
         _classes.pop(next(iter(_classes)))
     return known[1]
+
+
+def _stamp(files: list[Path]) -> _Stamp:
+    abouts = [(one, one.stat()) for one in files]
+    return tuple((str(one), about.st_mtime_ns, about.st_size) for one, about in abouts)
+
+
+def _is_current(stamp: _Stamp) -> bool:
+    try:
+        return _stamp([Path(name) for name, _, _ in stamp]) == stamp
+    except OSError:
+        return False
 
 
 def read(path: Path, adapter_file: Path | None, inside: Path | None = None, function: str = "") -> Program:
@@ -91,7 +112,7 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None, func
     if adapter_file is not None:
         _confined(adapter_file, inside)
     adapter = adapters.read(adapter_file) if adapter_file is not None else Adapter()
-    data = path.read_bytes()
+    data, files = path.read_bytes(), list[Path]()
     if path.suffix.lower() == ".spv":
         module = parse(data, where)
     else:
@@ -101,18 +122,25 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None, func
             adapter = described if adapter_file is None else adapter
         language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
-        module = _compiled(text, where, language, adapter.defines, [path.parent, *folders])
+        module = _compiled(text, where, language, adapter.defines, [path.parent, *folders], files)
     if function and function != adapter.function:  # what the adapter says of another function does not hold
         adapter = replace(adapter, function=function, arguments=(), cosine=None, pdf="", sample="")
     textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
-    return Program(module, adapter, textures, where)
+    files += [path.parent / about["file"] for about in adapter.textures.values()]
+    return Program(module, adapter, textures, where, tuple(dict.fromkeys(files)))
 
 
-def _compiled(text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path]) -> Module:
-    """The module of a text; `folders` begin with the shader's own, in which #include of GLSL and HLSL does not look."""
+def _compiled(
+    text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path], files: list[Path]
+) -> Module:
+    """The module of a text; `folders` begin with the shader's own, in which #include of GLSL and HLSL does not look.
+
+    files  gets the files that it includes
+    """
     if language == "wgsl":
-        return translated(text, where, defines, folders)
-    return parse(compile_text(text, where, language=language, defines=defines, folders=folders[1:]), where)
+        return translated(text, where, defines, folders, files)
+    binary = compile_text(text, where, language=language, defines=defines, folders=folders[1:], read=files)
+    return parse(binary, where)
 
 
 def _confined(path: Path, inside: Path | None) -> Path:

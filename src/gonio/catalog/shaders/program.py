@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...errors import InputError
@@ -29,8 +30,16 @@ class Declared(NamedTuple):
 class Program:
     """A module with the meaning of its functions. Raises InputError if the meaning does not fit the functions."""
 
-    def __init__(self, module: Module, adapter: Adapter, textures: dict[str, Texture], where: str) -> None:
+    def __init__(
+        self,
+        module: Module,
+        adapter: Adapter,
+        textures: dict[str, Texture],
+        where: str,
+        files: tuple[Path, ...] = (),
+    ) -> None:
         self.module, self.textures, self.where = module, textures, where
+        self.files = files  # that the shader includes or reads as textures
         self._replayed: dict[str, Replayed] = {}
         self.adapter = _completed(module, adapter, where)
         self.eval = _one(module, self.adapter.function, where)

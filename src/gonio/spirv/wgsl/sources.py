@@ -39,6 +39,7 @@ class Sources:
         self._size, self._units = 0, 0
         self._known: dict[str, Unit | None] = {}
         self._files: dict[str, Path] | None = None
+        self.read: list[Path] = []
         self.main = self._unit(text, where)
         if self.main.path:
             self._known[self.main.path] = self.main
@@ -112,4 +113,5 @@ class Sources:
     def _small(self, file: Path) -> Path:
         if file.stat().st_size > MAX_TEXT:
             raise refuse(f"'{file.name}' has over {MAX_TEXT >> 20} MB", "import less", self.main.where)
+        self.read.append(file)
         return file

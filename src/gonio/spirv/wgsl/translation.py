@@ -29,16 +29,23 @@ MAX_INSIDE = 32  # declarations that need one another
 _SPACES = {"uniform": 2, "storage": 12, "push_constant": 9, "immediate": 9, "private": 6, "": 0}
 
 
-def translated(text: str, where: str, defines: Mapping[str, str], folders: Sequence[Path]) -> Module:
+def translated(
+    text: str, where: str, defines: Mapping[str, str], folders: Sequence[Path], read: list[Path] | None = None
+) -> Module:
     """The module of a WGSL text.
 
     where    name of the file, for messages
     defines  of #ifdef, and values of `override`
     folders  where #import may read
+    read     gets the files that are imported
     Raises InputError, with file and line.
     """
     try:
-        return _Translation(Sources(text, where, defines, folders)).module()
+        sources = Sources(text, where, defines, folders)
+        module = _Translation(sources).module()
+        if read is not None:
+            read += sources.read
+        return module
     except RecursionError:
         raise refuse("expressions too deep within one another", "name the parts by let", where) from None
 

@@ -4,7 +4,8 @@
 
 A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
 of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`). An engine that is not
-on npm is recognized by a file of its repository (`MARK`).
+on npm is recognized by a file of its repository (`MARK`). `replaced` states words of the adapters that depend on the
+release, such as which arguments a function takes.
 """
 
 from __future__ import annotations
@@ -29,13 +30,15 @@ MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
 class Engine(NamedTuple):
     """An engine: the name of its package on npm, our programs, and its tables by file name.
 
-    mark  of an engine that is not on npm: a file of its repository, by which a checkout is recognized
+    mark      of an engine that is not on npm: a file of its repository, by which a checkout is recognized
+    replaced  words of the adapters that depend on what the package holds
     """
 
     package: str
     folder: Path
     tables: Callable[[Path], dict[str, np.ndarray]]
     mark: str
+    replaced: Callable[[Path], dict[str, str]]
 
 
 class Package(NamedTuple):
@@ -53,7 +56,14 @@ def engines() -> dict[str, Engine]:
     """All engines by the names of their packages."""
     modules = [importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__)]
     return {
-        one.PACKAGE: Engine(one.PACKAGE, Path(one.__path__[0]), one.tables, getattr(one, "MARK", "")) for one in modules
+        one.PACKAGE: Engine(
+            one.PACKAGE,
+            Path(one.__path__[0]),
+            one.tables,
+            getattr(one, "MARK", ""),
+            getattr(one, "replaced", lambda package: {}),
+        )
+        for one in modules
     }
 
 
@@ -90,13 +100,15 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
     package = package_in(folder)
     engine = engines()[package.name]
     place = Path(target)
+    words = engine.replaced(package.folder)
     tables = engine.tables(package.folder)
     there = os.path.relpath(package.folder.resolve(), place.resolve()).replace(os.sep, "/")
     place.mkdir(parents=True, exist_ok=True)
     for source in _programs(engine.folder):
         text = source.read_text(encoding="utf-8")
         if source.suffix == ".toml":
-            text = text.replace('"package/', f'"{there}/')
+            for old, new in {'"package/': f'"{there}/', **words}.items():
+                text = text.replace(old, new)
         files.write_whole(place / source.name, text.encode())
     for name, table in tables.items():
         data = io.BytesIO()
