@@ -192,11 +192,13 @@ def judged(
     seed: int,
     begin: Begin = lambda what: None,
     skip: Mapping[str, str] = MappingProxyType({}),
+    result: Callable[[str, str], None] = lambda law, text: None,
 ) -> Judged:
     """The findings of the laws on a subject.
 
     begin  called with the name of the next law, or of another step
     skip   steps to skip, and why: the BSDF ended the process there, or did not return
+    result called with a law's name and its preliminary result: its size and cause come with the verdict
     """
     begin(PLACES)
     others = [] if PLACES in skip else _places(one, effort, seed)
@@ -207,6 +209,7 @@ def judged(
             continue
         begin(law.name)
         results.append((law, _everywhere(law, one, others, effort, seed)))
+        result(law.name, _preliminary(results[-1][1], law.name in one.breaches))
     begin(QUALITY)
     return Judged(one, others, results, None if QUALITY in skip else quality.of(one, seed))
 
@@ -217,6 +220,22 @@ class Asked(NamedTuple):
     place: Place
     what: Finding | Verdict
     seconds: float
+
+
+def _preliminary(all_: list[Asked], declared: bool) -> str:
+    """A law's result at all places, without the threshold of its statistical tests, which depends on all laws.
+
+    declared  whether a violation of it is declared, whose size the verdict compares
+    """
+    verdicts = [asked.what for asked in all_ if isinstance(asked.what, Verdict)]
+    findings = [asked.what for asked in all_ if isinstance(asked.what, Finding)]
+    if any(one.failed for one in verdicts) or any(one.problems or not one.figure <= one.tolerance for one in findings):
+        return "does not hold, which is declared" if declared else "does not hold"
+    if not findings:
+        return "does not apply" if all(one.status == NOT_APPLICABLE for one in verdicts) else "not tried"
+    tests = sum(len(one.trials) for one in findings)
+    places = f"{len(findings)} {'setting' if len(findings) == 1 else 'settings'}"
+    return f"{tests} tests at {places} to be decided" if tests else f"holds at {places}"
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..catalog import outside
+from ..catalog import outside, shaders
 from ..work import executor, facts, parts
 from ..work.kept import Arrays
 from .isolation import child
@@ -85,6 +85,9 @@ def _files(item: Item) -> list[Path]:
     if not isinstance(item.target, str):
         return []
     paths = [path for text in (item.target, *item.settings) for path in outside.files_in(text)]
+    if (shader := shaders.file_in(item.target)) is not None and shader.is_file():
+        shaders.class_of(str(shader))
+        return sorted({*paths, *shaders.files_read(shader)})
     return [path for path in [*paths, Path(item.target)] if path.suffix in (".py", ".xml", ".json") and path.is_file()]
 
 

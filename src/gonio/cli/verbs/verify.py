@@ -112,7 +112,7 @@ def verify(
     known = outputs.check()
     items = [child.Item(one, tuple(made.settings()), how.vary) for one in target]
     task = child.Task(items, effort, 1 if how.seed is None else how.seed, how.law)
-    report = _judge(task, ", ".join(target), how, executor)
+    report = _judge(task, ", ".join(target), how, executor, quiet=as_json)
     outputs.write(report, known)
     _annotate(report, to.github, as_json)
     if as_json:
@@ -125,15 +125,16 @@ def verify(
         raise Exit(report.exit_code)
 
 
-def _judge(task: Task, title: str, how: Effort, executor: Executor) -> Report:
-    """The report of a task, by the processes of `executor`, with a progress bar."""
+def _judge(task: Task, title: str, how: Effort, executor: Executor, *, quiet: bool) -> Report:
+    """The report of a task, by the processes of `executor`, with a progress bar and, unless `quiet`, early results."""
     from ...verify.isolation import child
 
-    with _progress(title) as progress:
+    with _progress(title) as (progress, tell):
         # one target has nothing to resume, nor has a quick look: its cards are shared by processes without a cluster
         if executor.cluster is None and (len(task.items) == 1 or task.effort == "quick"):
             workers = 1 if executor.workers is None else executor.workers
-            return child.trial(task, jobs=workers, limit=how.timeout, memory=how.memory, progress=progress)
+            shown = None if quiet else tell
+            return child.trial(task, jobs=workers, limit=how.timeout, memory=how.memory, progress=progress, tell=shown)
         from ...verify import trials
 
         with executor.running():
@@ -141,8 +142,8 @@ def _judge(task: Task, title: str, how: Effort, executor: Executor) -> Report:
 
 
 @contextlib.contextmanager
-def _progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar that is made when the first step is done: it loads Rich."""
+def _progress(title: str) -> Iterator[tuple[Callable[[int, int, str], None], Callable[[str], None]]]:
+    """A bar that is made when the first step is done, since it loads Rich; and lines above it, on standard error."""
     with contextlib.ExitStack() as stack:
         bars: list[Bar] = []
 
@@ -152,7 +153,13 @@ def _progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
                     bars.append(stack.enter_context(Bar(title)))
                 bars[0].step(done, total, state)
 
-        yield progress
+        def tell(text: str) -> None:
+            if bars:
+                bars[0].tell(text)
+            else:
+                print(text, file=sys.stderr, flush=True)
+
+        yield progress, tell
 
 
 def _annotate(report: Report, wanted: bool, as_json: bool) -> None:

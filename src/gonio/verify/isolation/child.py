@@ -48,6 +48,7 @@ MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before i
 STRIKES = 3  # crashes of a method after which it is called at the given values only; of a card outside of any call
 
 Progress = Callable[[int, int, str], None]
+Tell = Callable[[str], None]
 Call = tuple[str, str, str]  # a method, and the material's values as a key and in words
 
 
@@ -102,6 +103,7 @@ def trial(
     limit: float | None = None,
     memory: float | None = None,
     progress: Progress | None = None,
+    tell: Tell | None = None,
     threshold: float | None = None,
 ) -> Report:
     """The report of a task.
@@ -109,6 +111,7 @@ def trial(
     jobs       processes at a time
     limit      seconds per law, GONIO_VERIFY_LIMIT or 300 if not given
     memory     GB per process; if not given, half of the machine's for all processes together
+    tell       called with each law's result on a single card, or with each card's on several, as soon as it is there
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
@@ -120,7 +123,7 @@ def trial(
     jobs = min(jobs, sum(item.cards for item in task.items))
     most = 0.5 * _machine_memory() / max(jobs, 1) if memory is None else memory * 1e9
     started = time.perf_counter()
-    pool = _Pool(task, jobs, limit, most, progress)
+    pool = _Pool(task, jobs, limit, most, progress, tell)
     try:
         from ..report import Report, significance  # while the first process loads what it needs
 
@@ -274,14 +277,18 @@ class _State:
 class _Pool:
     """The processes of a trial, and the state of each card."""
 
-    def __init__(self, task: Task, jobs: int, limit: float, memory: float, progress: Progress | None) -> None:
-        self.task, self.jobs, self.limit, self.memory, self.progress = task, jobs, limit, memory, progress
+    def __init__(
+        self, task: Task, jobs: int, limit: float, memory: float, progress: Progress | None, tell: Tell | None
+    ) -> None:
+        self.task, self.jobs, self.limit, self.memory = task, jobs, limit, memory
+        self.progress, self.tell = progress, tell
         self.answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
         self.workers = [_Worker(task, limit, self.answers) for _ in range(jobs)]
         self.states: list[_State] | None = None  # once a process has loaded the targets
         self.waiting: list[int] = []  # numbers of the cards that no process judges yet
         self.laws: list[str] = []
         self.begun: set[tuple[int, str]] = set()
+        self.told: set[tuple[int, str]] = set()
         self.warned: set[str] = set()
 
     @property
@@ -335,6 +342,16 @@ class _Pool:
         if step in self.laws:
             self.begun.add((card, step))
 
+    def _result(self, worker: _Worker, card: int, law: str, result: str) -> None:
+        assert self.states is not None
+        if len(self.states) == 1:
+            self._tell(card, f"{law}: {result}")
+
+    def _tell(self, card: int, text: str) -> None:
+        if self.tell and (card, text) not in self.told:  # a card may be judged twice
+            self.told.add((card, text))
+            self.tell(text)
+
     def _call(self, worker: _Worker, *call: str) -> None:
         worker.call = (call[0], call[1], call[2]) if call else None
 
@@ -354,6 +371,9 @@ class _Pool:
             card.notes.append(f"it printed {printed} {'line' if printed == 1 else 'lines'} while it was judged")
         card.notes += self.states[number].notes
         self.states[number].card = card
+        if len(self.states) > 1:
+            failed = [one.law for one in card.verdicts if one.failed]
+            self._tell(number, f"{card.title}: {'fails ' + ', '.join(failed) if failed else 'holds'}")
 
     def _warning(self, worker: _Worker, text: str) -> None:
         if text not in self.warned:

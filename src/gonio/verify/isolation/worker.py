@@ -79,8 +79,11 @@ def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
         def begin(step: str, number: int = number) -> None:
             say("step", number, step)
 
+        def result(law: str, text: str, number: int = number) -> None:
+            say("result", number, law, text)
+
         calls.judge(subjects[number].model, forbidden)
-        judged = run.judged(subjects[number], laws, task.effort, task.seed, begin, skip)
+        judged = run.judged(subjects[number], laws, task.effort, task.seed, begin, skip, result)
         say("card", number, _plain(judged.card(threshold, task.seed, task.effort, begin)))
 
 
