@@ -8,14 +8,14 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 0.05), (0.25, 0.25), (0.5, 0.25), (0.5, 1.0), (0.75, 0.5), (1.0, 0.5))
 
-INTRO = """`light_compute` of the clustered forward renderer for one directional light, as `StandardMaterial3D` uses it: Burley's
-diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim, backlight and transmittance are not judged.
+INTRO = """`light_compute` of the clustered forward renderer for one directional light, as `StandardMaterial3D` uses it:
+Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim, backlight and transmittance are not judged.
 Roughness and metallic are not rounded to 8 bits, as the renderer does. Later releases multiply the lobe by an energy
 compensation, which was not judged."""
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """White metal by both masking terms beside the integral, and what a coat adds to a black metal and to a white one."""
+    """White metal by both masking terms beside the integral, and with and without a coat."""
     figures = {}
     for rough, cosine in PLACES:
         key = f"{rough:g}_{cosine:g}"
@@ -63,8 +63,8 @@ roots of the isotropic term.
 
 ## The clear coat is added
 
-As a comment in `light_compute` says, nothing takes from the base what the coat reflects. White metal of roughness 0.5 with
-a coat of roughness 0.1:
+As a comment in `light_compute` says, nothing takes from the base what the coat reflects. White metal of roughness
+0.5 with a coat of roughness 0.1:
 
 | n.v | without coat | with coat |
 |---|---|---|
@@ -109,7 +109,8 @@ ENGINE = Engine(
     remarks={
         "White metal": "Single scattering without compensation; it loses more than GGX: see [the masking "
         "terms](#two-masking-terms).",
-        "White dielectric": "The diffuse and the specular lobe are added. `DIFFUSE_BURLEY` gains light at high roughness, too.",
+        "White dielectric": "The diffuse and the specular lobe are added. `DIFFUSE_BURLEY` gains light at high "
+        "roughness, too.",
         "White metal, anisotropy 0.7": "The loss is that of GGX.",
         "White dielectric, coat of this roughness": "The base has roughness 0.5; see [the "
         "coat](#the-clear-coat-is-added).",
