@@ -10,8 +10,8 @@ PLACES = ((0.25, 0.05), (0.25, 0.25), (0.5, 0.25), (0.5, 1.0), (0.75, 0.5), (1.0
 
 INTRO = """`light_compute` of the clustered forward renderer for one directional light, as `StandardMaterial3D` uses it:
 Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim, backlight and transmittance are not
-judged. Roughness and metallic are not rounded to 8 bits, as the renderer does. Later releases multiply the lobe by an energy
-compensation, which was not judged."""
+judged. Roughness and metallic are not rounded to 8 bits, as the renderer does. Later releases multiply the lobe by an
+energy compensation, which was not judged."""
 
 
 def trials(folder: Path) -> dict[str, float]:
