@@ -1,0 +1,91 @@
+// Prints the fragment programs that three.js writes for its node materials, as JSON by name: what WebGPURenderer hands
+// to the device to draw one frame. The device here draws nothing, so that Node suffices.
+//
+//     node capture.mjs node_modules/three/build/three.webgpu.js
+import { pathToFileURL } from 'node:url';
+
+// An object that has every property, each of which can be called and does nothing; `own` has the ones that matter.
+const inert = ( own = {} ) => new Proxy( function () {}, {
+	get: ( _, name ) => name in own ? own[ name ] : name === 'then' ? undefined : name === Symbol.toPrimitive ? () => 0 : inert(),
+	apply: () => inert(),
+	construct: () => inert(),
+} );
+
+const programs = [], errors = [];
+const device = inert( {
+	features: new Set( [ 'core-features-and-limits' ] ),
+	lost: new Promise( () => {} ),
+	popErrorScope: async () => null,
+	createBuffer: ( { size } ) => inert( { getMappedRange: () => new ArrayBuffer( size ) } ),
+	createShaderModule: ( { code } ) => ( code.includes( '@fragment' ) && programs.push( code ), inert() ),
+} );
+for ( const name of [ 'GPUShaderStage', 'GPUBufferUsage', 'GPUTextureUsage' ] ) globalThis[ name ] = inert();
+globalThis.GPURenderBundleEncoder = class {};
+globalThis.requestAnimationFrame = () => 0;
+globalThis.self = globalThis;
+globalThis.navigator ??= {};
+navigator.gpu ??= inert();
+console.log = console.info = console.warn = () => {}; // what it prints is the result alone
+console.error = ( ...words ) => errors.push( words.join( ' ' ) ); // three.js goes on with another material
+
+const THREE = await import( pathToFileURL( process.argv[ 2 ] ) );
+const { float, vec2, vec3, uniform, varyingProperty } = THREE.TSL;
+
+// A light of irradiance 1, whose direction is an input of the fragment program, `lampDirection`.
+class Lamp extends THREE.Light {}
+class LampNode extends THREE.AnalyticLightNode {
+
+	setupDirect() {
+
+		return { lightDirection: varyingProperty( 'vec3', 'lampDirection' ), lightColor: vec3( 1 ) };
+
+	}
+
+}
+
+// The inputs of each material. Uniforms have the names of the parameters of our adapters to WebGLRenderer's program.
+const number = ( name ) => uniform( 0.5 ).setName( name );
+const color = ( name ) => uniform( new THREE.Color() ).setName( name );
+const base = () => ( {
+	colorNode: color( 'color' ), roughnessNode: number( 'rough' ), metalnessNode: number( 'metal' ),
+	opacityNode: float( 1 ), emissiveNode: vec3( 0 ),
+	iorNode: float( 1.5 ), specularColorNode: vec3( 1 ), specularIntensityNode: float( 1 ),
+} );
+const MATERIALS = {
+	standard: [ THREE.MeshStandardNodeMaterial, {} ],
+	physical: [ THREE.MeshPhysicalNodeMaterial, {
+		iorNode: number( 'index' ), specularColorNode: color( 'specularTint' ), specularIntensityNode: number( 'specularWeight' ),
+		clearcoatNode: number( 'coat' ), clearcoatRoughnessNode: number( 'coatRoughness' ),
+		sheenNode: color( 'sheen' ), sheenRoughnessNode: number( 'sheenWidth' ),
+	} ],
+	anisotropic: [ THREE.MeshPhysicalNodeMaterial, { anisotropyNode: vec2( number( 'strength' ), 0 ) } ],
+	iridescent: [ THREE.MeshPhysicalNodeMaterial, {
+		iridescenceNode: number( 'strength' ), iridescenceIORNode: number( 'filmIndex' ), iridescenceThicknessNode: number( 'filmThickness' ),
+	} ],
+};
+
+const renderer = new THREE.WebGPURenderer( { canvas: inert( { width: 1, height: 1, style: {} } ), device } );
+await renderer.init();
+if ( Lamp.registerNode ) Lamp.registerNode( LampNode ); else renderer.library.addLight( LampNode, Lamp ); // before r187
+renderer.setRenderTarget( new THREE.RenderTarget( 1, 1, { type: THREE.FloatType } ) ); // so that it draws linear colors
+
+function captured( Material, inputs ) {
+
+	const nodes = { ...base(), ...inputs };
+	// before r186 a material has no specularColorNode and specularIntensityNode, and reads these two
+	THREE.TSL.materialSpecularColor.setup = () => nodes.specularColorNode;
+	THREE.TSL.materialSpecularIntensity.setup = () => nodes.specularIntensityNode;
+	const plane = new THREE.PlaneGeometry();
+	plane.setAttribute( 'tangent', new THREE.Float32BufferAttribute( Array( 4 ).fill( [ 1, 0, 0, 1 ] ).flat(), 4 ) );
+	const scene = new THREE.Scene();
+	scene.add( new THREE.Mesh( plane, Object.assign( new Material(), nodes ) ), new Lamp() );
+	const camera = new THREE.PerspectiveCamera();
+	camera.position.z = 1;
+	renderer.render( scene, camera );
+	if ( errors.length ) throw new Error( errors[ 0 ] );
+	return programs.pop();
+
+}
+
+const made = Object.entries( MATERIALS ).map( ( [ name, [ Material, inputs ] ] ) => [ name, captured( Material, inputs ) ] );
+process.stdout.write( JSON.stringify( Object.fromEntries( made ) ) );
