@@ -24,7 +24,7 @@ def adopt(
     ],
     *,
     output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
-    tsl: Annotated[bool, Option("--tsl", help="Of three.js, the TSL build, too: runs the package's JavaScript.")] = False,
+    tsl: Annotated[bool, Option("--tsl", help="three.js: its TSL build too, by running its JavaScript.")] = False,
     force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
     as_json: Json = False,
 ) -> None:

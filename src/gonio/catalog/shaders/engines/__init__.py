@@ -89,9 +89,7 @@ def package_in(folder: str | os.PathLike[str]) -> Package:
     return Package(name, str(about.get("version", "")), path.parent)
 
 
-def adopt_package(
-    folder: str | os.PathLike[str], target: str | os.PathLike[str], *, tsl: bool = False
-) -> list[Path]:
+def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str], *, tsl: bool = False) -> list[Path]:
     """Write the materials of a package of an engine into a folder: each a .glsl or .wgsl with its adapter.
 
     folder  the package as npm installs it, such as node_modules/three, or a checkout of an engine that is not on npm;

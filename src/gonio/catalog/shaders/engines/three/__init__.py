@@ -1,4 +1,4 @@
-"""three.js: its fragment programs for MeshStandardMaterial and MeshPhysicalMaterial, of WebGLRenderer and WebGPURenderer."""
+"""three.js: the fragment programs of WebGLRenderer and WebGPURenderer for its standard and physical materials."""
 
 from __future__ import annotations
 

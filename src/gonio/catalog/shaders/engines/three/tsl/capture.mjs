@@ -43,49 +43,50 @@ class LampNode extends THREE.AnalyticLightNode {
 
 }
 
-// The inputs of each material. Uniforms have the names of the parameters of our adapters to WebGLRenderer's program.
+// What a material's properties are in its program: a constant, or a uniform, which has the name of the parameter of our
+// adapter to WebGLRenderer's program.
 const number = ( name ) => uniform( 0.5 ).setName( name );
 const color = ( name ) => uniform( new THREE.Color() ).setName( name );
-const base = () => ( {
-	colorNode: color( 'color' ), roughnessNode: number( 'rough' ), metalnessNode: number( 'metal' ),
-	opacityNode: float( 1 ), emissiveNode: vec3( 0 ),
-	iorNode: float( 1.5 ), specularColorNode: vec3( 1 ), specularIntensityNode: float( 1 ),
-} );
+const base = {
+	color: color( 'color' ), roughness: number( 'rough' ), metalness: number( 'metal' ),
+	opacity: float( 1 ), emissive: vec3( 0 ), emissiveIntensity: float( 1 ),
+	ior: float( 1.5 ), specularColor: vec3( 1 ), specularIntensity: float( 1 ),
+};
 const MATERIALS = {
-	standard: [ THREE.MeshStandardNodeMaterial, {} ],
-	physical: [ THREE.MeshPhysicalNodeMaterial, {
-		iorNode: number( 'index' ), specularColorNode: color( 'specularTint' ), specularIntensityNode: number( 'specularWeight' ),
-		clearcoatNode: number( 'coat' ), clearcoatRoughnessNode: number( 'coatRoughness' ),
-		sheenNode: color( 'sheen' ), sheenRoughnessNode: number( 'sheenWidth' ),
+	standard: [ new THREE.MeshStandardNodeMaterial(), base ],
+	physical: [ new THREE.MeshPhysicalNodeMaterial( { clearcoat: 1, sheen: 1 } ), {
+		...base, ior: number( 'index' ), specularColor: color( 'specularTint' ), specularIntensity: number( 'specularWeight' ),
+		clearcoat: number( 'coat' ), clearcoatRoughness: number( 'coatRoughness' ),
+		sheen: float( 1 ), sheenColor: color( 'sheen' ), sheenRoughness: number( 'sheenWidth' ),
 	} ],
-	anisotropic: [ THREE.MeshPhysicalNodeMaterial, { anisotropyNode: vec2( number( 'strength' ), 0 ) } ],
-	iridescent: [ THREE.MeshPhysicalNodeMaterial, {
-		iridescenceNode: number( 'strength' ), iridescenceIORNode: number( 'filmIndex' ), iridescenceThicknessNode: number( 'filmThickness' ),
+	anisotropic: [ new THREE.MeshPhysicalNodeMaterial(), base ],
+	iridescent: [ new THREE.MeshPhysicalNodeMaterial( { iridescence: 1 } ), {
+		...base, iridescence: number( 'strength' ), iridescenceIOR: number( 'filmIndex' ),
 	} ],
 };
+MATERIALS.anisotropic[ 0 ].anisotropyNode = vec2( number( 'strength' ), 0 );
+MATERIALS.iridescent[ 0 ].iridescenceThicknessNode = number( 'filmThickness' );
 
 const renderer = new THREE.WebGPURenderer( { canvas: inert( { width: 1, height: 1, style: {} } ), device } );
 await renderer.init();
 if ( Lamp.registerNode ) Lamp.registerNode( LampNode ); else renderer.library.addLight( LampNode, Lamp ); // before r187
 renderer.setRenderTarget( new THREE.RenderTarget( 1, 1, { type: THREE.FloatType } ) ); // so that it draws linear colors
 
-function captured( Material, inputs ) {
+function captured( material, properties ) {
 
-	const nodes = { ...base(), ...inputs };
-	// before r186 a material has no specularColorNode and specularIntensityNode, and reads these two
-	THREE.TSL.materialSpecularColor.setup = () => nodes.specularColorNode;
-	THREE.TSL.materialSpecularIntensity.setup = () => nodes.specularIntensityNode;
+	THREE.MaterialNode.prototype.getCache = ( name ) => properties[ name ];
 	const plane = new THREE.PlaneGeometry();
 	plane.setAttribute( 'tangent', new THREE.Float32BufferAttribute( Array( 4 ).fill( [ 1, 0, 0, 1 ] ).flat(), 4 ) );
 	const scene = new THREE.Scene();
-	scene.add( new THREE.Mesh( plane, Object.assign( new Material(), nodes ) ), new Lamp() );
+	scene.add( new THREE.Mesh( plane, material ), new Lamp() );
 	const camera = new THREE.PerspectiveCamera();
 	camera.position.z = 1;
 	renderer.render( scene, camera );
-	if ( errors.length ) throw new Error( errors[ 0 ] );
-	return programs.pop();
+	const program = programs.pop();
+	if ( errors.length || ! program ) throw new Error( errors[ 0 ] ?? 'no fragment program' );
+	return program;
 
 }
 
-const made = Object.entries( MATERIALS ).map( ( [ name, [ Material, inputs ] ] ) => [ name, captured( Material, inputs ) ] );
+const made = Object.entries( MATERIALS ).map( ( [ name, given ] ) => [ name, captured( ...given ) ] );
 process.stdout.write( JSON.stringify( Object.fromEntries( made ) ) );
