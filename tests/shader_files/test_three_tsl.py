@@ -1,4 +1,4 @@
-"""three.js's TSL build, whose JavaScript writes WGSL: a short package of our own, and three.js where it is installed."""
+"""three.js's TSL build, whose JavaScript writes WGSL: a short package of our own, and three.js if installed."""
 
 from __future__ import annotations
 

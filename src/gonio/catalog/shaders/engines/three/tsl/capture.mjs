@@ -6,7 +6,7 @@ import { pathToFileURL } from 'node:url';
 
 // An object that has every property, each of which can be called and does nothing; `own` has the ones that matter.
 const inert = ( own = {} ) => new Proxy( function () {}, {
-	get: ( _, name ) => name in own ? own[ name ] : name === 'then' ? undefined : name === Symbol.toPrimitive ? () => 0 : inert(),
+	get: ( _, name ) => name in own || name === 'then' ? own[ name ] : name === Symbol.toPrimitive ? () => 0 : inert(),
 	apply: () => inert(),
 	construct: () => inert(),
 } );
@@ -55,7 +55,8 @@ const base = {
 const MATERIALS = {
 	standard: [ new THREE.MeshStandardNodeMaterial(), base ],
 	physical: [ new THREE.MeshPhysicalNodeMaterial( { clearcoat: 1, sheen: 1 } ), {
-		...base, ior: number( 'index' ), specularColor: color( 'specularTint' ), specularIntensity: number( 'specularWeight' ),
+		...base, ior: number( 'index' ),
+		specularColor: color( 'specularTint' ), specularIntensity: number( 'specularWeight' ),
 		clearcoat: number( 'coat' ), clearcoatRoughness: number( 'coatRoughness' ),
 		sheen: float( 1 ), sheenColor: color( 'sheen' ), sheenRoughness: number( 'sheenWidth' ),
 	} ],
