@@ -15,7 +15,7 @@ import pytest
 from gonio import cli
 from gonio.catalog import shaders
 from gonio.catalog.shaders.engines.three import tsl
-from gonio.errors import InputError
+from gonio.errors import InputError, MachineError
 from gonio.spirv.compiler import compiler
 
 import browser
@@ -177,6 +177,15 @@ def test_verb_says_what_is_missing(
     (package / "build" / "three.webgpu.js").unlink()
     code, said = gonio("adopt", "node_modules/three", "--force")
     assert code == 2 and "no build/three.webgpu.js" in said
+
+
+def test_old_node_is_named(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = tmp_path / "node"
+    node.write_text("#!/bin/sh\necho 'node: bad option: --permission' >&2\nexit 9\n")
+    node.chmod(0o755)
+    monkeypatch.setattr(tsl.shutil, "which", lambda name: str(node))
+    with pytest.raises(MachineError, match="TSL needs Node 20 or later"):
+        shaders.adopt_package(package, tmp_path / "out", tsl=True)
 
 
 def test_other_engines_have_no_tsl(tmp_path: Path) -> None:

@@ -55,7 +55,8 @@ def generated(package: Path, adapters: Path) -> dict[str, str]:
     for name, text in _programs(package / _BUILD).items():
         shader = f"three-tsl-{name}.wgsl"
         adapter = (adapters / f"three-{name}.glsl.toml").read_text(encoding="utf-8")
-        files[shader], files[f"{shader}.toml"] = _function(text, shader), _adapter(text, adapter, shader)
+        files[shader] = _function(_checked(text, adapter, shader), shader)
+        files[f"{shader}.toml"] = _adapter(adapter)
     return files
 
 
@@ -111,16 +112,19 @@ def _function(text: str, name: str) -> str:
     return body + _END.replace("INPUTS", ", ".join(values))
 
 
-def _adapter(text: str, webgl: str, name: str) -> str:
-    """The adapter to a program, from the one to the WebGL build."""
+def _checked(text: str, adapter: str, name: str) -> str:
+    """A program whose inputs are those of an adapter; its table has the adapter's name for it."""
     textures = re.findall(r"var (\w+) : texture_2d<f32>", text)
     uniforms = set(re.findall(r"^\t(\w+) : (?:f32|vec\d<f32>),?$", text, re.MULTILINE))
-    parameters = set(re.findall(r"^\[parameters\.(\w+)\]", webgl, re.MULTILINE))
+    parameters = set(re.findall(r"^\[parameters\.(\w+)\]", adapter, re.MULTILINE))
     if len(textures) != 1 or uniforms != parameters:
         other = ", ".join(sorted(uniforms ^ parameters)) or f"{len(textures)} textures"
         raise InputError(f"other inputs in the program of this release of three.js: {other}", name, _WITHOUT)
-    doc = re.search(r'^doc = ".*"$', webgl, re.MULTILINE)
-    assert doc is not None
-    head = [doc[0].replace("Material", "NodeMaterial", 1), 'function = "lit"', 'arguments = ["light", "view"]']
-    rest = webgl[webgl.index("[parameters.") :].replace("[textures.dfgLUT]", f"[textures.{textures[0]}]")
+    return re.sub(rf"\b{textures[0]}(?=\b|_sampler\b)", "dfgLUT", text)
+
+
+def _adapter(webgl: str) -> str:
+    """The adapter to a program, from the one to the WebGL build."""
+    doc, rest = webgl.partition("\n")[0], webgl[webgl.index("[parameters.") :]
+    head = [doc.replace("Material", "NodeMaterial", 1), 'function = "lit"', 'arguments = ["light", "view"]']
     return "\n".join([*head, "cosine = true", "", rest])
