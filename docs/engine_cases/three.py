@@ -196,6 +196,12 @@ CAUSES |= {
     (name, law): f"As for `{name.replace('-tsl', '')}`."
     for name in TSL
     for law in ("positivity", "reciprocity", "energy", "linearity", "precision")
+} | {
+    (
+        "three-tsl-physical",
+        "energy",
+        "0.185.1",
+    ): "As for `three-physical`; besides, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
 }
 
 ENGINE = Engine(
@@ -228,12 +234,12 @@ ENGINE = Engine(
             lambda r: {"rough": 0.5, "sheen": 1.0, "sheenWidth": r},
         ),
         Furnace(
-            "White dielectric, coat and sheen of this roughness",
+            "White dielectric, coat and sheen",
             "three-physical",
             lambda r: {"rough": 0.5, "coat": 1.0, "coatRoughness": r, "sheen": 1.0, "sheenWidth": r},
         ),
         Furnace(
-            "White dielectric, coat and sheen of this roughness, TSL",
+            "White dielectric, coat and sheen, TSL",
             "three-tsl-physical",
             lambda r: {"rough": 0.5, "coat": 1.0, "coatRoughness": r, "sheen": 1.0, "sheenWidth": r},
         ),
@@ -249,6 +255,9 @@ ENGINE = Engine(
         "White metal, anisotropy 0.7": "The table is read at `roughness`, while the lobe is wider along the tangent.",
         "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, while a "
         "rough coat reflects less than that at grazing angles.",
+        "White dielectric, coat and sheen": "Coat and sheen have this roughness, the base has 0.5.",
+        "White dielectric, coat and sheen, TSL": "The coat does not attenuate the sheen: see "
+        "[below](#tsl-against-webgl).",
         "White dielectric, white sheen of this roughness": "`IBLSheenBRDF` is smaller than the albedo of the lobe at "
         "low sheen roughness and grazing angles: see *energy* below.",
     },

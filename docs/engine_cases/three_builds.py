@@ -136,6 +136,6 @@ and metalness 0.3; *equal* within 1e-5:
 
 With these lines of the GLSL changed to what TSL has, all values agree within {before["tsl_left"]:.0e} and
 {after["tsl_left"]:.0e}. In {new} one difference is left. [KHR_materials_sheen](https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_materials_sheen)
-puts the clear coat on top of the sheen, as WebGLRenderer does; WebGPURenderer puts the sheen on top, where the
-coat does not attenuate it, and both lobes gain at grazing angles (last two furnaces above). Remedy: exchange the two
-blocks of `PhysicalLightingModel.finish`."""
+puts the clear coat on top of the sheen, as WebGLRenderer does. WebGPURenderer puts the sheen on top, where the coat
+does not attenuate it; the last two furnaces above differ most at grazing angles. Remedy: exchange the two blocks of
+`PhysicalLightingModel.finish`."""
