@@ -82,7 +82,7 @@ def measured(engine: Engine, package: shaders.Package) -> dict[str, Any]:
         if engine.made:
             shutil.copytree(package.folder, folder, dirs_exist_ok=True)
         else:
-            shaders.adopt_package(package.folder, folder)
+            shaders.adopt_package(package.folder, folder, tsl=engine.tsl)
         return {
             "furnaces": {
                 one.title: [furnace(material(folder, one.material, **one.parameters(r))) for r in ROUGHNESSES]
@@ -226,11 +226,13 @@ def _cell(one: dict[str, str]) -> str:
 def _again(engine: Engine, version: str) -> list[str]:
     stem = engine.page
     get = engine.again.format(version=version) or (
-        f"npm install {engine.package}@{version}\ngonio adopt node_modules/{engine.package} -o {stem}"
+        f"npm install {engine.package}@{version}\n"
+        f"gonio adopt node_modules/{engine.package} -o {stem}{' --tsl' * engine.tsl}"
     )
-    suffix = f".{engine.language}"
     lines = ["## Again", "", *(f"    {line}" for line in get.split("\n"))]
-    lines += [f"    gonio verify {_operand(stem, name, suffix)}" for name in engine.materials]
+    for name in engine.materials:
+        suffix = ".wgsl" if engine.tsl and "-tsl-" in name else f".{engine.language}"
+        lines.append(f"    gonio verify {_operand(stem, name, suffix)}")
     if engine.programs:
         links = ", ".join(f"[{name}](programs/{name})" for name in engine.programs)
         printed = sorted((FOLDER / "programs").glob(f"{stem}-*.txt"))

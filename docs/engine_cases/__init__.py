@@ -1,4 +1,4 @@
-"""What `make_engine_cards.py` measures of each engine, one file each."""
+"""What `make_engine_cards.py` measures of each engine: one file each, with `ENGINE`, and what these share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ from .base import Engine
 
 def engines() -> dict[str, Engine]:
     """All engines by package."""
-    names = sorted(one.name for one in pkgutil.iter_modules(__path__) if one.name != "base")
-    every = [importlib.import_module(f"{__name__}.{name}").ENGINE for name in names]
-    return {one.package: one for one in every}
+    names = sorted(one.name for one in pkgutil.iter_modules(__path__))
+    modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
+    return {one.ENGINE.package: one.ENGINE for one in modules if hasattr(one, "ENGINE")}

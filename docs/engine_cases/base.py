@@ -45,6 +45,7 @@ class Engine(NamedTuple):
     made       the folder of a release holds the shaders and adapters themselves
     language   suffix of the shaders
     laws       the laws to judge by, all if empty
+    tsl        its TSL build is measured too
     """
 
     package: str
@@ -64,6 +65,7 @@ class Engine(NamedTuple):
     made: bool = False
     language: str = "glsl"
     laws: tuple[str, ...] = ()
+    tsl: bool = False
 
 
 def material(folder: Path, name: str, **parameters: float) -> Any:
@@ -89,6 +91,16 @@ def single_scattering(roughness: float, cosines: tuple[float, ...]) -> list[floa
 
 def asymmetry(one: BSDF, count: int = 4000) -> float:
     """Largest relative difference of f(wo, wi) and f(wi, wo), of pairs to 89 degrees."""
+    wo, wi = _pairs(count)
+    return _apart(*(np.asarray(one.f(*pair, precision="float64")) for pair in ((wo, wi), (wi, wo))))
+
+
+def difference(one: BSDF, other: BSDF, count: int = 4000) -> float:
+    """Largest relative difference of two materials, of pairs to 89 degrees."""
+    return _apart(*(np.asarray(each.eval(*_pairs(count), precision="float64")) for each in (one, other)))
+
+
+def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(1)
 
     def directions() -> np.ndarray:
@@ -96,6 +108,8 @@ def asymmetry(one: BSDF, count: int = 4000) -> float:
         r = np.sqrt(1.0 - z * z)
         return np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
 
-    wo, wi = directions(), directions()
-    there, back = (np.asarray(one.f(*pair, precision="float64")) for pair in ((wo, wi), (wi, wo)))
-    return float(np.max(np.abs(there - back) / np.maximum(np.maximum(np.abs(there), np.abs(back)), 1e-12)))
+    return directions(), directions()
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.max(np.abs(one - other) / np.maximum(np.maximum(np.abs(one), np.abs(other)), 1e-12)))

@@ -8,13 +8,16 @@ import gonio as go
 import numpy as np
 from gonio.catalog.shaders import files
 
+from . import three_builds
 from .base import Engine, Furnace, asymmetry, furnace, material, single_scattering
 
 INTRO = """MeshStandardMaterial and MeshPhysicalMaterial of WebGLRenderer under directional lights: the package's own
 fragment program, `ShaderLib/meshphysical.glsl.js`, for a flat surface without maps, with the defines that
 WebGLRenderer sets. The two releases are the last before and the newest after
 [#33983](https://github.com/mrdoob/three.js/pull/33983), which replaced the compensation of rough metals. Light from an
-environment map takes another path (`RE_IndirectSpecular_Physical`) and is not judged here."""
+environment map takes another path (`RE_IndirectSpecular_Physical`) and is not judged here. The materials
+three-tsl-... are those of WebGPURenderer, MeshStandardNodeMaterial and MeshPhysicalNodeMaterial: the WGSL that the
+package's TSL build hands to the device, [compared below](#tsl-against-webgl) with the GLSL."""
 
 THREAD = {(0.5, 0.5): (0.90, 1.00), (0.75, 0.5): (0.84, 1.00), (1.0, 0.5): (0.72, 0.94), (1.0, 1.0): (0.58, 0.89)}
 
@@ -63,7 +66,7 @@ def trials(folder: Path) -> dict[str, float]:
     finally:
         np.save(folder / "dfgLUT.npy", own)
         files.forget()
-    return figures | _layers(folder)
+    return figures | _layers(folder) | three_builds.trials(folder)
 
 
 def _layers(folder: Path) -> dict[str, float]:
@@ -137,7 +140,9 @@ program:
 {tables}
 
 Remedy at the same size: compute the texels at 0, 1/15, ... 1, and scale the coordinates by 15/16 plus 1/32, as
-`LTC_Uv` in the same chunk does for its tables."""
+`LTC_Uv` in the same chunk does for its tables.
+
+{three_builds.section(old, before, new, after)}"""
 
 
 CAUSES = {
@@ -186,13 +191,33 @@ CAUSES = {
     ("three-iridescent", "precision"): "As for the standard material.",
 }
 
+TSL = ("three-tsl-standard", "three-tsl-physical", "three-tsl-anisotropic", "three-tsl-iridescent")
+CAUSES |= {
+    (name, law): f"As for `{name.replace('-tsl', '')}`."
+    for name in TSL
+    for law in ("positivity", "reciprocity", "energy", "linearity", "precision")
+} | {
+    (
+        "three-tsl-physical",
+        "energy",
+        "0.185.1",
+    ): "As for `three-physical`; besides, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
+}
+
 ENGINE = Engine(
     package="three",
     page="three",
     title="three.js",
     home="https://github.com/mrdoob/three.js",
     intro=INTRO,
-    materials=("three-standard", "three-standard(metal=0)", "three-physical", "three-anisotropic", "three-iridescent"),
+    materials=(
+        "three-standard",
+        "three-standard(metal=0)",
+        "three-physical",
+        "three-anisotropic",
+        "three-iridescent",
+        *TSL,
+    ),
     furnaces=(
         Furnace("White metal", "three-standard", lambda r: {"rough": r}),
         Furnace("White dielectric", "three-standard", lambda r: {"rough": r, "metal": 0.0}),
@@ -208,6 +233,16 @@ ENGINE = Engine(
             "three-physical",
             lambda r: {"rough": 0.5, "sheen": 1.0, "sheenWidth": r},
         ),
+        Furnace(
+            "White dielectric, coat and sheen",
+            "three-physical",
+            lambda r: {"rough": 0.5, "coat": 1.0, "coatRoughness": r, "sheen": 1.0, "sheenWidth": r},
+        ),
+        Furnace(
+            "White dielectric, coat and sheen, TSL",
+            "three-tsl-physical",
+            lambda r: {"rough": 0.5, "coat": 1.0, "coatRoughness": r, "sheen": 1.0, "sheenWidth": r},
+        ),
     ),
     remarks={
         "White dielectric": "`RE_Direct_Physical` leaves to the diffuse lobe 1 - F(v.h) of each light. At grazing "
@@ -220,6 +255,9 @@ ENGINE = Engine(
         "White metal, anisotropy 0.7": "The table is read at `roughness`, while the lobe is wider along the tangent.",
         "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, while a "
         "rough coat reflects less than that at grazing angles.",
+        "White dielectric, coat and sheen": "Coat and sheen have this roughness, the base has 0.5.",
+        "White dielectric, coat and sheen, TSL": "The coat does not attenuate the sheen: see "
+        "[below](#tsl-against-webgl).",
         "White dielectric, white sheen of this roughness": "`IBLSheenBRDF` is smaller than the albedo of the lobe at "
         "low sheen roughness and grazing angles: see *energy* below.",
     },
@@ -227,4 +265,5 @@ ENGINE = Engine(
     sections=sections,
     causes=CAUSES,
     programs=("three-furnace.html",),
+    tsl=True,
 )

@@ -53,6 +53,13 @@ def test_table_of_the_same_size_from_edge_to_edge_mends_white_metal() -> None:
     assert abs(1.0 - figures["edges_16"]) < 0.05 * abs(1.0 - figures["own"])
 
 
+def test_causes_account_for_the_difference_of_the_builds_of_three() -> None:
+    for version, apart in {"0.185.1": {"plain", "weight", "sheen", "both", "film"}, "0.187.0": {"both"}}.items():
+        figures = CARDS["three"][version]["trials"]
+        assert all(figures[f"tsl_{name}"] > 1e-4 for name in apart)
+        assert figures["tsl_left"] < 1e-5  # with the lines named as causes changed
+
+
 def _printed_by(output: Path) -> tuple[str, str]:
     """Page and release of an output."""
     page, _, version = output.stem.replace("-furnace-", " ").partition(" ")

@@ -24,6 +24,7 @@ def adopt(
     ],
     *,
     output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
+    tsl: Annotated[bool, Option("--tsl", help="three.js: its TSL build too, by running its JavaScript.")] = False,
     force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -38,13 +39,16 @@ def adopt(
       gonio verify my.glsl
       gonio adopt node_modules/three
       gonio verify three/three-standard.glsl
+      gonio adopt node_modules/three --tsl
     """
     from ... import files
     from ...catalog import shaders
 
     if file.is_dir():
-        _adopt_package(file, output, force=force, as_json=as_json)
+        _adopt_package(file, output, tsl=tsl, force=force, as_json=as_json)
         return
+    if tsl:
+        raise InputError(f"'{file}' is not the folder of three.js", "--tsl", "gonio adopt node_modules/three --tsl")
     if output is not None:
         raise InputError(
             "-o names the folder for a package's shaders", "--output", "leave it out: FILE.toml is written"
@@ -62,11 +66,11 @@ def adopt(
         print(f"  guessed: {guess}")
 
 
-def _adopt_package(folder: Path, output: Path | None, *, force: bool, as_json: bool) -> None:
+def _adopt_package(folder: Path, output: Path | None, *, tsl: bool, force: bool, as_json: bool) -> None:
     from ...catalog import shaders
 
     target = output or Path(shaders.package_in(folder).name.rpartition("/")[2])
     if target.exists() and not force:
         raise InputError(f"'{target}' is there already", "--output", "name another folder, or replace it with --force")
-    written = shaders.adopt_package(folder, target)
+    written = shaders.adopt_package(folder, target, tsl=tsl)
     print(json.dumps({"written": [str(one) for one in written]}) if as_json else "\n".join(map(str, written)))

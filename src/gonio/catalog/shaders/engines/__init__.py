@@ -5,7 +5,8 @@
 A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
 of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`). An engine that is not
 on npm is recognized by a file of its repository (`MARK`). `replaced` states words of the adapters that depend on the
-release, such as which arguments a function takes.
+release, such as which arguments a function takes. Shaders that an engine's JavaScript writes are had by running it
+(`generated`), only if asked for.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
 class Engine(NamedTuple):
     """An engine: the name of its package on npm, our programs, and its tables by file name.
 
-    mark      of an engine that is not on npm: a file of its repository, by which a checkout is recognized
-    replaced  words of the adapters that depend on what the package holds
+    mark       of an engine that is not on npm: a file of its repository, by which a checkout is recognized
+    replaced   words of the adapters that depend on what the package holds
+    generated  of an engine with a build whose shaders its JavaScript writes: shaders and adapters by file name
     """
 
     package: str
@@ -39,6 +41,7 @@ class Engine(NamedTuple):
     tables: Callable[[Path], dict[str, np.ndarray]]
     mark: str
     replaced: Callable[[Path], dict[str, str]]
+    generated: Callable[[Path], dict[str, str]] | None
 
 
 class Package(NamedTuple):
@@ -62,6 +65,7 @@ def engines() -> dict[str, Engine]:
             one.tables,
             getattr(one, "MARK", ""),
             getattr(one, "replaced", lambda package: {}),
+            getattr(one, "generated", None),
         )
         for one in modules
     }
@@ -89,19 +93,25 @@ def package_in(folder: str | os.PathLike[str]) -> Package:
     return Package(name, str(about.get("version", "")), path.parent)
 
 
-def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]) -> list[Path]:
+def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str], *, tsl: bool = False) -> list[Path]:
     """Write the materials of a package of an engine into a folder: each a .glsl or .wgsl with its adapter.
 
     folder  the package as npm installs it, such as node_modules/three, or a checkout of an engine that is not on npm;
             it is read again whenever a material is used
     target  the folder to write, made if missing; the shaders name the package relative to it
-    Returns the shaders, one per material. Raises InputError if the package is none that Gonio knows.
+    tsl     whether to add the materials of three.js's TSL build, for which Node runs the package's JavaScript; they are
+            written as they are now, and do not change with the package
+    Returns the shaders, one per material. Raises InputError if the package is none that Gonio knows, or has no TSL
+    build that can be read; MachineError without Node.
     """
     package = package_in(folder)
     engine = engines()[package.name]
     place = Path(target)
     words = engine.replaced(package.folder)
     tables = engine.tables(package.folder)
+    if tsl and engine.generated is None:
+        raise InputError(f"'{package.name}' has no TSL build", "--tsl", "it is for three")
+    generated = engine.generated(package.folder) if tsl and engine.generated else {}
     there = os.path.relpath(package.folder.resolve(), place.resolve()).replace(os.sep, "/")
     place.mkdir(parents=True, exist_ok=True)
     for source in _programs(engine.folder):
@@ -110,11 +120,14 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
             for old, new in {'"package/': f'"{there}/', **words}.items():
                 text = text.replace(old, new)
         files.write_whole(place / source.name, text.encode())
+    for name, text in generated.items():
+        files.write_whole(place / name, text.encode())
     for name, table in tables.items():
         data = io.BytesIO()
         np.save(data, table, allow_pickle=False)
         files.write_whole(place / f"{name}.npy", data.getvalue())
-    return [place / one.stem for one in _programs(engine.folder) if one.suffix == ".toml"]
+    written = [*(one.name for one in _programs(engine.folder)), *sorted(generated)]
+    return [place / name.removesuffix(".toml") for name in written if name.endswith(".toml")]
 
 
 def _programs(folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""three.js: its fragment program for MeshStandardMaterial and MeshPhysicalMaterial."""
+"""three.js: the fragment programs of WebGLRenderer and WebGPURenderer for its standard and physical materials."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from .....errors import InputError
 from .....spirv.literals import array_in
+from . import tsl
 
 PACKAGE = "three"
 _TABLE = "src/renderers/shaders/DFGLUTData.js"
@@ -24,3 +25,8 @@ def tables(package: Path) -> dict[str, np.ndarray]:
     if len(words) != 2 * size * size or any(not 0 <= word < 1 << 16 for word in words):
         raise InputError(f"{len(words)} numbers, two half floats per texel of a square expected", _TABLE)
     return {"dfgLUT": np.array(words, np.uint16).view(np.float16).astype(np.float64).reshape(size, size, 2)}
+
+
+def generated(package: Path) -> dict[str, str]:
+    """The materials of the TSL build: shaders and adapters by file name."""
+    return tsl.generated(package, Path(__file__).parent)
