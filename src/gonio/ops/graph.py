@@ -306,8 +306,11 @@ def first_free(name: str, used: Container[str]) -> str:
     return next(free for free in names if free not in used)
 
 
-def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
-    """Record a call of a `@function`; defines it first if this combination of argument types is new."""
+def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: bool = False) -> Value:
+    """Record a call of a `@function`; defines it first if this combination of argument types is new.
+
+    constants  results that are plain numbers remain plain numbers
+    """
     bound = inspect.signature(python_function).bind(*args, **kwargs)
     bound.apply_defaults()
     graph, _ = _stack[-1]
@@ -326,13 +329,22 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
             stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
         name = first_free(stem, used)
         function = graph._known[key] = _define(graph, python_function, dict(bound.arguments), name)
+    if constants and all(node.op == "constant" for _, node in _flatten(function.result, "")):
+        return rebuild(function.result, lambda node: node.static, Node)
     nodes = [node for argument, value in bound.arguments.items() for _, node in _flatten(value, argument)]
     called = emit("call", "tuple", *nodes, static=function)
     if isinstance(function.result, Node):
         called.type = function.result.type
         return called
     counter = itertools.count()
-    return rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)), Node)
+
+    def element(node: Node) -> Value:
+        place = next(counter)
+        if constants and node.op == "constant":
+            return node.static
+        return emit("element", node.type, called, static=place)
+
+    return rebuild(function.result, element, Node)
 
 
 def recording(values: tuple) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..errors import InputError
-from . import composites
+from . import calls, composites
 from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
 from .bits import cast
 from .composites import Cell, Pointer
@@ -54,6 +54,7 @@ class Machine:
         self._given, self._textures = dict(globals or {}), dict(textures or {})
         self._globals = {id: Pointer(Cell(self._initial(one))) for id, one in module.variables.items()}
         self._flows: dict[int, Flow] = {}
+        self._named: dict[int, frozenset[int]] = {}  # globals by function
         self._stack: list[int] = []
         self._count = 0
 
@@ -235,7 +236,12 @@ class Machine:
     def _called(self, frame: Frame, one: Instruction, mask: Value) -> Value:
         function = self.module.functions[one.operands[0]]
         arguments = [self._get(frame, id) for id in one.operands[1:]]
-        return self._run(function, arguments, both(frame.outer, mask))
+        mask = both(frame.outer, mask)
+        if not calls.is_recordable(arguments):
+            return self._run(function, arguments, mask)
+        named = calls.globals_of(self.module, function, self._named)
+        cells = {id: self._globals[id].cell for id in sorted(named)}
+        return calls.recorded(calls.Recorded(self.module, function, self._run, cells), arguments, mask)
 
     # ------------------------------------------------------------------ values
 
@@ -249,6 +255,8 @@ class Machine:
         target, value = self._get(frame, one.operands[0]), self._get(frame, one.operands[1])
         if not isinstance(target, Pointer):
             raise TypeError("a store to no pointer")
+        if not target.path:
+            calls.named(value, self.module.names.get(target.cell.id, ""))
         own = id(target.cell) in frame.own
         if not own:
             mask = both(frame.outer, mask)

@@ -12,8 +12,7 @@ from typing import Any
 
 from .. import ops
 from ..ops import graph
-from ..ops.structure import leaves as parts_of
-from ..ops.structure import rebuild
+from ..ops.structure import flatten, rebuild
 from .values import Value, leaves, static, where
 
 _OPERATIONS: dict[str, Callable[..., Value]] = {
@@ -79,6 +78,13 @@ def _filled(value: Value, path: str, symbols: Mapping[str, Value]) -> Value:
 
 
 def _run(function: graph.Function, arguments: list[Value]) -> Value:
+    """The result of a recording, as it is structured."""
+    results = iter(_results(function, arguments))
+    return rebuild(function.result, lambda _: next(results), graph.Node)
+
+
+def _results(function: graph.Function, arguments: list[Value]) -> list[Value]:
+    """The values of the nodes of its result."""
     values: list[Any] = []
     remaining, read = iter(arguments), dict[tuple[object, ...], Any]()
 
@@ -92,9 +98,12 @@ def _run(function: graph.Function, arguments: list[Value]) -> Value:
         elif node.op == "constant":
             values.append(node.static)
         elif node.op == "call":
-            values.append(_run(node.static, given))
-        elif node.op == "element":
-            values.append(list(parts_of(given[0]))[node.static])
+            results = _results(node.static, given)
+            values.append(results[0] if isinstance(node.static.result, graph.Node) else results)
+        elif node.op == "vector":
+            values.append(given)
+        elif node.op in ("component", "element"):
+            values.append(given[0][node.static])
         elif node.op in ("lookup", "fetch"):
             table, channel = node.static
             key = node.op, id(table), *[one.index if isinstance(one, graph.Node) else one for one in node.args]
@@ -103,4 +112,4 @@ def _run(function: graph.Function, arguments: list[Value]) -> Value:
             values.append(read[key][channel])
         else:
             values.append(_OPERATIONS[node.op](*given))
-    return rebuild(function.result, get, graph.Node)
+    return [get(node) for _, node in flatten(function.result, "", graph.Node)]

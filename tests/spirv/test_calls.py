@@ -1,0 +1,70 @@
+"""A shader's functions are recorded as functions: emitted text keeps them, and a tree of calls is no tree of text."""
+
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.shaders import bundle
+
+SHADER = """
+uniform float roughness;
+float scale;
+float lobe(float c, float a) { float t = c * c * (a * a - 1.0) + 1.0; return a * a / (3.14159265 * t * t); }
+vec3 fresnel(float c, vec3 f0) { return f0 + (1.0 - f0) * (1.0 - c); }
+void split(vec3 h, out float up, inout float sum) { up = h.z; sum = sum + h.x + h.y; scale = 2.0 * roughness; }
+float count(int n) { float s = 0.0; for (int i = 0; i < n; i++) s += 0.25; return s; }
+vec3 brdf(vec3 light, vec3 view, vec3 normal) {
+    vec3 h = normalize(light + view);
+    float up;
+    float sum = 0.5;
+    if (light.x > view.x) split(h, up, sum);
+    else { up = h.z; scale = 1.0; }
+    float w = lobe(up, roughness * roughness) * scale + count(3) * sum;
+    return w * fresnel(dot(light, h), vec3(0.9, 0.5, 0.1));
+}
+"""
+
+
+def directions(seed: int) -> np.ndarray:
+    x = np.random.default_rng(seed).normal(size=(200, 3))
+    x[:, 2] = np.abs(x[:, 2]) + 0.05
+    return x / np.linalg.norm(x, axis=1, keepdims=True)
+
+
+def expected(wo: np.ndarray, wi: np.ndarray, roughness: float) -> np.ndarray:
+    h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
+    mask, a2 = wi[:, 0] > wo[:, 0], roughness**4
+    scale, total = np.where(mask, 2.0 * roughness, 1.0), np.where(mask, 0.5 + h[:, 0] + h[:, 1], 0.5)
+    t = h[:, 2] ** 2 * (a2 - 1.0) + 1.0
+    w = a2 / (3.14159265 * t * t) * scale + 0.75 * total
+    f0 = np.array([0.9, 0.5, 0.1])
+    return w[:, None] * (f0 + (1.0 - f0) * (1.0 - np.sum(wi * h, axis=1)[:, None])) * wi[:, 2:]
+
+
+@pytest.fixture
+def shader(tmp_path: Path) -> go.BSDF:
+    (tmp_path / "mine.glsl").write_text(SHADER)
+    return go.Shader(tmp_path / "mine.glsl", roughness=0.6)
+
+
+def test_values_with_out_arguments_globals_and_masks(shader: go.BSDF) -> None:
+    wo, wi = directions(1), directions(2)
+    np.testing.assert_allclose(shader.eval(wo, wi, precision="float64"), expected(wo, wi, 0.6), rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl", "numpy"])
+def test_emitted_text_keeps_functions_and_names(shader: go.BSDF, language: str) -> None:
+    text = bundle(shader, language).text
+    for name in ("lobe", "fresnel", "split"):
+        assert f" {name}(" in text, name
+    assert "roughness" in text and " h_z" in text
+
+
+def test_a_tree_of_calls_is_recorded_once_a_function(tmp_path: Path) -> None:
+    lines = ["float f0(float x) { return x * 0.5; }"]
+    lines += [f"float f{i}(float x) {{ return f{i - 1}(x) + f{i - 1}(0.5 * x) * 0.25; }}" for i in range(1, 13)]
+    lines += ["vec3 brdf(vec3 light, vec3 view, vec3 normal) { return vec3(f12(light.z)); }"]
+    (tmp_path / "tree.glsl").write_text("\n".join(lines))
+    text = bundle(go.Shader(tmp_path / "tree.glsl"), "glsl").text
+    assert text.count("float f12(float x)") == 1 and len(text) < 60_000  # 4,096 calls of f0
