@@ -44,7 +44,12 @@ class ForbiddenOperator(RecordingError):
     """A Python operator with no meaning on a value, or a different one: `if`, `and`, `**`."""
 
 
+foreign = ""  # "file:line" of the text that is being read, if values come from no Python code
+
+
 def _source_line() -> str:
+    if foreign:
+        return foreign
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(HERE):
         frame = frame.f_back

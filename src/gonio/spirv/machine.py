@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..errors import InputError
+from ..ops import graph
 from . import calls, composites
 from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
 from .bits import cast
@@ -71,7 +72,10 @@ class Machine:
             Pointer(Cell(value)) if kind == "pointer" and not isinstance(value, Pointer) else value
             for kind, value in zip(kinds, arguments, strict=True)
         ]
-        return self._run(function, given, True)
+        try:
+            return self._recorded(function, given, True)
+        finally:
+            graph.foreign = ""
 
     def folded(self, one: Instruction) -> Value:
         """The value of an instruction whose operands are constants."""
@@ -154,6 +158,7 @@ class Machine:
         try:
             for one in block.instructions:
                 self._count += 1
+                graph.foreign = f"{one.file}:{one.line}" if one.line else ""
                 if self._count > MAX_INSTRUCTIONS:
                     raise refuse(f"more than {MAX_INSTRUCTIONS} steps", "fewer iterations of its loops")
                 if one.name in _FLOW:
@@ -236,7 +241,10 @@ class Machine:
     def _called(self, frame: Frame, one: Instruction, mask: Value) -> Value:
         function = self.module.functions[one.operands[0]]
         arguments = [self._get(frame, id) for id in one.operands[1:]]
-        mask = both(frame.outer, mask)
+        return self._recorded(function, arguments, both(frame.outer, mask))
+
+    def _recorded(self, function: Function, arguments: Sequence[Value], mask: Value) -> Value:
+        """A call that a recording keeps as one, if there is a recording."""
         if not calls.is_recordable(arguments):
             return self._run(function, arguments, mask)
         named = calls.globals_of(self.module, function, self._named)

@@ -14,7 +14,7 @@ from ...material import BSDF, binding, guide_search
 from ...ops import Precision, backend
 from .. import directions, estimators, ranges, severity
 from ..effort import Effort
-from ..forensics import extremes
+from ..forensics import extremes, origin
 from ..forensics.causes import place_of
 from ..forensics.ratio import Cause
 from ..subject import Fault, Subject, guarded
@@ -102,7 +102,12 @@ class Positivity(Law):
         for fault, wrong in _FAULTS.items():
             bad = np.any([wrong(there.eval(wo, wi, precision=p)).any(1) for p in there.precisions], axis=0)
             if bad.any():
-                yield from self._of_eval(subject, finding, effort, seed, fault, bad)
+                place = origin.of(there.model, wo[bad][0], wi[bad][0]) if isinstance(there.model, BSDF) else ""
+                words = f"it begins with {place}" if place and fault == "not finite" else ""
+                for one in self._of_eval(subject, finding, effort, seed, fault, bad):
+                    yield dataclasses.replace(one, words="; ".join(filter(None, [one.words, words])))
+                if words:
+                    yield Cause(f"eval is {fault}: {words}", fault)
                 return
             rows = [
                 (what, wrong(values).any(1), u)
