@@ -46,7 +46,8 @@ OVERVIEW = """Shaders of engines, judged by the laws of [`gonio verify`](../../v
 contains no text of theirs: `gonio adopt` of a package or checkout writes a program that includes the engine's own
 ([how](../../shaders.md#engines)). A page states the size of every failure, its cause down to the function
 or table, and how to see it without Gonio. The laws are those of a path tracer: a rasterizer need not be reciprocal, and
-several causes are deliberate. Corrections are welcome.
+several causes are deliberate. Corrections are welcome. Filament has no card: its package on npm holds compiled
+materials, whose text its compiler removes.
 """
 
 

@@ -348,6 +348,12 @@ def stochastic(model: BSDF) -> BSDF | None:
     return next((inner for _, inner in tree.walk(model) if inner.stochastic), None)
 
 
+def written_from(model: object) -> str:
+    """What a text was made from, in words: the class's Python source, or the shader that it was read from."""
+    shader = getattr(type(model), "program", None)
+    return f"the shader {shader.where}" if shader else "its Python source"
+
+
 def choices(model: BSDF) -> list[tuple[str, Value]]:
     """(path, value) of the choices that shape the code: classes of materials, options and flags."""
     return [

@@ -17,7 +17,7 @@ from . import python_runtime as runtime
 from .languages._python import Python
 from .manifest import Json
 from .names import Names
-from .program import ENTRIES, Program, choices, flat
+from .program import ENTRIES, Program, choices, flat, written_from
 from .python_writer import PythonWriter, docstring
 from .textures import groups, width
 from .values import Record
@@ -58,7 +58,7 @@ def _head(made: Program, language: Python) -> list[str]:
     doc = inspect.cleandoc(type(model).__doc__ or "").replace("\\", "\\\\").splitlines()
     shaped = [f"{path} = {value}" for path, value in choices(model)]
     return [
-        f"{type(model).__name__}, written by Gonio {__version__} from its Python source for {language.title}.",
+        f"{type(model).__name__}, written by Gonio {__version__} from {written_from(model)} for {language.title}.",
         "",
         *doc,
         *(["", *textwrap.wrap("With " + ", ".join(shaped) + ".", 105)] if shaped else []),

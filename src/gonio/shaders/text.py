@@ -18,7 +18,7 @@ from .method_writer import INTERPOLATED, MethodWriter
 from .method_writer import readers as method_readers
 from .names import Names
 from .operations import operations
-from .program import ENTRIES, Program, Routines, choices
+from .program import ENTRIES, Program, Routines, choices, written_from
 from .routine import RoutineWriter
 from .syntax import literal
 from .textures import READERS, axes
@@ -131,7 +131,7 @@ def head(made: Program, names: Names) -> list[str]:
     model, language = made.model, names.language
     entries = sorted(made.entries.items(), key=lambda entry: list(ENTRIES).index(entry[0]))
     shaped = [f"{path} = {value}" for path, value in choices(model)]
-    lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
+    lines = [f"// {type(model).__name__}, written by Gonio {__version__} from {written_from(model)}.", "//"]
     lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
     if made.without:
         off = ", ".join(f"{path} = {tree.value_at(model, path):g}" for path in made.without)
