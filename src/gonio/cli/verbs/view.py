@@ -53,8 +53,8 @@ def view(
 ) -> None:
     """Show materials live on shading balls, in a browser, next to a path-traced reference.
 
-    FILE.py:CLASS and shaders (FILE.glsl) are watched: when a file is saved, the page shows the new picture, or the error
-    in it. With -o the page is one file that needs no server and no network.
+    FILE.py:CLASS and shaders (FILE.glsl) are watched: when a file is saved, the page shows the new picture, or the
+    error in it. With -o the page is one file that needs no server and no network.
 
     \b
     Examples:
