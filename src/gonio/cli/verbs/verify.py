@@ -71,8 +71,8 @@ def verify(
         list[str],
         Argument(
             metavar="TARGET",
-            help="MODEL, FILE.py:CLASS, a shader such as FILE.glsl, mitsuba:PLUGIN, or a Mitsuba .xml or .json; several "
-            "share the options.",
+            help="MODEL, FILE.py:CLASS, a shader such as FILE.glsl, mitsuba:PLUGIN, or a Mitsuba .xml or .json; "
+            "several share the options.",
             autocompletion=completion.materials,
         ),
     ],
