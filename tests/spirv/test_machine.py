@@ -1,5 +1,8 @@
 """Shader text against closed forms, on symbols in 64 bits, and constructs that are refused, with their lines."""
 
+from pathlib import Path
+
+import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
@@ -181,3 +184,25 @@ def test_texels_are_fetched_by_integers() -> None:
         return Machine(module, {}, {"t": table}).call(module.function("f")[0], [x])
 
     np.testing.assert_array_equal(ops.record(formula, x="float").evaluate(x=X), np.where(X < 0.5, 2.0, 3.0))
+
+
+SIGNS = {
+    "uintBitsToFloat((floatBitsToUint(x) & 0x7FFFFFFFu) | (floatBitsToUint(y) & 0x80000000u))": np.copysign,
+    "uintBitsToFloat(0x3F800000u | (floatBitsToUint(y) & 0x80000000u))": lambda x, y: np.copysign(1.0, y),
+    "uintBitsToFloat((0x80000000u & floatBitsToUint(y)) ^ floatBitsToUint(x))": lambda x, y: x * np.copysign(1.0, y),
+    "uintBitsToFloat(floatBitsToUint(x) ^ 0x80000000u)": lambda x, y: -x,
+    "uintBitsToFloat(floatBitsToUint(x) & 0x7FFFFFFFu)": lambda x, y: np.abs(x),
+}
+
+
+@pytest.mark.parametrize("formula", SIGNS)
+def test_signs_are_read_and_written_as_bits(tmp_path: Path, formula: str) -> None:
+    text = (
+        f"vec3 brdf(vec3 light, vec3 view) {{ float x = light.x; float y = view.y; return vec3(2.0 + {formula}); }}\n"
+    )
+    (tmp_path / "signs.glsl").write_text(text)
+    pairs = np.random.default_rng(1).normal(size=(2, 50, 3))
+    pairs[..., 2] = np.abs(pairs[..., 2]) + 0.1
+    wo, wi = pairs / np.linalg.norm(pairs, axis=-1, keepdims=True)
+    values = go.Shader(tmp_path / "signs.glsl").f(wo, wi, precision="float64")[:, 0]
+    np.testing.assert_allclose(values, 2.0 + SIGNS[formula](wi[:, 0], wo[:, 1]), rtol=1e-12)

@@ -12,7 +12,7 @@ from functools import reduce
 import numpy as np
 
 from .. import ops
-from .bits import shifted_left, shifted_right
+from .bits import flipped, joined, masked, shifted_left, shifted_right
 from .values import UNDEFINED, Bits, Value, both, either, folded, negated, numeric, refuse, select, static, truth
 
 
@@ -128,6 +128,12 @@ def _shift(a: int, b: int, left: bool) -> int:
     return (a << (b & 31)) if left else (a >> (b & 31))
 
 
+def _bitwise(plain: Callable[..., int], on_bits: Callable[..., Value]) -> Callable[..., Value]:
+    """An operation on integers that are known, or on the bits of floats."""
+    integers = _integer(plain, None)
+    return lambda a, b: on_bits(a, b) if isinstance(a, Bits) or isinstance(b, Bits) else integers(a, b)
+
+
 _shift_left = _integer(lambda a, b: _shift(a, b, True), None)
 _shift_right = _integer(lambda a, b: _shift(a, b, False), None)
 INTEGERS: dict[str, Callable[..., Value]] = {
@@ -145,9 +151,9 @@ INTEGERS: dict[str, Callable[..., Value]] = {
     "ShiftRightLogical": lambda a, b: (
         shifted_right(a, b) if isinstance(a, Bits) else _shift_right(a & 0xFFFFFFFF if static(a) else a, b)
     ),
-    "BitwiseOr": _integer(operator.or_, None),
-    "BitwiseXor": _integer(operator.xor, None),
-    "BitwiseAnd": _integer(operator.and_, None),
+    "BitwiseOr": _bitwise(operator.or_, joined),
+    "BitwiseXor": _bitwise(operator.xor, flipped),
+    "BitwiseAnd": _bitwise(operator.and_, masked),
     "Not": _integer(operator.invert, None),
     "ConvertFToI": to_integer,
 }

@@ -1,7 +1,8 @@
-"""The bits of numbers that vary, as far as logarithms and powers of two need them: the exponent, read and written.
+"""The bits of numbers that vary, as far as logarithms, powers of two and signs need them.
 
-(floatBitsToInt(x) >> 23) - 127        floor(log2 |x|)
-intBitsToFloat((e + 127) << 23)        2^e
+(floatBitsToInt(x) >> 23) - 127                                             floor(log2 |x|)
+intBitsToFloat((e + 127) << 23)                                             2^e
+uintBitsToFloat((bits(x) & 0x7FFFFFFF) | (bits(y) & 0x80000000))            copysign(x, y); likewise with ^
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from .values import UNDEFINED, Bits, Value, numeric, refuse, static, wrapped
 
 MANTISSA = 23  # bits
 BIAS = 127
+SIGN, MAGNITUDE = 0x80000000, 0x7FFFFFFF
 
 
 def cast(value: Value, kind: str) -> Value:
@@ -26,6 +28,8 @@ def cast(value: Value, kind: str) -> Value:
             return float(struct.unpack("<f", words)[0])
         return int(struct.unpack("<i" if kind == "int" else "<I", words)[0])
     if isinstance(value, Bits):
+        if value.part == "sign" and kind == "float":
+            return ops.copysign(0.0 * value.number, value.number)
         if kind != "float" or value.number is not None:
             return value.number if kind == "float" else value
         return _power_of_two(value.exponent - float(BIAS))
@@ -47,7 +51,7 @@ def _power_of_two(e: Value) -> Value:
 
 def shifted_right(value: Bits, count: Value) -> Value:
     """Sign and exponent, of the bits of a float shifted by 23."""
-    if value.number is None or count != MANTISSA:
+    if value.number is None or value.part == "sign" or count != MANTISSA:
         raise refuse("a bit operation on an integer that varies", "compute with floats")
     size = ops.abs(value.number)
     guess = ops.floor(ops.log(size) * (1.0 / math.log(2.0)))
@@ -62,3 +66,40 @@ def shifted_left(value: Value, count: Value) -> Value:
     if isinstance(value, Bits) or count != MANTISSA:
         raise refuse("a bit operation on an integer that varies", "compute with floats")
     return Bits(None, numeric(value))
+
+
+def masked(a: Value, b: Value) -> Value:
+    """a & b, of which one is the bits of a float: its sign or its magnitude."""
+    bits, mask = (a, b) if isinstance(a, Bits) else (b, a)
+    word = 0 if isinstance(mask, Bits) or not static(mask) else wrapped(int(mask), False)
+    if bits.number is None or bits.part == "sign" or word not in (SIGN, MAGNITUDE):
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
+    return Bits(bits.number, None, "sign") if word == SIGN else Bits(ops.abs(bits.number), None, "magnitude")
+
+
+def joined(a: Value, b: Value) -> Value:
+    """a | b of a magnitude and a sign."""
+    size: Value
+    size, sign = (b, a) if isinstance(a, Bits) and a.part == "sign" else (a, b)
+    if not isinstance(sign, Bits) or sign.part != "sign":
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
+    if not isinstance(size, Bits) and static(size) and wrapped(int(size), False) < SIGN:
+        size = Bits(float(cast(int(size), "float")), None, "magnitude")
+    if not isinstance(size, Bits) or size.part != "magnitude":
+        raise refuse("a bit operation on an integer that varies", "compute with floats")
+    number = ops.abs(sign.number) * 0.0 + size.number if static(size.number) else size.number
+    return Bits(ops.copysign(number, sign.number), None)
+
+
+def flipped(a: Value, b: Value) -> Value:
+    """a ^ b of a float's bits and a sign."""
+    bits, sign = (b, a) if isinstance(a, Bits) and a.part == "sign" else (a, b)
+    if static(bits):
+        bits, sign = sign, bits
+    if isinstance(bits, Bits) and bits.number is not None and bits.part != "sign":
+        if isinstance(sign, Bits):
+            if sign.part == "sign":
+                return Bits(bits.number * ops.copysign(0.0 * sign.number + 1.0, sign.number), None)
+        elif static(sign) and wrapped(int(sign), False) == SIGN:
+            return Bits(-bits.number, None)
+    raise refuse("a bit operation on an integer that varies", "compute with floats")

@@ -26,12 +26,15 @@ class Undefined:
 
 
 class Bits:
-    """The bits of a float that varies as an integer: of `number`, or of the power of two with a biased exponent."""
+    """The bits of a float that varies as an integer: of `number`, or of the power of two with a biased exponent.
 
-    __slots__ = ("exponent", "number")
+    part  "magnitude" if the sign is known to be 0, "sign" if only the sign of `number` is left
+    """
 
-    def __init__(self, number: Value, exponent: Value) -> None:
-        self.number, self.exponent = number, exponent
+    __slots__ = ("exponent", "number", "part")
+
+    def __init__(self, number: Value, exponent: Value, part: str = "") -> None:
+        self.number, self.exponent, self.part = number, exponent, part
 
 
 UNDEFINED: Final = Undefined()
