@@ -86,7 +86,7 @@ def _files(item: Item) -> list[Path]:
         return []
     paths = [path for text in (item.target, *item.settings) for path in outside.files_in(text)]
     if (shader := shaders.file_in(item.target)) is not None and shader.is_file():
-        shaders.class_of(str(shader))
+        shaders.class_of(shaders.head_in(item.target))
         return sorted({*paths, *shaders.files_read(shader)})
     return [path for path in [*paths, Path(item.target)] if path.suffix in (".py", ".xml", ".json") and path.is_file()]
 

@@ -96,6 +96,7 @@ def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
     from ...viewer import stage
 
     accepted = {*operands.MATERIALS, *([operands.Kind.SCENE] if len(target) == 1 else [])}
+    target = made.shaders(target)
     kinds = [operands.kind_of(one, accepted, "MODEL") for one in target]
     settings = made.settings()
     if kinds == [operands.Kind.SCENE]:

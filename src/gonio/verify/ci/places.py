@@ -31,8 +31,8 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
-        if shaders.names_shader(shader := card.subject.target.partition("(")[0]):
-            return Place(_relative(Path(os.path.expanduser(shader))), _function_line(shader))
+        if (shader := shaders.file_in(card.subject.target)) is not None:
+            return Place(_relative(shader), _function_line(shaders.head_in(card.subject.target)))
         known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
         return Place(_relative(file), 1) if known else None
     file = Path(os.path.expanduser(named["file"]))
@@ -95,7 +95,7 @@ def _function_line(shader: str) -> int:
     try:
         cls: Any = shaders.class_of(shader)
         name = cls.program.adapter.function
-        text = Path(os.path.expanduser(shader)).read_text(encoding="utf-8", errors="replace")
+        text = Path(os.path.expanduser(shaders.parted(shader)[0])).read_text(encoding="utf-8", errors="replace")
     except (GonioError, OSError):
         return 1
     lines = enumerate(text.splitlines(), 1)
