@@ -46,6 +46,8 @@ MEANINGS = {
     "l.v": "cosine of light and view",
     "u": "three random numbers, of `sample`",
     "derived": "what the function `derive` returns for the parameters",
+    "result": "where a function without a value writes it, as `out vec3 color`",
+    "ignored": "written by the function besides its value, and not read",
     "parameter": "a parameter of the material; of a struct every member is one",
 }
 # names of arguments, in lower case and without prefixes, to their meaning

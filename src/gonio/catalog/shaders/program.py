@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ...errors import InputError
 from ...spirv import Machine, Module
 from ...spirv.arithmetic import elementwise
+from ...spirv.composites import Cell, Pointer
 from ...spirv.images import Texture
 from ...spirv.module import UNIFORM, Function
 from ...spirv.replay import Replayed
@@ -56,6 +57,11 @@ class Program:
                 raise InputError(f"{what}'{_title(module, function)}'", f"{stated}: {key}", "one meaning per argument")
             if "derived" in arguments and (not self.adapter.derive or name == "derive"):
                 raise InputError("'derived' without a function", f"{stated}: {key}", "derive = 'NAME'")
+            places = [type for (_, type), one in zip(function.parameters, arguments, strict=True) if one == "result"]
+            if len(places) > 1 or any(module.type(one).kind != "pointer" for one in places):
+                raise InputError(
+                    "'result' for what the function does not write", f"{stated}: {key}", "an `out` argument"
+                )
         declared = {one.name: one for one in self._declared()}
         self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
 
@@ -136,7 +142,12 @@ class Program:
         if "derived" in meanings:
             derive, of_parameters = self.formulas["derive"]
             given["derived"] = machine.call(derive, self._given(derive, of_parameters, values, directions))
-        return machine.call(function, self._given(function, meanings, values, given))
+        if "result" not in meanings:
+            return machine.call(function, self._given(function, meanings, values, given))
+        place = function.parameters[meanings.index("result")][1]
+        cell = Cell(self.module.zero(self.module.type(place).parts[0]))
+        machine.call(function, self._given(function, meanings, values, {**given, "result": Pointer(cell)}))
+        return cell.value
 
     def _given(
         self, function: Function, meanings: Sequence[str], values: dict[str, Value], given: dict[str, Value]
@@ -149,6 +160,9 @@ class Program:
     def _argument(
         self, type: int, meaning: str, name: str, values: dict[str, Value], directions: dict[str, Value]
     ) -> Value:
+        if meaning == "ignored":
+            kind = self.module.type(type)
+            return self.module.zero(kind.parts[0] if kind.kind == "pointer" else type)
         if meaning != "parameter":
             value = _GIVEN[meaning](directions)
             kind = self.module.type(type)
@@ -218,6 +232,7 @@ _GIVEN: dict[str, Callable[[dict[str, Value]], Any]] = {
     "l.v": lambda given: _cosine(given["light"], given["view"]),
     "u": lambda given: given["u"],
     "derived": lambda given: given["derived"],
+    "result": lambda given: given["result"],
 }
 
 
@@ -264,7 +279,11 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
     derived  whether an argument of that name is what the adapter's function `derive` returns
     """
     result = []
+    written = _written(module, function)
     for id, type in function.parameters:
+        if id in written:
+            result.append("result" if id == written[-1] and module.shape(function.type) == "void" else "ignored")
+            continue
         if derived and module.names.get(id, "") == "derived":
             result.append("derived")
             continue
@@ -275,6 +294,23 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
     return tuple(result)
 
 
+def _written(module: Module, function: Function) -> list[int]:
+    """The parameters that a function writes before it reads them, as `out` ones: colors and numbers."""
+    first: dict[int, bool] = {id: False for id, type in function.parameters if module.type(type).kind == "pointer"}
+    pending, owner = set(first), {id: id for id in first}
+    for block in function.blocks.values():
+        for one in block.instructions:
+            if one.name == "AccessChain" and one.operands[0] in owner:
+                owner[one.result] = owner[one.operands[0]]
+                continue
+            for place, operand in enumerate(one.operands):
+                if operand in owner and owner[operand] in pending:
+                    pending.discard(owner[operand])
+                    first[owner[operand]] = one.name == "Store" and place == 0
+    shapes = {id: module.shape(type) for id, type in function.parameters}
+    return [id for id, is_out in first.items() if is_out and shapes[id] in ("float", "vec3", "vec4")]
+
+
 def _rank(module: Module, function: Function) -> tuple[int, int]:
     """How much a function looks like a BRDF: by its name, and by the directions among its arguments."""
     name = _title(module, function).lower()
@@ -283,8 +319,7 @@ def _rank(module: Module, function: Function) -> tuple[int, int]:
     meanings = _meanings(module, function)
     directions = sum(one in ("light", "view", "normal", "half", "n.l", "n.v", "incident") for one in meanings)
     both = ("light" in meanings and "view" in meanings) or ("n.l" in meanings and "n.v" in meanings)
-    result = module.shape(function.type)
-    usable = both and result in ("vec3", "float", "vec4")
+    usable = both and (module.shape(function.type) in ("vec3", "float", "vec4") or "result" in meanings)
     return (exact.get(name, near) if usable else -1), directions
 
 

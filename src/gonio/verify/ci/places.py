@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...catalog import shaders
 from ...errors import GonioError
-from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Verdict
+from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Unread, Verdict
 
 _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
@@ -41,6 +41,15 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
             if match["file"] == file.name:
                 return Place(_relative(file), int(match["line"]))
     return Place(_relative(file), _class_line(file, named["name"]))
+
+
+def of_unread(unread: Unread) -> Place | None:
+    """The line that an error of reading names, else the first of the shader's file."""
+    file = shaders.file_in(unread.target)
+    if file is None:
+        return None
+    line = re.fullmatch(rf"(?:.*[/\\])?{re.escape(file.name)}:(\d+).*", unread.where)
+    return Place(_relative(file), int(line[1]) if line else 1)
 
 
 def level(verdict: Verdict) -> str:
@@ -111,4 +120,4 @@ def _class_line(file: Path, name: str) -> int:
     return next((n.lineno for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name == name), 1)
 
 
-__all__ = ["Place", "cause", "grade", "level", "of", "words"]
+__all__ = ["Place", "cause", "grade", "level", "of", "of_unread", "words"]
