@@ -21,6 +21,7 @@ filter = "linear"
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -267,12 +268,19 @@ def _uniform(name: str, value: object, where: str, over: Uniform) -> Uniform:
     if value.get("kind", "") not in UNIFORMS:
         raise InputError(f"parameters.{name}: unknown kind '{value['kind']}'", where, ", ".join(UNIFORMS[1:]))
     made = replace(over, **{**value, "default": over.default if default is None else _plain(default)})
-    low, high = made.low, made.high
-    outside = [one for one in numbers if (low is not None and one < low) or (high is not None and one > high)]
-    if outside or (low is not None and high is not None and low > high):
-        what = f"parameters.{name}: default = {default!r:.40}, low = {low}, high = {high}"
-        raise InputError(what, where, "the default lies between low and high")
+    check_range(name, made, where)
     return made
+
+
+def check_range(name: str, uniform: Uniform, where: str) -> None:
+    """Raise InputError for a default outside the range, and for an empty range."""
+    low = -math.inf if uniform.low is None else uniform.low
+    high = math.inf if uniform.high is None else uniform.high
+    default = uniform.default
+    numbers = default if isinstance(default, tuple) else () if default is None else (default,)
+    if low > high or not all(low <= one <= high for one in numbers):
+        what = f"parameters.{name}: default = {default!r:.40}, low = {uniform.low}, high = {uniform.high}"
+        raise InputError(what, where, "the default lies between low and high")
 
 
 UNIFORMS = ("", "alpha", "angle", "fixed")

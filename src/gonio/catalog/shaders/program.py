@@ -17,7 +17,7 @@ from ...spirv.module import UNIFORM, Function
 from ...spirv.replay import Replayed
 from ...spirv.standard import normalize
 from ...spirv.values import Value, leaves, numeric
-from .adapter import Adapter, Uniform, meaning_of
+from .adapter import Adapter, Uniform, check_range, meaning_of
 
 
 class Declared(NamedTuple):
@@ -78,6 +78,7 @@ class Program:
                 uniform = self._stated(name) or Uniform()
                 if uniform.default is None and name in self.module.defaults:
                     uniform = replace(uniform, default=self.module.defaults[name])
+                    check_range(name, uniform, self.adapter.where or self.where)
                 yield Declared(name, shape, uniform)
         unknown = [name for name in self.adapter.parameters if not {name, name.removesuffix("_")} & names]
         if unknown:
@@ -282,7 +283,7 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
     written = _written(module, function)
     for id, type in function.parameters:
         if id in written:
-            result.append("result" if id == written[-1] and module.shape(function.type) == "void" else "ignored")
+            result.append("result" if id == written[0] and module.shape(function.type) == "void" else "ignored")
             continue
         if derived and module.names.get(id, "") == "derived":
             result.append("derived")
@@ -295,7 +296,7 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
 
 
 def _written(module: Module, function: Function) -> list[int]:
-    """The parameters that a function writes before it reads them, as `out` ones: colors and numbers."""
+    """The parameters that a function writes before it reads them, as `out` ones: colors, then numbers."""
     first: dict[int, bool] = {id: False for id, type in function.parameters if module.type(type).kind == "pointer"}
     pending, owner = set(first), {id: id for id in first}
     for block in function.blocks.values():
@@ -308,7 +309,7 @@ def _written(module: Module, function: Function) -> list[int]:
                     pending.discard(owner[operand])
                     first[owner[operand]] = one.name == "Store" and place == 0
     shapes = {id: module.shape(type) for id, type in function.parameters}
-    return [id for id, is_out in first.items() if is_out and shapes[id] in ("float", "vec3", "vec4")]
+    return [id for kind in ("vec3", "vec4", "float") for id, is_out in first.items() if is_out and shapes[id] == kind]
 
 
 def _rank(module: Module, function: Function) -> tuple[int, int]:
