@@ -84,6 +84,7 @@ def _homework(target: Sequence[str] | None, made: Material) -> Stage:
     """The homework's rows. Raises InputError for anything named besides."""
     from ...viewer import stage
 
+    made.shaders(())
     if target or made.settings():
         what = f"--homework and {target[0]} together" if target else "--homework with parameters"
         raise InputError(what, "--homework", "leave one of them out; the page's sliders change all values")
