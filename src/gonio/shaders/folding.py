@@ -20,19 +20,19 @@ def folded(recorded: graph.Graph, values: Mapping[str, Any]) -> dict[graph.Node,
     values  by the name of the entry's parameter, "self.alpha": a number, or a list of components
     """
     known: dict[graph.Node, Any] = {}
-    met: dict[graph.Function, list[Any]] = {}  # by callee, its arguments that are the same in all calls so far
+    agreed: dict[graph.Function, list[Any]] = {}  # by callee, its arguments that are the same in all calls so far
     entry = recorded.functions[-1]
     for node in _parameters(entry):
         if node.static in values:
             known[node] = np.reshape(np.asarray(values[node.static], float), (-1, 1) if node.type != "float" else (1,))
     for function in reversed(recorded.functions):  # callers come before callees
-        for node, value in zip(_parameters(function), met.get(function, ()), strict=False):
+        for node, value in zip(_parameters(function), agreed.get(function, ()), strict=False):
             if value is not None:
                 known[node] = value
         for node in function.nodes:
             arguments = [known.get(one) if isinstance(one, graph.Node) else one for one in node.args]
             if node.op == "call":
-                _meet(met, node.static, arguments)
+                _agree(agreed, node.static, arguments)
             with np.errstate(all="ignore"):
                 value = _value(node, arguments, known)
             if value is not None:
@@ -45,10 +45,10 @@ def _parameters(function: graph.Function) -> list[graph.Node]:
     return [node for node in function.nodes if node.op == "parameter"]
 
 
-def _meet(met: dict[graph.Function, list[Any]], callee: graph.Function, arguments: list[Any]) -> None:
+def _agree(agreed: dict[graph.Function, list[Any]], callee: graph.Function, arguments: list[Any]) -> None:
     """Keep the arguments that are the same in this call as in those before."""
-    pairs = zip(met.get(callee, arguments), arguments, strict=True)
-    met[callee] = [a if a is not None and b is not None and np.array_equal(a, b) else None for a, b in pairs]
+    pairs = zip(agreed.get(callee, arguments), arguments, strict=True)
+    agreed[callee] = [a if a is not None and b is not None and np.array_equal(a, b) else None for a, b in pairs]
 
 
 def _value(node: graph.Node, arguments: list[Any], known: Mapping[graph.Node, Any]) -> Any:

@@ -66,8 +66,8 @@ class Routines:
     derives: str = ""  # name of the routine that computes derived values
 
     def __init__(self, graph_of_all: graph.Graph, single: bool, values: Mapping[str, object] | None = None) -> None:
-        found = folded(graph_of_all, {f"self.{path}": one for path, one in values.items()}) if values else {}
-        simplified = routines(graph_of_all, guarded=not single, folded=found)
+        numbers = folded(graph_of_all, {f"self.{path}": one for path, one in values.items()}) if values else {}
+        simplified = routines(graph_of_all, guarded=not single, folded=numbers)
         self.driver = simplified.pop()
         functions_of = dict(zip((r.name for r in simplified), graph_of_all.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
