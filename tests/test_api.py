@@ -34,7 +34,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "verify": verify,
 }
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
-TEXT = {"param", "preset", "as_json"}
+TEXT = {"param", "preset", "define", "adapter", "as_json"}
 CREW = {"workers", "cluster"}  # in a program: with go.cluster(...)
 ONLY_TYPED = {
     "verify": {"at", "github"},

@@ -97,7 +97,7 @@ def build(named: Settings) -> BSDF:
 def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
     """Whether a material of a class has a parameter, by its path; `given` are its settings, as for `made`."""
     name, dot, rest = path.partition(".")
-    parameter = cls.parameters().get(name)
+    parameter = cls.parameters().get(_own_name(cls.parameters(), name))
     if name in WIDTHS and parameter is None and "alpha" in cls.parameters():
         return True
     if parameter is None or not dot:
@@ -169,11 +169,16 @@ def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, 
         raise InputError(f"{cls.__name__} cannot be constructed: {type(error).__name__}: {error}", "TARGET") from None
 
 
+def _own_name(known: Mapping[str, Parameter], name: str) -> str:
+    """The name of a parameter: with the underscore that it has where materials have a member of that name."""
+    return f"{name}_" if name not in known and f"{name}_" in known else name
+
+
 def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
     """The settings of a material itself, and of each inner material, by parameter. Raises InputError for unknown
     names."""
     known = cls.parameters()
-    given = with_pair(known, given, "--param")
+    given = with_pair(known, {_own_name(known, name): value for name, value in given.items()}, "--param")
     own: dict[str, object] = {}
     below: dict[str, dict[str, object]] = {}
     for path, value in given.items():

@@ -90,7 +90,8 @@ def _named(work: Work) -> BSDF:
     head, own = notation.split(work.text)
     if not shaders.names_shader(head):
         raise InputError(f"--function given, and '{head}' is no shader", "--function", "leave it out")
-    return notation.made(shaders.class_of(head, function=work.function), texts.assignments(own))[0]
+    named = shaders.with_options(head, [("function", work.function)])
+    return notation.made(shaders.class_of(named), texts.assignments(own))[0]
 
 
 def _rows(work: Work) -> Finding:

@@ -83,7 +83,39 @@ class Trust(Options):
     allow_code: Code = False
 
 
-class Material(Options):
+class Reading(Options):
+    """How shaders that are named on the command line are read."""
+
+    define: Annotated[
+        list[str] | None,
+        Option("--define", "-D", metavar="NAME=VALUE", help="Set a macro or override of a shader; repeatable."),
+    ] = None
+    adapter: Annotated[
+        list[str] | None,
+        Option(metavar="KEY=VALUE", help="Set an entry of a shader's adapter, such as function=BRDF; repeatable."),
+    ] = None
+
+    def shaders(self, texts: Sequence[str]) -> list[str]:
+        """The materials, with `define` and `adapter` as a part of the name of each that is a shader. Raises InputError
+        if these are given and there is none."""
+        from ..catalog import shaders
+        from ..errors import InputError
+
+        options = [shaders.option(one, "--adapter") for one in self.adapter or ()]
+        options += [shaders.option(one, "-D", "defines.") for one in self.define or ()]
+        heads = [shaders.head_in(one) for one in texts]
+        if options and not any(heads):
+            hint = f"name one, such as my.glsl ({', '.join(shaders.SUFFIXES)})"
+            raise InputError("a macro or an adapter's entry given, and no shader", "-D, --adapter", hint)
+        if not options:
+            return list(texts)
+        return [
+            shaders.with_options(head, options) + one.strip()[len(head) :] if head else one
+            for one, head in zip(texts, heads, strict=True)
+        ]
+
+
+class Material(Reading):
     """Parameters and preset of the materials that are named on the command line."""
 
     param: Annotated[
@@ -103,6 +135,7 @@ class Material(Options):
 
         for one in models:
             operands.kind_of(one, accepted or operands.MATERIALS, "MODEL")
+        models = self.shaders(models)
         settings = self.settings()
         if not settings:
             return list(models)
@@ -124,6 +157,7 @@ class Material(Options):
         """Raise InputError if parameters are given without a material."""
         from ..errors import InputError
 
+        self.shaders(())
         if self.settings():
             what = f"parameters of a material given, and '{target}' is none"
             raise InputError(what, "--param", "name a material, such as conductor, or leave the parameters out")
@@ -134,7 +168,7 @@ class Material(Options):
         from ..catalog import notation, operands
 
         if operands.kind_of(scene, {operands.Kind.SCENE, *operands.MATERIALS}, "SCENE") in operands.MATERIALS:
-            cls, own = notation.taken_apart(scene, allow_code=allow_code)
+            cls, own = notation.taken_apart(self.shaders([scene])[0], allow_code=allow_code)
             return cls, {**own, **dict(map(notation.assignment, self.settings()))}
         self.refuse(scene)
         return None
@@ -161,6 +195,7 @@ class Fitting(Material):
 
     def models(self, names: Sequence[str]) -> list[str]:
         """The models as texts, with the preset where one is given. Raises InputError for a preset of a sum."""
+        names = self.shaders(names)
         if not self.preset:
             return list(names)
         from ..errors import InputError

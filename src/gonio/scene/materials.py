@@ -561,10 +561,11 @@ def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart
         raise invalid("a shader without a 'file'", 'such as {"type": "shader", "file": "my.glsl"}', "file")
     folder, anywhere = context.get("folder", Path()), context.get("allow_outside", False)
     try:
-        path = located(file, folder, "", anywhere)
+        name, options = shaders.parted(file)
+        path = located(name, folder, "", anywhere)
         if not shaders.names_shader(str(path)):
             raise InputError(f"'{file}' is no shader by its name", "", ", ".join(shaders.SUFFIXES))
-        model: Any = shaders.class_of(str(path), None if anywhere else folder)
+        model: Any = shaders.class_of(f"{path}?{options}" if options else str(path), None if anywhere else folder)
     except GonioError as error:
         raise invalid(f"{error.where}: {error.what}" if error.where else error.what, error.hint, "file") from None
     return _own_part(SHADER, model).model_validate(value, context=context)

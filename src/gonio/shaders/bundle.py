@@ -63,6 +63,7 @@ def bundle(
     lean: bool = False,
     on: Collection[str] = (),
     constants: bool = False,
+    fold: bool = False,
     arrays: bool = True,
     placement: Placement | None = None,
 ) -> Bundle:
@@ -78,8 +79,8 @@ def bundle(
     if not models:
         raise InputError("no material given", "emit", "name at least one, such as conductor")
     if language.standalone:
-        return _file(models, language, functions, lean, place)
-    sources = [_recorded(one, functions, lean, on, arrays=arrays) for one in models]
+        return _file(models, language, functions, lean, place, fold)
+    sources = [_recorded(one, functions, lean, on, arrays=arrays, fold=fold) for one in models]
     module = Module(language, place, constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
     text = texts.joined(module.head, module.blocks, language, place.prefix)
@@ -88,7 +89,12 @@ def bundle(
 
 
 def _file(
-    models: Sequence[MaterialLike], language: Language, functions: Sequence[str], lean: bool, place: Placement
+    models: Sequence[MaterialLike],
+    language: Language,
+    functions: Sequence[str],
+    lean: bool,
+    place: Placement,
+    fold: bool,
 ) -> Bundle:
     """A file that runs by itself, which holds its tables."""
     if place.prefix or place.first_binding or place.tables or place.half:
@@ -97,7 +103,7 @@ def _file(
     if len(models) != 1:
         what = f"{len(models)} materials given, and a file in {language.name} holds one"
         raise InputError(what, "emit: lang", "write a file for each")
-    made, numbers = _recorded(models[0], functions, lean, (), single=False)
+    made, numbers = _recorded(models[0], functions, lean, (), single=False, fold=fold)
     names = Names(made, language)
     text = python_file(made, names, numbers)
     described = manifest(made, names, numbers, {id(table): 0 for table in made.tables})
@@ -111,6 +117,7 @@ def _recorded(
     on: Collection[str],
     single: bool = True,
     arrays: bool = True,
+    fold: bool = False,
 ) -> tuple[Program, dict[str, Json]]:
     """The parts of a material's shader, and the values of its numeric parameters by path."""
     model = material(model)
@@ -118,6 +125,6 @@ def _recorded(
     numbers = dict(numbers_of(model))  # raises for arrays of materials
     try:
         without = [path for path in switched_off(model) if path not in on] if lean else ()
-        return Program(model, functions, without, single, arrays), numbers
+        return Program(model, functions, without, single, arrays, numbers if fold else None), numbers
     except graph.RecordingError as error:
         raise InputError(f"it cannot be written as shader code: {error.what}", error.where, error.hint) from error

@@ -24,6 +24,7 @@ class Choice:
     functions: str | Sequence[str]
     lean: bool = False
     constants: bool = False
+    fold: bool = False
     fit: str = ""
     ibl: bool = False
     budget: int = 0
@@ -39,8 +40,9 @@ class Choice:
             raise InputError(
                 what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
             )
-        if (self.lean or self.constants) and (self.fit or self.ibl):
-            what = f"{'--lean' if self.lean else '--constants'} with {'--fit' if self.fit else '--ibl'}"
+        if (self.lean or self.constants or self.fold) and (self.fit or self.ibl):
+            given = "--lean" if self.lean else "--constants" if self.constants else "--fold"
+            what = f"{given} with {'--fit' if self.fit else '--ibl'}"
             raise InputError(what, "emit", "it goes with whole materials")
 
 
@@ -53,6 +55,7 @@ def emit(
     *,
     lean: bool = False,
     constants: bool = False,
+    fold: bool = False,
     fit: str = "",
     ibl: bool = False,
     budget: int = 0,
@@ -69,6 +72,8 @@ def emit(
     lean           omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not
                    a field. An eighth of the text of a default `openpbr` remains
     constants      also write the material's own values, as a constant of its struct: Conductor_values
+    fold           put the material's own values into the code: what depends on them alone is a number there, and the
+                   functions keep the argument of the struct, but do not read it
     prefix         begins all global names, so that shaders written apart fit into one module
     group          of the bindings of tables: WGSL's @group, HLSL's register space
     first_binding  number of the first table's binding
@@ -82,7 +87,7 @@ def emit(
     Raises InputError for a stochastic material (RandomWalk), which has no shader code, and where `fit`, `ibl` and
     `budget` exclude each other.
     """
-    given = Choice(functions, lean, constants, fit, ibl, budget)
+    given = Choice(functions, lean, constants, fold, fit, ibl, budget)
     return shader(model, lang, given, Placement(**placement))[0].text
 
 
@@ -106,7 +111,8 @@ def shader(
         several = [cheapest]
         lines = [str(tier) for tier in chosen]
     members = [material(one) for one in several]
-    made = bundle(members, lang, choice.functions, lean=choice.lean, constants=choice.constants, placement=placement)
+    lean, constants, fold = choice.lean, choice.constants, choice.fold
+    made = bundle(members, lang, choice.functions, lean=lean, constants=constants, fold=fold, placement=placement)
     if placement.half:
         made = bounded(made, members)
     return made, lines

@@ -84,7 +84,7 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
             {"name": name, "type": type_, "doc": TERMS.get(name, "")}
             for name, type_ in (terms.record.fields if terms and terms.record else [])
         ],
-        "parameters": list(_parameters(model, set(struct.paths))),
+        "parameters": list(_parameters(model, set(struct.paths), made.folds)),
         "textures": [texture(table, names, bindings) for table in made.tables],
         "transmits": bool(facts.transmits),
         "delta": facts.delta,
@@ -127,7 +127,7 @@ TERMS = {
 }
 
 
-def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
+def _parameters(model: BSDF, fields: set[str], folds: bool) -> Iterator[dict[str, Json]]:
     fixed = model.fixed
     for path, parameter, value, _ in tree.surface(model):
         yield {
@@ -143,7 +143,7 @@ def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
             "choices": parameter.choices,
             "field": programs.flat(path) if path in fields else None,
             "off": parameter.off,
-            "fixed": path in fixed,
+            "fixed": path in fixed or (folds and path in fields),
         }
 
 

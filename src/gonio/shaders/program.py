@@ -10,13 +10,14 @@ from __future__ import annotations
 import functools
 import inspect
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from .. import ops
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, binding, recording, tree
 from ..ops import Direction, graph
 from ..ops.table import Table
+from .folding import folded
 from .polyfills import POLYFILLS
 from .simplify import routines
 from .values import Record, Routine, Value, shape
@@ -64,8 +65,9 @@ class Routines:
     arrays: bool = True
     derives: str = ""  # name of the routine that computes derived values
 
-    def __init__(self, graph_of_all: graph.Graph, single: bool) -> None:
-        simplified = routines(graph_of_all, guarded=not single)
+    def __init__(self, graph_of_all: graph.Graph, single: bool, values: Mapping[str, object] | None = None) -> None:
+        numbers = folded(graph_of_all, {f"self.{path}": one for path, one in values.items()}) if values else {}
+        simplified = routines(graph_of_all, guarded=not single, folded=numbers)
         self.driver = simplified.pop()
         functions_of = dict(zip((r.name for r in simplified), graph_of_all.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in simplified}
@@ -153,6 +155,7 @@ class Program(Routines):
     structs   of parameters, derived values and results, in order of use
     without   paths of parameters that are off and shape the code
     single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
+    values    of the parameters, by path, where they are folded into the code; `folds` says so
     """
 
     bound: BSDF
@@ -164,10 +167,12 @@ class Program(Routines):
         without: Sequence[str] = (),
         single: bool = True,
         arrays: bool = True,
+        values: Mapping[str, object] | None = None,
     ) -> None:
+        self.folds = values is not None
         self.model, self.without, self.arrays = model, tuple(without), arrays
         self.bound = recording.symbols(model, self.without)
-        super().__init__(recorded(self.bound, functions, single), single)
+        super().__init__(recorded(self.bound, functions, single), single, values)
         stem = graph.class_name(model)
         self.derives = f"{stem}_derive"
         for routine in self.routines:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
+from ..catalog.shaders.program import of_struct
 from ..errors import InputError
 from ..material import BSDF, recording
 from ..ops import graph
@@ -168,18 +169,10 @@ def _one(module: Module, made: Bundle, method: str) -> Function:
     name = made.manifest["functions"][method]
     candidates = module.function(name)
     if len(candidates) > 1:
-        candidates = [one for one in candidates if _first(module, one) == made.manifest["struct"]]
+        candidates = of_struct(module, name, made.manifest["struct"])
     if len(candidates) != 1:
         raise InputError(f"{len(candidates)} functions '{name}' in the text", "shader")
     return candidates[0]
-
-
-def _first(module: Module, function: Function) -> str:
-    """The name of the type of a function's first parameter, as far as it is a struct."""
-    type_ = function.parameters[0][1] if function.parameters else 0
-    if type_ and module.type(type_).kind == "pointer":
-        type_ = module.type(type_).parts[0]
-    return module.names.get(type_, "")
 
 
 def _called(

@@ -8,31 +8,42 @@ a / where(b == 0, 1, b))` becomes a quotient that is selected only where b is no
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..ops import graph
 from ..ops.table import Table
+from .folding import Numbers
 from .source import module_constant
 from .values import COMPARE, ELEMENTWISE, LOGIC, SIZES, Kind, Routine, Static, Value, shape
 
 
-def routines(recorded: graph.Graph, guarded: bool = False) -> list[Routine]:
+def routines(
+    recorded: graph.Graph, guarded: bool = False, folded: Mapping[graph.Node, Numbers] | None = None
+) -> list[Routine]:
     """All functions of a recording, simplified, callees first.
 
+    folded   nodes that are numbers, as `folding.folded` finds them
     guarded  keep a selection inside another one by the same mask, which makes the gradient of the unused branch finite
     """
     known: dict[graph.Function, Routine] = {}
     for function in recorded.functions:
-        known[function] = _Simplifier(function, known, guarded).routine
+        known[function] = _Simplifier(function, known, guarded, folded or {}).routine
     return list(known.values())
 
 
 class _Simplifier:
     """Converts a recorded function into a simplified routine."""
 
-    def __init__(self, function: graph.Function, known: dict[graph.Function, Routine], guarded: bool) -> None:
-        self.known, self.guarded = known, guarded
+    def __init__(
+        self,
+        function: graph.Function,
+        known: dict[graph.Function, Routine],
+        guarded: bool,
+        folded: Mapping[graph.Node, Numbers],
+    ) -> None:
+        self.known, self.guarded, self.folded = known, guarded, folded
         self.table: dict[tuple, Value] = {}
         self.count = 0
         self.assumed: dict[tuple, Value] = {}
@@ -73,6 +84,11 @@ class _Simplifier:
         return value
 
     def convert(self, node: graph.Node) -> Value:
+        if node in self.folded:
+            if node.op == "parameter":
+                self.routine.parameters.append(self.make("parameter", shape(node.type), (), node.static))
+            numbers = tuple(map(self.constant, self.folded[node]))
+            return numbers[0] if len(numbers) == 1 else self.vector(numbers)
         args = tuple(
             self.values[a] if isinstance(a, graph.Node) else self.constant(a, source=node.source) for a in node.args
         )

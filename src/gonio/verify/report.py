@@ -7,10 +7,11 @@ import io
 from typing import TYPE_CHECKING
 
 from .._version import __version__
+from ..errors import InputError
 from . import statistics, terminal
 from .laws import chosen
 from .severity import Grade
-from .verdict import DECLARED, NOT_TRIED, Card, Verdict
+from .verdict import DECLARED, NOT_TRIED, Card, Unread, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,6 +32,7 @@ class Report:
     tests      statistical tests in the whole report
     threshold  p-value below which one of them rejects, by Sidak's correction
     mended     failures of the baseline that no longer occur, as text
+    unread     shaders that cannot be read, beside others that were judged
     """
 
     cards: list[Card]
@@ -40,16 +42,18 @@ class Report:
     threshold: float
     seconds: float = 0.0
     mended: list[str] = dataclasses.field(default_factory=list)
+    unread: list[Unread] = dataclasses.field(default_factory=list)
 
     @property
     def passed(self) -> bool:
-        return all(card.passed for card in self.cards)
+        return not self.unread and all(card.passed for card in self.cards)
 
     @property
     def exit_code(self) -> int:
-        """0 if nothing fails, 1 if something does, 4 if no picture shows any of the failures."""
-        if self.passed:
-            return 0
+        """0 if nothing fails, 1 if something does, 4 if no picture shows any of the failures, 2 if something is
+        unread."""
+        if self.unread or self.passed:
+            return InputError.code if self.unread else 0
         return 4 if all(verdict.grade is Grade.INVISIBLE for verdict in self.failures) else 1
 
     @property
@@ -80,17 +84,24 @@ class Report:
             "threshold": self.threshold,
             "seconds": round(self.seconds, 3),
             "mended": list(self.mended),
+            "unread": [one._asdict() for one in self.unread],
             "cards": [card.as_dict() for card in self.cards],
         }
 
     def show(self, console: Console) -> None:
         """Print a table per subject, then the explanation of each failure, and a summary."""
+        from rich.markup import escape
+
         for card in self.cards:
             terminal.show_card(card, console)
+        for one in self.unread:
+            console.print(f"[bold red]not read:[/] {escape(f'{one.target}: {one.words()}')}")
         for line in self.mended:
             console.print(f"fixed: {line}", markup=False)
         broken = len(self.failures)
         word = f"[green]{self._holding()}[/]" if not broken else f"[bold red]{broken} violated[/]"
+        if self.unread:
+            word = f"[bold red]{len(self.unread)} not read[/], {word}"
         if self.untried:
             word = " ".join(filter(None, [word, f"[bold yellow]{' and '.join(self.untried)} NOT TRIED[/]"]))
         tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (0.01 over all)"

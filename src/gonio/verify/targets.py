@@ -68,7 +68,9 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         return Subject(bsdf, cls.name, values)
     # The file documents its own values; the title shows those that were assigned in addition.
     assigned = {*(name.partition(".")[0] for name in given), *texts.assignments(inside)}
-    return Subject(bsdf, head, {name: value for name, value in values.items() if name in assigned})
+    return Subject(
+        bsdf, head, {name: value for name, value in values.items() if {name, name.removesuffix("_")} & assigned}
+    )
 
 
 # --------------------------------------------------------------------------- Mitsuba

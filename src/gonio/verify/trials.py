@@ -6,6 +6,7 @@ A part is therefore tested with the number of its own tests, and again if the di
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import shutil
 import tempfile
@@ -16,10 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..catalog import outside, shaders
+from ..errors import InputError
 from ..work import executor, facts, parts
 from ..work.kept import Arrays
 from .isolation import child
 from .report import Report, significance
+from .verdict import Unread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -47,12 +50,21 @@ def trial(
         if job.found and progress:
             progress(0, len(task.items), f"resuming a trial of which {job.found} parts are done")
         judged = _judged(task, range(len(task.items)), None, limit, memory, hashes, progress)
-        tests = sum(len(card.p_values) for cards in judged.values() for card in cards)
+        tests = sum(len(card.p_values) for cards in judged.values() for card in _cards(cards))
         threshold = significance(tests)
-        doubtful = [number for number, cards in judged.items() if not all(one.decided_by(threshold) for one in cards)]
+        unread = [one for ones in judged.values() for one in ones if isinstance(one, Unread)]
+        if len(unread) == len(judged):
+            raise InputError(unread[-1].what, unread[-1].where, unread[-1].hint)
+        doubtful = [
+            number for number, cards in judged.items() if not all(one.decided_by(threshold) for one in _cards(cards))
+        ]
         judged |= _judged(task, doubtful, threshold, limit, memory, hashes, progress)
-    cards = [card for number in sorted(judged) for card in judged[number]]
-    return Report(cards, task.seed, task.effort, tests, threshold, time.perf_counter() - began)
+    cards = [card for number in sorted(judged) for card in _cards(judged[number])]
+    return Report(cards, task.seed, task.effort, tests, threshold, time.perf_counter() - began, unread=unread)
+
+
+def _cards(judged: Sequence[Card | Unread]) -> list[Card]:
+    return [one for one in judged if not isinstance(one, Unread)]
 
 
 def _judged(
@@ -63,13 +75,13 @@ def _judged(
     memory: float | None,
     hashes: Mapping[str, str],
     progress: Progress | None,
-) -> dict[int, list[Card]]:
-    """The cards of some targets, by number."""
+) -> dict[int, list[Card | Unread]]:
+    """The cards of some targets, by number; of a shader that cannot be read the error."""
     ones = [task._replace(items=[task.items[number]]) for number in numbers]
     arguments = [(one, threshold, limit, memory, dict(hashes)) for one in ones]
     keys = [parts.key_of(one, threshold, sorted(hashes.items()), facts.code(), facts.versions()) for one in ones]
     files = {content: Path(name) for name, content in hashes.items()}
-    judged: dict[int, list[Card]] = {}
+    judged: dict[int, list[Card | Unread]] = {}
     for index, arrays in executor.each(part, arguments, keys, files):
         if index >= 0:
             # from the user's own folder, or from a worker that executes what it receives anyway
@@ -86,7 +98,8 @@ def _files(item: Item) -> list[Path]:
         return []
     paths = [path for text in (item.target, *item.settings) for path in outside.files_in(text)]
     if (shader := shaders.file_in(item.target)) is not None and shader.is_file():
-        shaders.class_of(str(shader))
+        with contextlib.suppress(InputError):  # its part reports it
+            shaders.class_of(shaders.head_in(item.target))
         return sorted({*paths, *shaders.files_read(shader)})
     return [path for path in [*paths, Path(item.target)] if path.suffix in (".py", ".xml", ".json") and path.is_file()]
 
@@ -103,5 +116,12 @@ def part(
                 shutil.copyfile(executor.file(content), copy)
                 settings = tuple(text.replace(name, str(copy)) for text in item.settings)
                 item = item._replace(target=item.target.replace(name, str(copy)), settings=settings)
-        report = child.trial(task._replace(items=[item]), limit=limit, memory=memory, threshold=threshold)
-    return {"cards": np.frombuffer(pickle.dumps(report.cards), np.uint8)}
+        cards: list[Card | Unread]
+        try:
+            report = child.trial(task._replace(items=[item]), limit=limit, memory=memory, threshold=threshold)
+            cards = [*report.cards]
+        except InputError as error:
+            if not isinstance(item.target, str) or not shaders.head_in(item.target):
+                raise
+            cards = [Unread(item.target, error.what, error.where, error.hint)]
+    return {"cards": np.frombuffer(pickle.dumps(cards), np.uint8)}

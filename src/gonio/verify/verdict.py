@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +131,23 @@ class Verdict:
         """All fields but the evidence; numbers that JSON cannot hold become null."""
         names = [field.name for field in dataclasses.fields(self) if field.name != "evidence"]
         return {name: _plain(getattr(self, name)) for name in names}
+
+
+class Unread(NamedTuple):
+    """A target among several that cannot be read, so that no law judges it, and the error.
+
+    where  the file and line, or what else the error names
+    """
+
+    target: str
+    what: str
+    where: str
+    hint: str
+
+    def words(self) -> str:
+        """The error in a line."""
+        place = f"{self.where}: " if self.where else ""
+        return f"{place}{self.what}" + (f" ({self.hint})" if self.hint else "")
 
 
 @dataclasses.dataclass

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING
 
 from .names import SUFFIXES as SUFFIXES
 from .names import file_in as file_in
+from .names import head_in as head_in
 from .names import names_shader as names_shader
+from .names import option as option
+from .names import parted as parted
+from .names import with_options as with_options
 
 if TYPE_CHECKING:
     from .adoption import adopt as adopt

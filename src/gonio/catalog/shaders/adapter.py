@@ -10,21 +10,22 @@ lossless_tolerance = 0.02               # the largest loss that is meant in a wh
 default = 0.5
 low = 0.0
 high = 1.0
-unit = ""
+unit = "nm"                             # as plots and sliders print it
 doc = "width of the lobe"
 
 [textures.table]
-file = "table.npy"                      # (rows, columns, channels); or .exr, .hdr, .png
+file = "table.npy"                      # (rows, columns, channels); or numbers without a header, .f32 and .f16
 wrap = "clamp"
 filter = "linear"
 """
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,9 @@ MEANINGS = {
     "l.h": "cosine of light and half vector",
     "l.v": "cosine of light and view",
     "u": "three random numbers, of `sample`",
+    "derived": "what the function `derive` returns for the parameters",
+    "result": "where a function without a value writes it, as `out vec3 color`",
+    "ignored": "written by the function besides its value, and not read",
     "parameter": "a parameter of the material; of a struct every member is one",
 }
 # names of arguments, in lower case and without prefixes, to their meaning
@@ -67,13 +71,17 @@ MAX_TOML = 1 << 18
 
 @dataclass(frozen=True)
 class Uniform:
-    """A parameter as the adapter describes it; absent entries leave what the shader says."""
+    """A parameter as the adapter describes it; absent entries leave what the shader says.
+
+    kind  of a vector of two: "alpha", widths along x and y; "angle", cosine and sine. "fixed" keeps the default
+    """
 
     default: Any = None
     low: float | None = None
     high: float | None = None
     unit: str = ""
     doc: str = ""
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -81,10 +89,13 @@ class Adapter:
     """The meaning of a shader, see the head of this file.
 
     pdf, sample  names of functions, "" for none; pdf_arguments, sample_arguments: their meanings
+    derive       the name of a function of the parameters alone, whose result is the argument "derived" of others
+    struct       the type of the first argument, by which overloads are told apart; only in what `gonio emit` wrote
     albedo       the name of a function that states the albedo for the view, "" for none, and its error that is meant
     lossless_tolerance  the loss that is meant in a white furnace, None makes no claim
     includes     folders, relative to the shader, from which it may include
     defines      macros
+    where        the file that says so, for errors
     """
 
     function: str = ""
@@ -94,6 +105,9 @@ class Adapter:
     pdf_arguments: tuple[str, ...] = ()
     sample: str = ""
     sample_arguments: tuple[str, ...] = ()
+    derive: str = ""
+    derive_arguments: tuple[str, ...] = ()
+    struct: str = ""
     albedo: str = ""
     albedo_arguments: tuple[str, ...] = ()
     albedo_tolerance: float = 0.01
@@ -104,7 +118,8 @@ class Adapter:
     includes: tuple[str, ...] = ()
     defines: Mapping[str, str] = field(default_factory=dict)
     parameters: Mapping[str, Uniform] = field(default_factory=dict)
-    textures: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    textures: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    where: str = ""
 
 
 def meaning_of(name: str) -> str:
@@ -121,63 +136,194 @@ def read(path: Path) -> Adapter:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"no adapter: {error}", str(path), "TOML as `gonio adopt` writes it") from None
-    kinds = {"function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
-             "sample_arguments": list, "transmits": bool, "language": str, "doc": str, "includes": list,
-             "defines": dict, "parameters": dict, "textures": dict, "albedo": str, "albedo_arguments": list,
-             "albedo_tolerance": float, "lossless_tolerance": float}  # fmt: skip
+    return parsed(content, str(path))
+
+
+KINDS: dict[str, type] = {
+    "function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
+    "sample_arguments": list, "derive": str, "derive_arguments": list, "struct": str, "transmits": bool,
+    "language": str, "doc": str, "includes": list, "defines": dict, "parameters": dict, "textures": dict,
+    "albedo": str, "albedo_arguments": list, "albedo_tolerance": float, "lossless_tolerance": float,
+}  # fmt: skip
+
+
+def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) -> Adapter:
+    """The adapter of the keys and values of a TOML file.
+
+    where  the file, for errors
+    over   an adapter whose entries hold where the content has none
+    Raises InputError, with what is accepted, for unknown keys and wrong types.
+    """
+    over = Adapter() if over is None else over
+    fields: dict[str, Any] = {"where": where}
     for key, value in content.items():
-        if key not in kinds:
-            raise InputError(f"unknown key '{key}'", str(path), did_you_mean(key, list(kinds)))
-        number = kinds[key] is float and isinstance(value, int | float) and not isinstance(value, bool)
-        if not number and not isinstance(value, kinds[key]):
-            what = f"{key} = {value!r:.40}, a {kinds[key].__name__} expected"
-            raise InputError(what, str(path), "see `gonio adopt FILE`")
+        if key not in KINDS:
+            raise InputError(f"unknown key '{key}'", where, did_you_mean(key, list(KINDS)))
+        number = KINDS[key] is float and isinstance(value, int | float) and not isinstance(value, bool)
+        if not number and not isinstance(value, KINDS[key]):
+            what = f"{key} = {value!r:.40}, a {KINDS[key].__name__} expected"
+            raise InputError(what, where, "see `gonio adopt FILE`")
         if isinstance(value, int | float) and number and not 0.0 <= value < 1.0:
-            raise InputError(f"{key} = {value!r:.40}", str(path), "a share of the light, 0 to 1")
-    for key in ("arguments", "pdf_arguments", "sample_arguments", "albedo_arguments"):
-        content[key] = tuple(_meaning(value, path) for value in content.get(key, ()))
-    content["includes"] = tuple(map(str, content.get("includes", ())))
-    content["defines"] = {str(key): str(value) for key, value in content.get("defines", {}).items()}
-    content["parameters"] = {key: _uniform(key, value, path) for key, value in content.get("parameters", {}).items()}
-    content["textures"] = {key: _texture(key, value, path) for key, value in content.get("textures", {}).items()}
-    if content.get("language", "glsl") not in ("glsl", "hlsl", "wgsl"):
-        raise InputError(f"unknown language '{content['language']}'", str(path), "glsl, hlsl or wgsl")
-    return Adapter(**content)
+            raise InputError(f"{key} = {value!r:.40}", where, "a share of the light, 0 to 1")
+        fields[key] = _READERS.get(key, _as_is)(key, value, where, over)
+    return replace(over, **fields)
 
 
-def _meaning(value: object, path: Path) -> str:
-    if value not in MEANINGS:
-        raise InputError(f"unknown meaning of an argument '{value}'", str(path), did_you_mean(str(value), [*MEANINGS]))
-    return str(value)
+def with_options(adapter: Adapter, options: Sequence[tuple[str, str]]) -> Adapter:
+    """An adapter with entries in place of its own, as the command line has them: ("parameters.alpha.low", "0.1").
+
+    Raises InputError as `parsed` does.
+    """
+    content: dict[str, Any] = {}
+    for key, text in options:
+        place, path = content, key.split(".")
+        if path[0] == "defines":
+            path = ["defines", key.removeprefix("defines.")]
+        for name in path[:-1]:
+            place = place.setdefault(name, {})
+            if not isinstance(place, dict):
+                raise InputError(f"{key} = {text:.40}, and '{name}' has a value already", OPTION, "give one of them")
+        place[path[-1]] = _value(path, text)
+    return replace(parsed(content, OPTION, adapter), where=adapter.where or OPTION) if content else adapter
 
 
-def _uniform(name: str, value: object, path: Path) -> Uniform:
-    known = {"default": (int, float, list, bool), "low": (int, float), "high": (int, float), "unit": str, "doc": str}
-    _check_entry(name, value, known, path)
-    assert isinstance(value, dict)
-    default = value.get("default")
-    numbers = default if isinstance(default, list) else [] if default is None else [default]
-    if not all(isinstance(number, int | float) for number in numbers) or (isinstance(default, list) and not default):
-        raise InputError(f"parameters.{name}: default = {default!r:.40}", str(path), "a number, or a list of numbers")
-    return Uniform(**{**value, "default": tuple(default) if isinstance(default, list) else default})
+OPTION = "--adapter"
 
 
-def _texture(name: str, value: object, path: Path) -> dict[str, str]:
-    _check_entry(name, value, {"file": str, "wrap": str, "filter": str}, path)
-    assert isinstance(value, dict)
-    for key, accepted in (("wrap", WRAPS), ("filter", FILTERS)):
-        if value.get(key, accepted[0]) not in accepted:
-            raise InputError(f"textures.{name}: unknown {key} '{value[key]}'", str(path), " or ".join(accepted))
-    if "file" not in value:
-        raise InputError(f"textures.{name} names no file", str(path), "file = 'table.npy'")
+def _value(path: Sequence[str], text: str) -> object:
+    """The value of an option's text: a list by commas, a number, true, false, or the text."""
+    if KINDS.get(path[0]) is str or path[0] == "defines" or path[-1] in ("unit", "doc", "file"):
+        return text
+    if KINDS.get(path[0]) is list or "," in text:
+        return [_scalar(one.strip()) for one in text.strip("[] ").split(",") if one.strip()]
+    return _scalar(text)
+
+
+def _scalar(text: str) -> object:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        number = float(text)
+    except ValueError:
+        return text.strip("\"' ")
+    return int(number) if re.fullmatch(r"[+-]?\d+", text) else number
+
+
+def as_option(value: object) -> str:
+    """The text of a value, as `with_options` reads it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return ",".join(map(as_option, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _as_is(key: str, value: Any, where: str, over: Adapter) -> object:
     return value
 
 
-def _check_entry(name: str, value: object, known: Mapping[str, Any], path: Path) -> None:
+def _meanings(key: str, values: list[object], where: str, over: Adapter) -> tuple[str, ...]:
+    for value in values:
+        if not isinstance(value, str) or value not in MEANINGS:
+            what = f"{key}: unknown meaning of an argument {value!r:.40}"
+            raise InputError(what, where, did_you_mean(str(value), [*MEANINGS]))
+    return tuple(map(str, values))
+
+
+def _folders(key: str, values: list[object], where: str, over: Adapter) -> tuple[str, ...]:
+    if not all(isinstance(value, str) for value in values):
+        raise InputError(f"{key} = {values!r:.40}, names of folders expected", where, 'includes = ["chunks"]')
+    return tuple(map(str, values))
+
+
+def _defines(key: str, values: Mapping[str, object], where: str, over: Adapter) -> dict[str, str]:
+    for name, value in values.items():
+        if isinstance(value, dict | list):
+            raise InputError(f"{key}.{name} = {value!r:.40}, a text or a number expected", where, '{ NAME = "1" }')
+    return {**over.defines, **{name: _macro(value) for name, value in values.items()}}
+
+
+def _macro(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _language(key: str, value: str, where: str, over: Adapter) -> str:
+    if value not in ("glsl", "hlsl", "wgsl"):
+        raise InputError(f"unknown language '{value}'", where, "glsl, hlsl or wgsl")
+    return value
+
+
+def _parameters(key: str, values: Mapping[str, object], where: str, over: Adapter) -> dict[str, Uniform]:
+    made = {name: _uniform(name, value, where, over.parameters.get(name, Uniform())) for name, value in values.items()}
+    return {**over.parameters, **made}
+
+
+def _uniform(name: str, value: object, where: str, over: Uniform) -> Uniform:
+    number, words = (int, float), ("unit", "doc", "kind")
+    known = {"default": (*number, list, bool), "low": number, "high": number, **dict.fromkeys(words, str)}
+    _check_entry(f"parameters.{name}", value, known, where)
+    assert isinstance(value, dict)
+    default = value.get("default")
+    numbers = default if isinstance(default, list) else [] if default is None else [default]
+    if not all(isinstance(one, int | float) for one in numbers) or (isinstance(default, list) and not default):
+        raise InputError(f"parameters.{name}: default = {default!r:.40}", where, "a number, or a list of numbers")
+    if value.get("kind", "") not in UNIFORMS:
+        raise InputError(f"parameters.{name}: unknown kind '{value['kind']}'", where, ", ".join(UNIFORMS[1:]))
+    made = replace(over, **{**value, "default": over.default if default is None else _plain(default)})
+    check_range(name, made, where)
+    return made
+
+
+def check_range(name: str, uniform: Uniform, where: str) -> None:
+    """Raise InputError for a default outside the range, and for an empty range."""
+    low = -math.inf if uniform.low is None else uniform.low
+    high = math.inf if uniform.high is None else uniform.high
+    default = uniform.default
+    numbers = default if isinstance(default, tuple) else () if default is None else (default,)
+    if low > high or not all(low <= one <= high for one in numbers):
+        what = f"parameters.{name}: default = {default!r:.40}, low = {uniform.low}, high = {uniform.high}"
+        raise InputError(what, where, "the default lies between low and high")
+
+
+UNIFORMS = ("", "alpha", "angle", "fixed")
+
+
+def _plain(default: object) -> object:
+    return tuple(default) if isinstance(default, list) else default
+
+
+def _textures(key: str, values: Mapping[str, object], where: str, over: Adapter) -> dict[str, Mapping[str, Any]]:
+    made = {name: _texture(name, value, where, over.textures.get(name, {})) for name, value in values.items()}
+    return {**over.textures, **made}
+
+
+def _texture(name: str, value: object, where: str, over: Mapping[str, Any]) -> dict[str, Any]:
+    value = {"file": value} if isinstance(value, str) else value
+    _check_entry(f"textures.{name}", value, {"file": str, "wrap": str, "filter": str, "shape": list}, where)
+    assert isinstance(value, dict)
+    made = {**over, **value}
+    for key, accepted in (("wrap", WRAPS), ("filter", FILTERS)):
+        if made.get(key, accepted[0]) not in accepted:
+            raise InputError(f"textures.{name}: unknown {key} '{made[key]}'", where, " or ".join(accepted))
+    if "file" not in made:
+        raise InputError(f"textures.{name} names no file", where, "file = 'table.npy'")
+    sizes = made.get("shape", [1, 1])
+    if not all(isinstance(one, int) and 0 < one < 1 << 24 for one in sizes) or not 2 <= len(sizes) <= 4:
+        what = f"textures.{name}: shape = {sizes!r:.40}"
+        raise InputError(what, where, "[rows, columns, channels], of a file without a header")
+    return made
+
+
+def _check_entry(name: str, value: object, known: Mapping[str, Any], where: str) -> None:
     if not isinstance(value, dict):
-        raise InputError(f"'{name}' = {value!r:.40}, a table of {', '.join(known)} expected", str(path))
+        raise InputError(f"{name} = {value!r:.40}, a table of {', '.join(known)} expected", where)
     for key, entry in value.items():
         if key not in known:
-            raise InputError(f"'{name}': unknown key '{key}'", str(path), did_you_mean(key, list(known)))
+            raise InputError(f"{name}: unknown key '{key}'", where, did_you_mean(key, list(known)))
         if not isinstance(entry, known[key]):
-            raise InputError(f"'{name}': {key} = {entry!r:.40} has the wrong type", str(path))
+            raise InputError(f"{name}: {key} = {entry!r:.40} has the wrong type", where)
+
+
+_READERS: dict[str, Callable[[str, Any, str, Adapter], object]] = {
+    **dict.fromkeys((key for key in KINDS if key.endswith("arguments")), _meanings),
+    "includes": _folders, "defines": _defines, "language": _language, "parameters": _parameters,
+    "textures": _textures,
+}  # fmt: skip

@@ -7,11 +7,14 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from ...errors import InputError
 from .adapter import Adapter
+from .emitted import manifest_of
 from .files import bounds, read
-from .names import names_shader
-from .program import Program
+from .names import names_shader, options_in, parted
+from .program import Program, candidates
 
 
 class Adopted(NamedTuple):
@@ -22,11 +25,17 @@ class Adopted(NamedTuple):
 
 
 def adopt(file: str | Path) -> Adopted:
-    """The adapter of a shader without one. Raises InputError for files that cannot be read."""
-    path = Path(os.path.expanduser(file))
-    if not names_shader(str(path)) or not path.is_file():
-        raise InputError(f"'{file}' is no shader", "FILE", "a .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf")
-    program = read(path, None)
+    """The adapter of a shader's name, whose options are written into it. Raises InputError for what cannot be read."""
+    name, query = parted(str(file))
+    path = Path(os.path.expanduser(name))
+    if not names_shader(str(path)):
+        hint = "a .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf"
+        raise InputError(f"'{name}' {'is no shader by its name' if path.exists() else 'does not exist'}", "FILE", hint)
+    if not path.is_file():
+        raise InputError(f"'{name}' {'is no file' if path.exists() else 'does not exist'}", "FILE")
+    if (manifest := manifest_of(path)) is not None:
+        raise InputError(f"'{path.name}' was written by gonio emit, and {manifest} is its adapter", "FILE", "use it")
+    program = read(path, None, options=options_in(query))
     adapter = program.adapter
     lines = [
         f"# How Gonio reads {path.name}; see docs/shaders.md",
@@ -34,10 +43,15 @@ def adopt(file: str | Path) -> Adopted:
         f"arguments = {json.dumps(list(adapter.arguments))}",
         f"cosine = {json.dumps(bool(adapter.cosine))}  # whether it includes |cos theta_i|",
     ]
-    for name in ("pdf", "sample"):
-        if getattr(adapter, name):
-            lines.append(f"{name} = {json.dumps(getattr(adapter, name))}")
-            lines.append(f"{name}_arguments = {json.dumps(list(getattr(adapter, f'{name}_arguments')))}")
+    for key in ("pdf", "sample", "derive"):
+        if getattr(adapter, key):
+            lines.append(f"{key} = {json.dumps(getattr(adapter, key))}")
+            lines.append(f"{key}_arguments = {json.dumps(list(getattr(adapter, f'{key}_arguments')))}")
+    if adapter.includes:
+        lines.append(f"includes = {json.dumps(list(adapter.includes))}")
+    if adapter.defines:
+        macros = ", ".join(f"{json.dumps(key)} = {json.dumps(value)}" for key, value in adapter.defines.items())
+        lines.append(f"defines = {{ {macros} }}")
     for declared in program.parameters.values():
         low, high, default = bounds(declared)
         lines += [
@@ -45,18 +59,29 @@ def adopt(file: str | Path) -> Adopted:
             f"[parameters.{declared.name}]  # {declared.shape}",
             f"default = {_toml(default, declared.shape)}",
         ]
-        lines += [f"low = {low}"] if abs(low) != float("inf") else []
-        lines += [f"high = {high}"] if abs(high) != float("inf") else []
+        lines += [f"low = {_number(low)}"] if abs(low) != float("inf") else []
+        lines += [f"high = {_number(high)}"] if abs(high) != float("inf") else []
         lines.append(f"doc = {json.dumps(declared.uniform.doc)}")
     for name in program.samplers():
-        lines += ["", f"[textures.{name}]", 'file = "table.npy"', 'wrap = "clamp"', 'filter = "linear"']
+        about = adapter.textures.get(name, {})
+        entries = {"file": "table.npy", "wrap": "clamp", "filter": "linear", **about}
+        lines += ["", f"[textures.{name}]", *(f"{key} = {json.dumps(value)}" for key, value in entries.items())]
     return Adopted("\n".join(lines) + "\n", tuple(_guesses(program, adapter)))
 
 
 def _toml(value: object, shape: str) -> str:
     if shape == "bool":
         return json.dumps(bool(value))
-    return json.dumps(list(value)) if isinstance(value, tuple) else f"{float(str(value))}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_number, value))}]"
+    return _number(value)
+
+
+def _number(value: object) -> str:
+    """A number in the digits that 32 bits have: 0.8, not 0.800000011920929."""
+    number = float(str(value))
+    short = float(str(np.float32(number)))
+    return f"{short if np.float32(number) == np.float64(number) else number}"
 
 
 def _guesses(program: Program, adapter: Adapter) -> list[str]:
@@ -66,9 +91,13 @@ def _guesses(program: Program, adapter: Adapter) -> list[str]:
         f"the BRDF is '{adapter.function}', by its name and arguments: {listed}",
         f"the cosine is {'included' if adapter.cosine else 'not included'}, which the file does not say",
     ]
+    others = [name for name in candidates(program.module) if name != adapter.function]
+    if others:
+        guesses.insert(1, f"as likely, and not taken: {', '.join(others)}; --adapter function=NAME takes another")
     for declared in program.parameters.values():
         if declared.uniform.default is None:
             low, high, default = bounds(declared)
+            default = _toml(default, declared.shape)
             guesses.append(f"{declared.name}: default {default}, range {low:g} to {high:g}, by its name")
-    guesses += [f"texture {name}: give its file" for name in program.samplers()]
+    guesses += [f"texture {name}: give its file" for name in program.samplers() if name not in adapter.textures]
     return guesses

@@ -10,7 +10,7 @@ import copyreg
 import keyword
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,39 +20,58 @@ import numpy as np
 from ...errors import InputError
 from ...material import parameters as kinds
 from ...material.bsdf import BSDF
-from ...ops.table import Table
 from ...spirv import Module, compile_text, parse, translated
-from ...spirv.images import Texture
 from . import adapter as adapters
-from . import explorer
+from . import emitted, explorer, tables
 from .adapter import Adapter
 from .material import _SampledShaderFile, _ShaderFile
+from .names import options_in, parted, with_options
 from .program import Declared, Program
 
 _LANGUAGES = {".hlsl": "hlsl", ".slang": "slang", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
-MAX_TABLE = 1 << 28
 MAX_CLASSES = 64  # in memory
 # parameters whose names say that they lie in [0, 1]
 _UNIT = re.compile(r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.I)
 
 
-def Shader(file: str | os.PathLike[str], **parameters: Any) -> BSDF:
+def Shader(
+    file: str | os.PathLike[str],
+    *,
+    defines: Mapping[str, object] | None = None,
+    adapter: Mapping[str, object] | None = None,
+    **parameters: Any,
+) -> BSDF:
     """A material from a shader: GLSL, HLSL, WGSL, SPIR-V, or a .brdf file of the BRDF Explorer.
 
         go.Shader("my.glsl", roughness=0.3)
+        go.Shader("my.glsl", defines={"USE_SHEEN": 1}, adapter={"function": "evalSheen", "textures": {"lut": "e.npy"}})
 
     file        the shader; FILE.toml beside it is its adapter, see docs/shaders.md
+    defines     macros of GLSL, HLSL and Slang, overrides of WGSL, by name; those of the adapter hold beside them
+    adapter     entries as in FILE.toml, in place of those there
     parameters  values of its parameters
     Raises InputError, with file and line, for what cannot be read; MachineError without a compiler.
     """
-    cls: Any = class_of(os.fspath(file))
-    unknown = [name for name in parameters if name not in cls.parameters()]
+    macros = [(f"defines.{key}", value) for key, value in (defines or {}).items()]
+    options = [(key, adapters.as_option(value)) for key, value in (*_flat(adapter or {}), *macros)]
+    cls: Any = class_of(with_options(os.fspath(file), options))
+    known = cls.parameters()
+    given = {name if name in known else f"{name}_": value for name, value in parameters.items()}
+    unknown = [name for name in parameters if not {name, f"{name}_"} & {*known}]
     if unknown:
-        known = ", ".join(cls.parameters()) or "none"
-        raise InputError(f"no parameter '{unknown[0]}'", os.fspath(file), f"it has: {known}")
-    material: BSDF = cls(**parameters)
+        raise InputError(f"no parameter '{unknown[0]}'", os.fspath(file), f"it has: {', '.join(known) or 'none'}")
+    material: BSDF = cls(**given)
     return material
+
+
+def _flat(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """The values of nested dicts by path: "textures.lut.file"."""
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 _Stamp = tuple[tuple[str, int, int], ...]
@@ -65,29 +84,39 @@ def files_read(shader: Path) -> frozenset[Path]:
     return frozenset(Path(name) for stamp in stamps for name, _, _ in stamp)
 
 
-def class_of(text: str, inside: Path | None = None, function: str = "") -> type[BSDF]:
-    """The class of a shader file.
+def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
+    """The class of a shader's name, which may have options: "my.glsl", "my.glsl?function=f".
 
-    inside    the folder in which the files that the adapter names must lie, None for any folder
-    function  the BRDF, in place of the one that the adapter names or that is guessed
+    inside  the folder in which the files that the adapter names must lie, None for any folder
     """
-    path = Path(os.path.expanduser(text.strip())).absolute()
-    adapters_ = Path(f"{path}.toml"), path.with_suffix(".toml")
-    adapter_file = next((one for one in adapters_ if one.is_file()), None)
-    own = [path, *(one for one in adapters_ if one == adapter_file)]
+    file, query = parted(text)
+    path = Path(os.path.expanduser(file)).absolute()
     try:
+        _stamp([path])
+        adapter_file = adapter_of(path)
+        own = [path, *([] if adapter_file is None else [adapter_file])]
         first = _stamp(own)
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
-        raise InputError(f"no file '{text}'", text, str(getattr(error, "strerror", "") or "")) from None
-    key = str(path), str(inside), function
+        raise InputError(f"no file '{file}'", text, str(getattr(error, "strerror", "") or "")) from None
+    key = str(path), str(inside), query
     known = _classes.pop(key, None)
     if known is None or known[0][: len(first)] != first or not _is_current(known[0]):
-        program = read(path, adapter_file, inside, function)
-        known = first + _stamp([one for one in program.files if one not in own]), _made(path, program, inside)
+        program = read(path, adapter_file, inside, options_in(query))
+        name = with_options(str(path), options_in(query))
+        files = [one for one in program.files if one not in own]
+        known = first + _stamp(files), _made(path, name, program, inside)
     _classes[key] = known
     while len(_classes) > MAX_CLASSES:
         _classes.pop(next(iter(_classes)))
     return known[1]
+
+
+def adapter_of(path: Path) -> Path | None:
+    """The file that says how a shader is read: the adapter beside it, or the manifest of `gonio emit`."""
+    named = Path(f"{path}.toml"), path.with_suffix(".toml")
+    return next((one for one in named if one.is_file()), None) or emitted.manifest_of(path)
 
 
 def _stamp(files: list[Path]) -> _Stamp:
@@ -102,8 +131,14 @@ def _is_current(stamp: _Stamp) -> bool:
         return False
 
 
-def read(path: Path, adapter_file: Path | None, inside: Path | None = None, function: str = "") -> Program:
-    """The program of a file, with the adapter beside it or guesses; `function` as in `class_of`."""
+def read(
+    path: Path, adapter_file: Path | None, inside: Path | None = None, options: Sequence[tuple[str, str]] = ()
+) -> Program:
+    """The program of a file.
+
+    adapter_file  as `adapter_of` finds it; without one names are interpreted
+    options       entries in place of the adapter's, by key
+    """
     where = path.name
     if not path.is_file():
         raise InputError(f"'{path}' is no file", where)
@@ -111,23 +146,35 @@ def read(path: Path, adapter_file: Path | None, inside: Path | None = None, func
         raise InputError(f"over {MAX_FILE >> 20} MB", where, "a shader is shorter")
     if adapter_file is not None:
         _confined(adapter_file, inside)
-    adapter = adapters.read(adapter_file) if adapter_file is not None else Adapter()
     data, files = path.read_bytes(), list[Path]()
+    text, described = data.decode("utf-8", "replace") if path.suffix.lower() != ".spv" else "", Adapter()
+    if path.suffix.lower() == ".brdf":
+        text, described = explorer.read(text, where)
+    adapter = _adapter(described, adapter_file, options)
     if path.suffix.lower() == ".spv":
         module = parse(data, where)
     else:
-        text = data.decode("utf-8", "replace")
-        if path.suffix.lower() == ".brdf":
-            text, described = explorer.read(text, where)
-            adapter = described if adapter_file is None else adapter
         language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
         folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
         module = _compiled(text, where, language, adapter.defines, [path.parent, *folders], files)
-    if function and function != adapter.function:  # what the adapter says of another function does not hold
-        adapter = replace(adapter, function=function, arguments=(), cosine=None, pdf="", sample="")
-    textures = {name: _texture(name, about, path.parent, inside) for name, about in adapter.textures.items()}
+    textures = {
+        name: tables.texture(name, about, _confined(path.parent / about["file"], inside), adapter.where)
+        for name, about in adapter.textures.items()
+    }
     files += [path.parent / about["file"] for about in adapter.textures.values()]
     return Program(module, adapter, textures, where, tuple(dict.fromkeys(files)))
+
+
+def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str, str]]) -> Adapter:
+    """What the shader's own file says, or the adapter in place of that, with options in place of its entries."""
+    function = dict(options).get("function", "")
+    if file is not None and file.suffix == ".json":
+        described = adapters.parsed(emitted.content(file, function), str(file))
+    elif file is not None:
+        described = adapters.read(file)
+    if function and function != described.function:  # what the adapter says of another function does not hold
+        described = replace(described, arguments=(), cosine=None, pdf="", sample="", derive="", struct="")
+    return adapters.with_options(described, options)
 
 
 def _compiled(
@@ -149,23 +196,6 @@ def _confined(path: Path, inside: Path | None) -> Path:
     if inside is not None and not resolved.is_relative_to(inside.resolve()):
         raise InputError(f"'{path.name}' lies outside the scene's folder {inside}", str(path), "copy it there")
     return resolved
-
-
-def _texture(name: str, about: Mapping[str, str], folder: Path, inside: Path | None) -> Texture:
-    path = _confined(folder / about["file"], inside)
-    where = f"textures.{name}"
-    try:
-        if path.stat().st_size > MAX_TABLE:
-            raise InputError(f"'{path.name}' has over {MAX_TABLE >> 20} MB", where)
-        values = np.load(path, allow_pickle=False)
-        values = np.asarray(values, np.float64)
-    except (OSError, ValueError, EOFError) as error:
-        what = f"'{about['file']}' is no table: {error}"
-        raise InputError(what[:200], where, "an .npy of numbers, (rows, columns, channels)") from None
-    if values.ndim not in (2, 3, 4) or values.shape[-1] > 4 or values.size == 0 or not np.all(np.isfinite(values)):
-        what = f"'{about['file']}' of shape {values.shape}, finite numbers of 1 to 4 channels last expected"
-        raise InputError(what, where, "numpy.save(FILE, array) with shape (rows, columns, channels)")
-    return Texture(name, Table(name, values), about.get("wrap", "clamp"), about.get("filter", "linear"))
 
 
 # --------------------------------------------------------------------------- classes
@@ -191,7 +221,7 @@ class _SampledShader(_SampledShaderFile, metaclass=_ShaderType):
     """Base of classes with one."""
 
 
-def _made(path: Path, program: Program, inside: Path | None) -> type[BSDF]:
+def _made(path: Path, spelling: str, program: Program, inside: Path | None) -> type[BSDF]:
     sampled = {"pdf", "sample"} <= set(program.formulas)
     fields: dict[str, tuple[str, ...]] = {}
     namespace: dict[str, Any] = {"__annotations__": {}}
@@ -206,7 +236,7 @@ def _made(path: Path, program: Program, inside: Path | None) -> type[BSDF]:
     namespace |= {
         "__doc__": f"{about.rstrip('.')}.",
         "__module__": __name__,
-        "spelling": str(path),
+        "spelling": spelling,
         "inside": inside,
         "name": re.sub(r"[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "shader",
         "program": program,
@@ -235,7 +265,7 @@ def bounds(declared: Declared) -> tuple[float, float, Any]:
     guess = (0.0, 1.0) if _UNIT.search(declared.name) else (-np.inf, np.inf)
     low = guess[0] if uniform.low is None else float(uniform.low)
     high = guess[1] if uniform.high is None else float(uniform.high)
-    return low, high, 0.5 if uniform.default is None else uniform.default
+    return low, high, min(max(0.5, low), high) if uniform.default is None else uniform.default
 
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
@@ -244,8 +274,14 @@ def _fields(declared: Declared) -> list[tuple[str, Any]]:
     uniform = declared.uniform
     doc = uniform.doc or f"{declared.shape} {declared.name} of the shader"
     low, high, default = bounds(declared)
+    if uniform.kind == "fixed":
+        return []
     if declared.shape == "bool":
         return [(name, kinds.flag(bool(uniform.default), doc))]
+    if uniform.kind == "alpha":
+        return [(name, kinds.width(default, doc, low=low, high=high))]
+    if uniform.kind == "angle":
+        return [(name, kinds.angle(default, doc))]
     if declared.shape == "vec3":
         color = default if isinstance(default, tuple) else float(default)
         return [(name, kinds.spectrum(color, doc, low=low, high=high, unit=uniform.unit))]

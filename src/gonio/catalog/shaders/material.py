@@ -13,7 +13,7 @@ from ...material import binding, tree
 from ...material.bsdf import BSDF, StatedAlbedo
 from ...material.calling import method
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend
+from ...ops import Direction, Mode, Scalar, Spectrum, backend
 from ...ops.types import Value
 from ...spirv.values import leaves, numeric, truth, where
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .program import Program
 
 ROTATIONS = 64  # directions at which isotropy is tested
+_SIZES = {"spectrum": (3,), "alpha": (2,)}  # of parameters that are vectors
 ISOTROPIC = 1e-9  # relative change by a rotation, in 64 bits
 
 
@@ -54,9 +55,15 @@ class _ShaderFile(BSDF):
 
     def _values(self) -> dict[str, Value]:
         values: dict[str, Value] = {}
-        for name, fields in self.fields.items():
-            given = [getattr(self, field) for field in fields]
-            if self.program.parameters[name].shape == "vec3":
+        for name, declared in self.program.parameters.items():
+            given = [getattr(self, field) for field in self.fields.get(name, ())]
+            if declared.uniform.kind == "fixed":
+                values[name] = declared.uniform.default
+            elif declared.uniform.kind == "angle":  # none if it is the plain number 0
+                values[name] = (1.0, 0.0) if given[0] is None else (given[0].x, given[0].y)
+            elif declared.uniform.kind == "alpha":
+                values[name] = given[0].x, given[0].y
+            elif declared.shape == "vec3":
                 values[name] = tuple(ops.channels(given[0]))
             else:
                 values[name] = given[0] if len(given) == 1 else tuple(given)
@@ -66,7 +73,9 @@ class _ShaderFile(BSDF):
         directions = {"view": (wo.x, wo.y, wo.z), **{name: (v.x, v.y, v.z) for name, v in others.items()}}
         return self.program.run(formula, self._values(), directions)
 
-    def _above(self, wo: Direction, wi: Direction) -> Mask:
+    def _above(self, wo: Direction, wi: Direction) -> Value:
+        if self.program.adapter.struct:  # what Gonio wrote states itself where it is 0
+            return True
         if self.program.adapter.transmits:
             return (wo.z != 0.0) & (wi.z != 0.0)
         return (wo.z > 0.0) & (wi.z > 0.0)
@@ -113,10 +122,11 @@ class _SampledShaderFile(_ShaderFile):
         above = self._above(wo, wi)  # as in eval and pdf: a direction below is a failed sample
         weight: Value = ops.vec3(*[where(above, numeric(part), 0.0) for part in leaves(members["weight"])])
         made = Sample.of_density(wi, weight, where(above, numeric(members["pdf"]), 0.0))
-        if "delta" not in members:
-            return made
-        delta = truth(members["delta"])
-        return made._replace(delta=delta if not isinstance(delta, bool) else made.delta)
+        delta, eta = truth(members.get("delta", False)), numeric(members.get("eta", 1.0))
+        return made._replace(
+            delta=delta if not isinstance(delta, bool) else made.delta,
+            eta=eta if not isinstance(eta, float) else made.eta * eta,
+        )
 
 
 def _is_isotropic(material: _ShaderFile) -> bool:
@@ -134,7 +144,10 @@ def _is_isotropic(material: _ShaderFile) -> bool:
         if leaf.parameter.numeric:
             value = np.asarray(leaf.value, float)
             value = value if value.ndim < 2 else value[0]
-            given[f"self_{leaf.path}"] = np.broadcast_to(value, (3,)) if leaf.parameter.kind == "spectrum" else value
+            kind = leaf.parameter.kind
+            if kind == "angle":
+                value = np.stack([np.cos(value), np.sin(value)])
+            given[f"self_{leaf.path}"] = np.broadcast_to(value, _SIZES[kind]) if kind in _SIZES else value
 
     def values(by: Any) -> Any:
         c, s = np.cos(by), np.sin(by)

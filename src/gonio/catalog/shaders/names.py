@@ -1,30 +1,78 @@
-"""Which texts name a shader. This is asked of every material, so it must not load the readers."""
+"""Which texts name a shader, and with which options. This is asked of every material, so it must not load the readers.
+
+A text may add to the shader's adapter, after a question mark as in an address: "my.glsl?function=f&defines.N=1". It is
+a part of the shader's name: such texts reach worker processes, scenes and results as others do.
+"""
 
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterable
 from pathlib import Path
+from urllib.parse import parse_qsl, quote
+
+from ...errors import InputError
 
 SUFFIXES = (".glsl", ".frag", ".hlsl", ".slang", ".wgsl", ".spv", ".brdf")
+_PLAIN = "/,[]:"  # are themselves in options
+_WITH_OPTIONS = re.compile(
+    rf"(.*(?:{'|'.join(map(re.escape, SUFFIXES))}))\?([^?()]*=[^?()]*)", re.DOTALL | re.IGNORECASE
+)
+
+
+def parted(text: str) -> tuple[str, str]:
+    """The file and the options of a shader's name: ("my.glsl", "function=f"); no options are ""."""
+    match = _WITH_OPTIONS.fullmatch(text.strip())
+    return (match[1], match[2]) if match else (text.strip(), "")
+
+
+def options_in(query: str) -> list[tuple[str, str]]:
+    """The keys and values of "function=f&defines.N=1"."""
+    return parse_qsl(query, keep_blank_values=True, max_num_fields=1000)
+
+
+def with_options(text: str, options: Iterable[tuple[str, str]]) -> str:
+    """A shader's name, with options added to its own; a later one replaces an earlier one of the same key."""
+    file, query = parted(text)
+    every = {**dict(options_in(query)), **dict(options)}
+    query = "&".join(f"{quote(key, _PLAIN)}={quote(value, _PLAIN)}" for key, value in every.items())
+    return f"{file}?{query}" if query else file
+
+
+def option(text: str, name: str, prefix: str = "") -> tuple[str, str]:
+    """(key, value) of "KEY=VALUE", as an option `name` of the command line has it; a macro may have no value."""
+    key, equals, value = text.partition("=")
+    if not key.strip() or not (equals or prefix):
+        example = "-D USE_SHEEN=1" if prefix else "--adapter function=BRDF"
+        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", name, f"such as {example}")
+    return prefix + key.strip(), value.strip() if equals else "1"
+
+
+def head_in(text: str) -> str:
+    """The shader's name, with its options, in a material's text: "my.glsl" of "my.glsl(roughness=0.3)"; else ""."""
+    head = text.partition("(")[0]
+    return next((one.strip() for one in (text, head) if names_shader(one)), "")
 
 
 def file_in(text: str) -> Path | None:
-    """The shader that a material's text names, with or without settings: "my.glsl", "my.glsl(roughness=0.3)"."""
-    head = text.partition("(")[0]
-    return next((Path(os.path.expanduser(one.strip())) for one in (text, head) if names_shader(one)), None)
+    """The shader that a material's text names, with or without settings and options."""
+    head = head_in(text)
+    return Path(os.path.expanduser(parted(head)[0])) if head else None
 
 
 def names_shader(text: str) -> bool:
     """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
-    suffix = Path(text.strip()).suffix.lower()
+    file = parted(text)[0]
+    suffix = Path(file).suffix.lower()
     if suffix not in SUFFIXES or "\0" in text:
         return False
     if suffix != ".brdf":
         return True
     try:
-        with Path(os.path.expanduser(text.strip())).open("rb") as file:
+        with Path(os.path.expanduser(file)).open("rb") as opened:
             from . import explorer
 
-            return explorer.is_explorer(file.read(1 << 16).decode("utf-8", "replace"))
+            return explorer.is_explorer(opened.read(1 << 16).decode("utf-8", "replace"))
     except OSError:
         return False

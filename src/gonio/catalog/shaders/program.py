@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 from ...errors import InputError
 from ...spirv import Machine, Module
 from ...spirv.arithmetic import elementwise
+from ...spirv.composites import Cell, Pointer
 from ...spirv.images import Texture
 from ...spirv.module import UNIFORM, Function
 from ...spirv.replay import Replayed
 from ...spirv.standard import normalize
 from ...spirv.values import Value, leaves, numeric
-from .adapter import Adapter, Uniform, meaning_of
+from .adapter import Adapter, Uniform, check_range, meaning_of
 
 
 class Declared(NamedTuple):
@@ -42,15 +43,25 @@ class Program:
         self.files = files  # that the shader includes or reads as textures
         self._replayed: dict[str, Replayed] = {}
         self.adapter = _completed(module, adapter, where)
-        self.eval = _one(module, self.adapter.function, where)
+        stated = adapter.where or where
+        self.eval = _one(module, self.adapter, "function", where)
         self.formulas = {"eval": (self.eval, self.adapter.arguments)}
-        for name in ("pdf", "sample", "albedo"):
-            if function := getattr(self.adapter, name):
-                self.formulas[name] = _one(module, function, where), getattr(self.adapter, f"{name}_arguments")
+        for name in ("pdf", "sample", "derive", "albedo"):
+            if getattr(self.adapter, name):
+                meanings = getattr(self.adapter, f"{name}_arguments")
+                self.formulas[name] = _one(module, self.adapter, name, where), meanings
         for name, (function, arguments) in self.formulas.items():
+            key = "arguments" if name == "eval" else f"{name}_arguments"
             if len(arguments) != len(function.parameters):
-                what = f"{name}: {len(arguments)} meanings for the {len(function.parameters)} arguments of "
-                raise InputError(f"{what}'{_title(module, function)}'", where, "one meaning per argument")
+                what = f"{len(arguments)} meanings for the {len(function.parameters)} arguments of "
+                raise InputError(f"{what}'{_title(module, function)}'", f"{stated}: {key}", "one meaning per argument")
+            if "derived" in arguments and (not self.adapter.derive or name == "derive"):
+                raise InputError("'derived' without a function", f"{stated}: {key}", "derive = 'NAME'")
+            places = [type for (_, type), one in zip(function.parameters, arguments, strict=True) if one == "result"]
+            if len(places) > 1 or any(module.type(one).kind != "pointer" for one in places):
+                raise InputError(
+                    "'result' for what the function does not write", f"{stated}: {key}", "an `out` argument"
+                )
         declared = {one.name: one for one in self._declared()}
         self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
 
@@ -64,14 +75,21 @@ class Program:
             names.add(name)
             shape = self.module.shape(type)
             if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
-                uniform = self.adapter.parameters.get(name, Uniform())
+                uniform = self._stated(name) or Uniform()
                 if uniform.default is None and name in self.module.defaults:
                     uniform = replace(uniform, default=self.module.defaults[name])
+                    check_range(name, uniform, self.adapter.where or self.where)
                 yield Declared(name, shape, uniform)
-        unknown = [name for name in self.adapter.parameters if name not in names]
+        unknown = [name for name in self.adapter.parameters if not {name, name.removesuffix("_")} & names]
         if unknown:
             known = ", ".join(sorted(names)) or "none"
-            raise InputError(f"no uniform '{unknown[0]}' in the shader", self.where, f"it has: {known}")
+            stated = f"{self.adapter.where}: parameters.{unknown[0]}"
+            raise InputError(f"no uniform '{unknown[0]}' in {self.where}", stated, f"it has: {known}")
+
+    def _stated(self, name: str) -> Uniform | None:
+        """What the adapter says of a parameter, by the shader's name or by that of the material, `isotropic_`."""
+        stated = self.adapter.parameters
+        return stated.get(name, stated.get(f"{name}_"))
 
     def _uniforms(self) -> Iterator[tuple[str, int]]:
         module = self.module
@@ -121,15 +139,31 @@ class Program:
             if not start.parameters:  # it assigns the initial values of globals
                 machine.call(start, ())
         function, meanings = self.formulas[formula]
-        arguments = [
-            self._argument(type, meaning, self.module.names.get(id, "argument"), values, directions)
+        given = dict(directions)
+        if "derived" in meanings:
+            derive, of_parameters = self.formulas["derive"]
+            given["derived"] = machine.call(derive, self._given(derive, of_parameters, values, directions))
+        if "result" not in meanings:
+            return machine.call(function, self._given(function, meanings, values, given))
+        place = function.parameters[meanings.index("result")][1]
+        cell = Cell(self.module.zero(self.module.type(place).parts[0]))
+        machine.call(function, self._given(function, meanings, values, {**given, "result": Pointer(cell)}))
+        return cell.value
+
+    def _given(
+        self, function: Function, meanings: Sequence[str], values: dict[str, Value], given: dict[str, Value]
+    ) -> list[Value]:
+        return [
+            self._argument(type, meaning, self.module.names.get(id, "argument"), values, given)
             for (id, type), meaning in zip(function.parameters, meanings, strict=True)
         ]
-        return machine.call(function, arguments)
 
     def _argument(
         self, type: int, meaning: str, name: str, values: dict[str, Value], directions: dict[str, Value]
     ) -> Value:
+        if meaning == "ignored":
+            kind = self.module.type(type)
+            return self.module.zero(kind.parts[0] if kind.kind == "pointer" else type)
         if meaning != "parameter":
             value = _GIVEN[meaning](directions)
             kind = self.module.type(type)
@@ -198,6 +232,8 @@ _GIVEN: dict[str, Callable[[dict[str, Value]], Any]] = {
     "l.h": lambda given: _cosine(given["light"], _half(given)),
     "l.v": lambda given: _cosine(given["light"], given["view"]),
     "u": lambda given: given["u"],
+    "derived": lambda given: given["derived"],
+    "result": lambda given: given["result"],
 }
 
 
@@ -208,27 +244,72 @@ def _title(module: Module, function: Function) -> str:
     return module.names.get(function.id, str(function.id)).partition("(")[0]
 
 
-def _one(module: Module, name: str, where: str) -> Function:
+def _one(module: Module, adapter: Adapter, key: str, where: str) -> Function:
+    """The function that an entry of the adapter names; `where` is the shader."""
+    name = getattr(adapter, key)
     functions = module.function(name)
+    where = f"{adapter.where}: {key}" if adapter.where and name else where
     if not functions:
         known = sorted({_title(module, one) for one in module.functions.values()} - {"main", "gonio_entry"})
         what = f"no function '{name}'" if name else "no function that looks like a BRDF"
         hint = f"function = 'NAME' in the adapter; it has {', '.join(known[:12]) or 'none'}"
         raise InputError(what, where, hint)
-    if len(functions) > 1:
+    if len(functions) > 1 and adapter.struct:
+        functions = of_struct(module, name, adapter.struct)
+    if len(functions) != 1:
         raise InputError(f"{len(functions)} functions '{name}'", where, "rename one: an adapter names functions")
     return functions[0]
 
 
-def _meanings(module: Module, function: Function) -> tuple[str, ...]:
-    """The meaning of each argument by its name, and by its type where the name says nothing."""
+def of_struct(module: Module, name: str, struct: str) -> list[Function]:
+    """Of the functions of a name those whose first parameter is a struct of that name, as of a mix of mixes."""
+    return [one for one in module.function(name) if _first(module, one) == struct]
+
+
+def _first(module: Module, function: Function) -> str:
+    """The name of the type of a function's first parameter, as far as it is a struct."""
+    type_ = function.parameters[0][1] if function.parameters else 0
+    if type_ and module.type(type_).kind == "pointer":
+        type_ = module.type(type_).parts[0]
+    return module.names.get(type_, "")
+
+
+def _meanings(module: Module, function: Function, derived: bool = False) -> tuple[str, ...]:
+    """The meaning of each argument by its name, and by its type where the name says nothing.
+
+    derived  whether an argument of that name is what the adapter's function `derive` returns
+    """
     result = []
+    written = _written(module, function)
     for id, type in function.parameters:
+        if id in written:
+            result.append("result" if id == written[0] and module.shape(function.type) == "void" else "ignored")
+            continue
+        if derived and module.names.get(id, "") == "derived":
+            result.append("derived")
+            continue
         meaning, shape = meaning_of(module.names.get(id, "")), module.shape(type)
         numbers = meaning in ("n.l", "n.v", "n.h", "l.h", "l.v")
         fits = shape == "float" if numbers else shape in ("vec2", "vec3") if meaning == "u" else shape == "vec3"
         result.append(meaning if fits else "parameter")
     return tuple(result)
+
+
+def _written(module: Module, function: Function) -> list[int]:
+    """The parameters that a function writes before it reads them, as `out` ones: colors, then numbers."""
+    first: dict[int, bool] = {id: False for id, type in function.parameters if module.type(type).kind == "pointer"}
+    pending, owner = set(first), {id: id for id in first}
+    for block in function.blocks.values():
+        for one in block.instructions:
+            if one.name == "AccessChain" and one.operands[0] in owner:
+                owner[one.result] = owner[one.operands[0]]
+                continue
+            for place, operand in enumerate(one.operands):
+                if operand in owner and owner[operand] in pending:
+                    pending.discard(owner[operand])
+                    first[owner[operand]] = one.name == "Store" and place == 0
+    shapes = {id: module.shape(type) for id, type in function.parameters}
+    return [id for kind in ("vec3", "vec4", "float") for id, is_out in first.items() if is_out and shapes[id] == kind]
 
 
 def _rank(module: Module, function: Function) -> tuple[int, int]:
@@ -239,37 +320,54 @@ def _rank(module: Module, function: Function) -> tuple[int, int]:
     meanings = _meanings(module, function)
     directions = sum(one in ("light", "view", "normal", "half", "n.l", "n.v", "incident") for one in meanings)
     both = ("light" in meanings and "view" in meanings) or ("n.l" in meanings and "n.v" in meanings)
-    result = module.shape(function.type)
-    usable = both and result in ("vec3", "float", "vec4")
+    usable = both and (module.shape(function.type) in ("vec3", "float", "vec4") or "result" in meanings)
     return (exact.get(name, near) if usable else -1), directions
+
+
+def candidates(module: Module) -> list[str]:
+    """The names of the functions that look most like a BRDF, equally so; those that no other of them calls first."""
+    own = [one for one in module.functions.values() if not _title(module, one).startswith(("main", "gonio_"))]
+    best = max((_rank(module, one) for one in own), default=(0, 0))
+    equal = [one for one in own if best[0] > 0 and _rank(module, one) == best]
+    called = {id for one in equal for id in _calls(one)}
+    return [_title(module, one) for one in sorted(equal, key=lambda one: one.id in called)]
+
+
+def _calls(function: Function) -> Iterator[int]:
+    """The functions that a function calls."""
+    for block in function.blocks.values():
+        yield from (one.operands[0] for one in block.instructions if one.name == "FunctionCall")
 
 
 def _completed(module: Module, adapter: Adapter, where: str) -> Adapter:
     """The adapter with guesses for what it leaves open."""
-    name = adapter.function
-    own = [one for one in module.functions.values() if not _title(module, one).startswith(("main", "gonio_"))]
-    if not name:
-        best = max(own, key=lambda one: _rank(module, one), default=None)
-        if best is not None and _rank(module, best)[0] > 0:
-            name = _title(module, best)
-    chosen = _one(module, name, where)
+    guessed = not adapter.function
+    name = adapter.function or next(iter(candidates(module)), "")
+    adapter = replace(adapter, function=name)
+    chosen = _one(module, replace(adapter, where="") if guessed else adapter, "function", where)
     stem = name.removesuffix("_eval")
     written = name != stem  # Gonio's own form: NAME_eval, NAME_pdf and NAME_sample, the cosine included
-    pdf, sample = adapter.pdf, adapter.sample
-    if written and not adapter.function and module.function(f"{stem}_pdf") and module.function(f"{stem}_sample"):
-        pdf, sample = pdf or f"{stem}_pdf", sample or f"{stem}_sample"
+    pdf, sample, derive = adapter.pdf, adapter.sample, adapter.derive
+    if written and guessed:
+        if module.function(f"{stem}_pdf") and module.function(f"{stem}_sample"):
+            pdf, sample = pdf or f"{stem}_pdf", sample or f"{stem}_sample"
+        if module.function(f"{stem}_derive"):
+            derive = derive or f"{stem}_derive"
 
-    def meanings(given: Sequence[str], function: str) -> tuple[str, ...]:
-        return tuple(given) or (_meanings(module, _one(module, function, where)) if function else ())
+    adapter = replace(adapter, pdf=pdf, sample=sample, derive=derive)
+
+    def meanings(key: str) -> tuple[str, ...]:
+        given: tuple[str, ...] = getattr(adapter, f"{key}_arguments")
+        if given or not getattr(adapter, key):
+            return given
+        return _meanings(module, _one(module, adapter, key, where), bool(derive) and key != "derive")
 
     return replace(
         adapter,
-        function=name,
-        arguments=adapter.arguments or _meanings(module, chosen),
+        arguments=adapter.arguments or _meanings(module, chosen, bool(derive)),
         cosine=written if adapter.cosine is None else adapter.cosine,
-        pdf=pdf,
-        sample=sample,
-        pdf_arguments=meanings(adapter.pdf_arguments, pdf),
-        sample_arguments=meanings(adapter.sample_arguments, sample),
-        albedo_arguments=meanings(adapter.albedo_arguments, adapter.albedo),
+        pdf_arguments=meanings("pdf"),
+        sample_arguments=meanings("sample"),
+        derive_arguments=meanings("derive"),
+        albedo_arguments=meanings("albedo"),
     )

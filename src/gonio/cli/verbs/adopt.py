@@ -9,7 +9,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from ...errors import InputError
-from ..options import Json, output_option
+from ..options import Json, Reading, output_option
 from .base import MATERIALS, verb
 
 
@@ -23,6 +23,7 @@ def adopt(
         ),
     ],
     *,
+    how: Reading,
     output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
     tsl: Annotated[bool, Option("--tsl", help="three.js: its TSL build too, by running its JavaScript.")] = False,
     force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
@@ -45,6 +46,7 @@ def adopt(
     from ...catalog import shaders
 
     if file.is_dir():
+        how.shaders(())
         _adopt_package(file, output, tsl=tsl, force=force, as_json=as_json)
         return
     if tsl:
@@ -53,8 +55,8 @@ def adopt(
         raise InputError(
             "-o names the folder for a package's shaders", "--output", "leave it out: FILE.toml is written"
         )
-    adopted = shaders.adopt(file)
-    target = Path(f"{file}.toml")
+    adopted = shaders.adopt(how.shaders([str(file)])[0])
+    target = Path(f"{shaders.parted(str(file))[0]}.toml")
     if target.exists() and not force:
         raise InputError(f"'{target}' is there already", "FILE", "edit it, or replace it with --force")
     files.write_whole(target, adopted.text.encode())

@@ -106,6 +106,7 @@ def bake(
         raise InputError("no target", "TARGET", "such as: gonio bake ggx -o tables")
     with executor.running():
         if preset:
+            made.shaders(())
             named = {name: options.pop(name) for name in ("resolution", "seed", "store", "flip")}
             _refuse(made, options)
             baked = tables.bake(target or "ggx", output, preset=preset, **named)

@@ -136,8 +136,7 @@ def _with_parameters(
     if model is None or model in Masking.family.all():
         made.refuse(target if model is None else model)
         return target, model
-    name = target.partition("(")[0]
-    if outside.names_code(name) or shaders.names_shader(name):
+    if outside.names_code(target.partition("(")[0]) or shaders.head_in(target):
         work, model = made.texts([target, model])
         return work, model
     return target, made.text(model)

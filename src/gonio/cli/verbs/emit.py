@@ -44,6 +44,7 @@ class Content(Options):
     constants: Annotated[
         bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
     ] = False
+    fold: Annotated[bool, Option("--fold", help="Put the material's own values into the code.")] = False
     fit: Annotated[
         str, Option(metavar="N|N/M", help="Instead write albedos as rational fits of this order; N/0: polynomials.")
     ] = ""
@@ -101,7 +102,7 @@ def emit(
       gonio emit kulla-conty -p base=conductor -o shaders/ --tables ktx2
       gonio emit openpbr -p coat_weight=1 --lean
       gonio emit conductor dielectric --prefix g_ --lang wgsl --group 1 --first-binding 4
-      gonio emit conductor --preset Au --constants
+      gonio emit conductor --preset Au --constants --fold
       gonio emit conductor --preset Au --language torch -o gold.py
       gonio emit conductor --preset Au --check 10000 -o vectors.json
       gonio emit conductor --preset Au --fit 4 --lang wgsl

@@ -9,7 +9,7 @@ from typing import Annotated
 from typer import Argument
 
 from .. import completion
-from ..options import Json
+from ..options import Json, Reading
 from .base import MATERIALS, verb
 
 
@@ -23,6 +23,8 @@ def explain(
             autocompletion=completion.materials_and_distributions,
         ),
     ] = "",
+    *,
+    how: Reading,
     as_json: Json = False,
 ) -> None:
     """Print the manual page of a material, or of any member of a family: formula, parameters, limits, source.
@@ -39,5 +41,5 @@ def explain(
     """
     from ...viewer.explanation import explain
 
-    page = explain(name)
+    page = explain(how.shaders([name])[0])
     print(json.dumps(page.as_dict()) if as_json else page.text(shutil.get_terminal_size().columns))

@@ -91,6 +91,7 @@ def measure(
     angles = {name: plan.axis_of(getattr(detector, name), name) for name in ("theta_i", "theta_r", "phi")}
     options = {**vars(detector), **angles, **vars(specimen)}
     if specimen.surface is not None:
+        made.shaders(())
         options["surface"] = run.surface_of(specimen.surface, made.param or (), made.preset)
     with Bar("measure") as bar:
 

@@ -101,6 +101,7 @@ def verify(
       gonio verify glass.py:Glass --write-baseline known.json
       gonio verify glass.py:Glass --baseline known.json
     """
+    target = made.shaders(target)
     if at:
         _show_pairs(target, made.settings(), how.vary, at, as_json)
         return

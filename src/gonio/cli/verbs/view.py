@@ -84,6 +84,7 @@ def _homework(target: Sequence[str] | None, made: Material) -> Stage:
     """The homework's rows. Raises InputError for anything named besides."""
     from ...viewer import stage
 
+    made.shaders(())
     if target or made.settings():
         what = f"--homework and {target[0]} together" if target else "--homework with parameters"
         raise InputError(what, "--homework", "leave one of them out; the page's sliders change all values")
@@ -96,6 +97,7 @@ def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
     from ...viewer import stage
 
     accepted = {*operands.MATERIALS, *([operands.Kind.SCENE] if len(target) == 1 else [])}
+    target = made.shaders(target)
     kinds = [operands.kind_of(one, accepted, "MODEL") for one in target]
     settings = made.settings()
     if kinds == [operands.Kind.SCENE]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
 from ..report import Report
 from ..verdict import NOT_TRIED
@@ -19,6 +20,10 @@ def wanted() -> bool:
 def text(report: Report) -> str:
     """A line per law that is violated or was not tried, for its file if there is one; "" if all laws hold."""
     lines = []
+    for one in report.unread:
+        place = places.of_unread(one)
+        options = {"file": place.file, "line": str(place.line)} if place else {}
+        lines.append(_line("error", {**options, "title": f"{one.target}: not read"}, one.words()))
     for card in report.cards:
         for verdict in card.verdicts:
             untried = verdict.status == NOT_TRIED
@@ -29,9 +34,13 @@ def text(report: Report) -> str:
             options["title"] = f"{card.title}: {verdict.law}" + (
                 f": {verdict.status}" if verdict.excused or untried else ""
             )
-            named = ",".join(f"{name}={_property(value)}" for name, value in options.items())
-            lines.append(f"::{_KINDS[places.level(verdict)]} {named}::{_data(chr(10).join(places.words(verdict)))}\n")
+            lines.append(_line(_KINDS[places.level(verdict)], options, "\n".join(places.words(verdict))))
     return "".join(lines)
+
+
+def _line(kind: str, options: Mapping[str, str], words: str) -> str:
+    named = ",".join(f"{name}={_property(value)}" for name, value in options.items())
+    return f"::{kind} {named}::{_data(words)}\n"
 
 
 def _data(text: str) -> str:

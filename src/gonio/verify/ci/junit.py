@@ -6,7 +6,7 @@ import re
 from xml.etree import ElementTree as xml
 
 from ..report import Report
-from ..verdict import NOT_APPLICABLE, NOT_TRIED, Card, Verdict
+from ..verdict import NOT_APPLICABLE, NOT_TRIED, Card, Unread, Verdict
 from . import places
 
 _FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0, even when escaped
@@ -14,7 +14,11 @@ _FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 
 def text(report: Report) -> str:
     """The file's text."""
-    root = xml.Element("testsuites", {"name": "gonio verify", **_counts(report.cards), "time": f"{report.seconds:.3f}"})
+    counts = {**_counts(report.cards), "errors": str(len(report.unread)), "time": f"{report.seconds:.3f}"}
+    counts["tests"] = str(int(counts["tests"]) + len(report.unread))
+    root = xml.Element("testsuites", {"name": "gonio verify", **counts})
+    for one in report.unread:
+        _unread(root, one)
     for card in report.cards:
         time = sum(verdict.seconds for verdict in card.verdicts)
         suite = xml.SubElement(root, "testsuite", {"name": clean(card.title), **_counts([card]), "time": f"{time:.3f}"})
@@ -25,6 +29,18 @@ def text(report: Report) -> str:
             xml.SubElement(suite, "system-out").text = clean("\n".join(lines))
     xml.indent(root)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+
+
+def _unread(root: xml.Element, one: Unread) -> None:
+    """A suite of one case, which could not be carried out."""
+    counts = {"tests": "1", "failures": "0", "errors": "1", "skipped": "0", "time": "0.000"}
+    suite = xml.SubElement(root, "testsuite", {"name": clean(one.target), **counts})
+    case = xml.SubElement(suite, "testcase", classname=clean(one.target), name="read", time="0.000")
+    place = places.of_unread(one)
+    if place is not None:
+        case.set("file", clean(place.file))
+        case.set("line", str(place.line))
+    xml.SubElement(case, "error", message=clean(one.words()), type="read")
 
 
 def _case(suite: xml.Element, card: Card, verdict: Verdict) -> None:

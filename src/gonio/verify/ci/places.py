@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...catalog import shaders
 from ...errors import GonioError
-from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Verdict
+from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Unread, Verdict
 
 _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
@@ -31,8 +31,8 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
-        if shaders.names_shader(shader := card.subject.target.partition("(")[0]):
-            return Place(_relative(Path(os.path.expanduser(shader))), _function_line(shader))
+        if (shader := shaders.file_in(card.subject.target)) is not None:
+            return Place(_relative(shader), _function_line(shaders.head_in(card.subject.target)))
         known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
         return Place(_relative(file), 1) if known else None
     file = Path(os.path.expanduser(named["file"]))
@@ -41,6 +41,15 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
             if match["file"] == file.name:
                 return Place(_relative(file), int(match["line"]))
     return Place(_relative(file), _class_line(file, named["name"]))
+
+
+def of_unread(unread: Unread) -> Place | None:
+    """The line that an error of reading names, else the first of the shader's file."""
+    file = shaders.file_in(unread.target)
+    if file is None:
+        return None
+    line = re.fullmatch(rf"(?:.*[/\\])?{re.escape(file.name)}:(\d+).*", unread.where)
+    return Place(_relative(file), int(line[1]) if line else 1)
 
 
 def level(verdict: Verdict) -> str:
@@ -95,7 +104,7 @@ def _function_line(shader: str) -> int:
     try:
         cls: Any = shaders.class_of(shader)
         name = cls.program.adapter.function
-        text = Path(os.path.expanduser(shader)).read_text(encoding="utf-8", errors="replace")
+        text = Path(os.path.expanduser(shaders.parted(shader)[0])).read_text(encoding="utf-8", errors="replace")
     except (GonioError, OSError):
         return 1
     lines = enumerate(text.splitlines(), 1)
@@ -111,4 +120,4 @@ def _class_line(file: Path, name: str) -> int:
     return next((n.lineno for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name == name), 1)
 
 
-__all__ = ["Place", "cause", "grade", "level", "of", "words"]
+__all__ = ["Place", "cause", "grade", "level", "of", "of_unread", "words"]

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from ..._version import __version__
 from ..report import Report
-from ..verdict import DECLARED, KNOWN, Card, Verdict
+from ..verdict import DECLARED, KNOWN, Card, Unread, Verdict
 from . import places
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -20,17 +20,20 @@ def text(report: Report) -> str:
     """The file's text."""
     laws = {verdict.law: verdict for card in report.cards for verdict in card.verdicts}
     rules = [_rule(verdict) for verdict in laws.values()]
+    if report.unread:
+        rules += [{"id": "gonio/read", "name": "Read", "shortDescription": {"text": "the shader can be read"}}]
     order = {name: index for index, name in enumerate(laws)}
     run = {
         "tool": {"driver": {"name": "Gonio", "version": __version__, "rules": rules}},
-        "invocations": [{"executionSuccessful": True, "exitCode": report.exit_code}],
+        "invocations": [{"executionSuccessful": not report.unread, "exitCode": report.exit_code}],
         "columnKind": "unicodeCodePoints",
         "results": [
             _result(card, verdict, order[verdict.law])
             for card in report.cards
             for verdict in card.verdicts
             if verdict.failed or verdict.excused or verdict.status == DECLARED
-        ],
+        ]
+        + [_unread(one, len(laws)) for one in report.unread],
         "properties": {"seed": report.seed, "effort": report.effort, "tests": report.tests},
     }
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
@@ -48,17 +51,34 @@ def _rule(verdict: Verdict) -> dict[str, Any]:
     return rule
 
 
+def _unread(one: Unread, rule: int) -> dict[str, Any]:
+    location: dict[str, Any] = {"logicalLocations": [{"name": one.target, "kind": "type"}]}
+    place = places.of_unread(one)
+    if place is not None:
+        location["physicalLocation"] = _physical(place)
+    key = hashlib.sha256(f"{one.target}\nread".encode()).hexdigest()
+    return {
+        "ruleId": "gonio/read",
+        "ruleIndex": rule,
+        "level": "error",
+        "message": {"text": f"{one.target}: not read\n{one.words()}"},
+        "locations": [location],
+        "partialFingerprints": {"titleAndLaw/v1": key},
+    }
+
+
+def _physical(place: places.Place) -> dict[str, Any]:
+    prefix = "file://" if PurePosixPath(place.file).is_absolute() else ""
+    return {"artifactLocation": {"uri": prefix + quote(place.file)}, "region": {"startLine": place.line}}
+
+
 def _result(card: Card, verdict: Verdict, rule: int) -> dict[str, Any]:
     location: dict[str, Any] = {
         "logicalLocations": [{"name": card.title, "fullyQualifiedName": card.subject.target, "kind": "type"}]
     }
     place = places.of(card, verdict)
     if place is not None:
-        prefix = "file://" if PurePosixPath(place.file).is_absolute() else ""
-        location["physicalLocation"] = {
-            "artifactLocation": {"uri": prefix + quote(place.file)},
-            "region": {"startLine": place.line},
-        }
+        location["physicalLocation"] = _physical(place)
     key = hashlib.sha256(f"{card.title}\n{verdict.law}".encode()).hexdigest()
     facts = {
         "status": verdict.status,

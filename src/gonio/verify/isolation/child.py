@@ -36,7 +36,7 @@ from . import watch
 
 if TYPE_CHECKING:
     from ..report import Report
-    from ..verdict import Card
+    from ..verdict import Card, Unread
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
 ISOLATED = "isolated"  # location of the error about a material that cannot be sent
@@ -132,7 +132,8 @@ def trial(
         if threshold is None:
             threshold = significance(tests)
             pool.judge(threshold, [number for number, card in enumerate(pool.cards) if not card.decided_by(threshold)])
-        return Report(pool.cards, task.seed, task.effort, tests, threshold, time.perf_counter() - started)
+        seconds = time.perf_counter() - started
+        return Report(pool.cards, task.seed, task.effort, tests, threshold, seconds, unread=pool.unread)
     finally:
         for worker in pool.workers:
             worker.close()
@@ -287,6 +288,7 @@ class _Pool:
         self.states: list[_State] | None = None  # once a process has loaded the targets
         self.waiting: list[int] = []  # numbers of the cards that no process judges yet
         self.laws: list[str] = []
+        self.unread: list[Unread] = []
         self.begun: set[tuple[int, str]] = set()
         self.told: set[tuple[int, str]] = set()
         self.warned: set[str] = set()
@@ -355,7 +357,8 @@ class _Pool:
     def _call(self, worker: _Worker, *call: str) -> None:
         worker.call = (call[0], call[1], call[2]) if call else None
 
-    def _loaded(self, worker: _Worker, titles: list[str], laws: list[str]) -> None:
+    def _loaded(self, worker: _Worker, titles: list[str], laws: list[str], unread: list[Unread]) -> None:
+        self.unread = unread
         if self.states is None:
             self.laws, self.states = laws, [_State(title) for title in titles]
             self.waiting = list(range(len(titles)))

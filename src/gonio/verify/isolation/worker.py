@@ -17,17 +17,17 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from ...catalog import notation, outside
+from ...catalog import notation, outside, shaders
 from ...errors import GonioError, GonioWarning, InputError, MachineError
 from ...material import BSDF
 from .. import run, targets
 from ..laws import chosen
 from ..subject import Described, Fault, Subject, of
-from ..verdict import Card
+from ..verdict import Card, Unread
 from . import watch
 from .child import ISOLATED, LOADING, OTHERS, Item, Task
 
@@ -67,9 +67,9 @@ def main() -> None:
 
 def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
     say("step", -1, LOADING)
-    subjects = [one for item in task.items for one in _subjects(item)]
+    subjects, unread = _loaded(task.items)
     laws = chosen(task.laws)
-    say("loaded", [one.title for one in subjects], [law.name for law in laws])
+    say("loaded", [one.title for one in subjects], [law.name for law in laws], unread)
     while True:
         try:
             number, skip, forbidden, threshold = pickle.load(orders)
@@ -85,6 +85,21 @@ def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
         calls.judge(subjects[number].model, forbidden)
         judged = run.judged(subjects[number], laws, task.effort, task.seed, begin, skip, result)
         say("card", number, _plain(judged.card(threshold, task.seed, task.effort, begin)))
+
+
+def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
+    """The subjects, and the shaders that cannot be read where others can."""
+    subjects: list[Subject] = []
+    unread: list[Unread] = []
+    for item in items:
+        try:
+            subjects += _subjects(item)
+        except InputError as error:
+            is_shader = isinstance(item.target, str) and shaders.head_in(item.target)
+            if not is_shader or (item is items[-1] and not subjects):
+                raise
+            unread.append(Unread(str(item.target), error.what, error.where, error.hint))
+    return subjects, unread
 
 
 def _outside(error: BaseException) -> str:

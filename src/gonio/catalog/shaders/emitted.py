@@ -1,0 +1,89 @@
+"""Shaders that `gonio emit` wrote: the manifest.json beside one states what an adapter would."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+
+MAX_MANIFEST = 16 << 20  # bytes; of a module with all materials it has 1 MB
+_KINDS = {"alpha": "alpha", "angle": "angle"}  # kinds of parameters whose fields are vectors of another meaning
+
+
+def manifest_of(shader: Path) -> Path | None:
+    """The manifest that names a shader as its own, None if there is none."""
+    file = shader.parent / "manifest.json"
+    try:
+        if not file.is_file() or file.stat().st_size > MAX_MANIFEST:
+            return None
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    if f'"{shader.name}"' not in text:  # other programs have files of that name
+        return None
+    return file if _loaded(file).get("shader") == shader.name else None
+
+
+def content(file: Path, function: str = "") -> dict[str, Any]:
+    """What an adapter of a shader would say, by its manifest; empty for a function that is no material's `eval`.
+
+    Raises InputError for a module of several materials if no function is named, and for a damaged manifest.
+    """
+    manifest = _loaded(file)
+    try:
+        several = manifest.get("materials", [manifest])
+        named = {one["functions"]["eval"]: one for one in several if "eval" in one["functions"]}
+        if function:
+            chosen = named.get(function)
+            return {} if chosen is None else dict(_entries(chosen))
+        if len(named) != 1:
+            hint = f"name its function: --adapter function={next(iter(named), 'NAME')}"
+            raise InputError(f"{len(named)} materials: {', '.join(named) or 'no eval'}", str(file), hint)
+        return dict(_entries(next(iter(named.values()))))
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        what = f"no manifest of `gonio emit`: {type(error).__name__} {error}"
+        raise InputError(what[:200], str(file), "emit the shader again, or remove the manifest") from None
+
+
+def _loaded(file: Path) -> dict[str, Any]:
+    try:
+        loaded = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        hint = "emit the shader again, or remove the manifest"
+        raise InputError(f"no manifest: {error}"[:200], str(file), hint) from None
+    return loaded if isinstance(loaded, dict) else {}
+
+
+def _entries(manifest: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    functions = manifest["functions"]
+    yield "function", functions["eval"]
+    yield "struct", manifest["struct"]
+    yield "cosine", True
+    yield "transmits", manifest["transmits"]
+    yield "doc", str(manifest["doc"]).partition("\n")[0]
+    if "derive" in functions:
+        yield "derive", functions["derive"]
+    if {"pdf", "sample"} <= set(functions):
+        yield "pdf", functions["pdf"]
+        yield "sample", functions["sample"]
+    kinds = {one["path"]: one for one in manifest["parameters"]}
+    yield "parameters", {field["name"]: _parameter(field, kinds[field["path"]]) for field in manifest["fields"]}
+    yield "textures", {one["uniform"]: _texture(one) for one in manifest["textures"]}
+
+
+def _parameter(field: Mapping[str, Any], described: Mapping[str, Any]) -> dict[str, Any]:
+    """A field of the struct; one on which tables depend keeps its value."""
+    kind = "fixed" if described["fixed"] else _KINDS.get(described["kind"], "")
+    result = {"default": field["value"] if kind == "fixed" else described["value"], "doc": described["doc"]}
+    result |= {key: described[key] for key in ("low", "high") if described[key] is not None and kind != "fixed"}
+    return {**result, "unit": described["unit"], **({"kind": kind} if kind else {})}
+
+
+def _texture(texture: Mapping[str, Any]) -> dict[str, Any]:
+    if texture["file_format"] != "raw":
+        what = f"tables in the form '{texture['file_format']}'"
+        raise InputError(what, f"{texture['file']}", "raw ones are read: gonio emit --tables raw")
+    return {"file": texture["file"], "shape": [*reversed(texture["size"]), texture["channels"]]}
