@@ -75,6 +75,7 @@ class Module:
     sets       ids of instruction sets -> their names
     refused    ids of functions that a front end could not translate -> why
     defaults   names of uniforms -> their values where the text has some
+    costs      ids of functions -> instructions of a call, callees included; known when one has run
     """
 
     types: dict[int, Type] = field(default_factory=dict)
@@ -87,6 +88,7 @@ class Module:
     strings: dict[int, str] = field(default_factory=dict)
     refused: dict[int, InputError] = field(default_factory=dict)
     defaults: dict[str, Value] = field(default_factory=dict)
+    costs: dict[int, int] = field(default_factory=dict)
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""
@@ -160,6 +162,8 @@ class _Parser:
         elif opcode == 11:  # OpExtInstImport
             module.sets[words[0]] = _text(words[1:])
         elif 19 <= opcode <= 39:
+            if words[0] in module.types:  # a type that changes could contain itself
+                raise ValueError(f"two types of id {words[0]}")
             module.types[words[0]] = self._type(opcode, words)
         elif opcode in NAMES:
             self._instruction(NAMES[opcode], words)
@@ -182,6 +186,8 @@ class _Parser:
         elif self.block is not None:
             self._append(one)
         elif name == "Variable":
+            if self.module.type(kind).kind != "pointer":
+                raise ValueError(f"a variable of id {result} whose type is no pointer")
             self.module.variables[result] = one
             if operands[0] == UNIFORM and len(operands) > 1:
                 self.module.defaults[self.module.names.get(result, "")] = self.module.constants[operands[1]]
@@ -222,7 +228,7 @@ class _Parser:
             size = sum(known(part).size for part in parts)
             return Type(kind, parts, len(parts), self._bounded(max(size, 1)))
         elif kind == "pointer":
-            return Type(kind, (words[2],), words[1])
+            return Type(kind, (words[2],), words[1]) if words[2] in self.module.types else Type("opaque")
         elif kind == "image":
             return Type(kind, (), words[2] + 1)
         else:

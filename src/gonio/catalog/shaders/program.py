@@ -64,6 +64,9 @@ class Program:
             names.add(name)
             shape = self.module.shape(type)
             if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
+                if not name.lstrip("_").isidentifier():  # it becomes a name in Python; SPIR-V's may be any text
+                    hint = "letters, digits and _ that begin with a letter; of SPIR-V: compile it with names"
+                    raise InputError(f"{name[:40]!r} as the name of a parameter", self.where, hint)
                 uniform = self.adapter.parameters.get(name, Uniform())
                 if uniform.default is None and name in self.module.defaults:
                     uniform = replace(uniform, default=self.module.defaults[name])
