@@ -128,8 +128,8 @@ def parse(data: bytes, where: str = "SPIR-V") -> Module:
     """The module in the bytes of a .spv. Raises InputError if it is none, or for types that are not read."""
     try:
         return _Parser(data, where).module
-    except InputError:
-        raise
+    except InputError as error:
+        raise InputError(error.what, error.where or where, error.hint or "compile it again") from None
     except (IndexError, KeyError, struct.error, OverflowError, ValueError, RecursionError) as error:
         raise InputError(f"the SPIR-V is damaged: {type(error).__name__} {error}", where, "compile it again") from None
 
