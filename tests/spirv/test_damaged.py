@@ -82,3 +82,10 @@ def test_names_that_begin_with_underscores(tmp_path: Path) -> None:
     for name, field in (("_class", "class_"), ("__sample", "sample_"), ("_rough", "rough")):
         shader = _shader(tmp_path, _module(name=name))
         assert list(type(shader).parameters()) == [field]  # type: ignore[attr-defined]
+
+
+def test_meanings_that_a_function_is_not_given(tmp_path: Path) -> None:
+    """`albedo` is called for a view alone."""
+    (tmp_path / "a.spv.toml").write_text('function = "brdf"\nalbedo = "brdf"\nalbedo_arguments = ["light", "view"]')
+    with pytest.raises(InputError, match="'light' as an argument of a function that is not given 'light'"):
+        _shader(tmp_path, _module())

@@ -134,7 +134,12 @@ class Program:
         self, type: int, meaning: str, name: str, values: dict[str, Value], directions: dict[str, Value]
     ) -> Value:
         if meaning != "parameter":
-            value = _GIVEN[meaning](directions)
+            try:
+                value = _GIVEN[meaning](directions)
+            except KeyError as error:
+                what = f"'{meaning}' as an argument of a function that is not given {error.args[0]!r}"
+                hint = "eval and pdf have light and view, sample view and u, albedo the view"
+                raise InputError(what, self.where, hint) from None
             kind = self.module.type(type)
             kind = self.module.type(kind.parts[0]) if kind.kind == "pointer" else kind
             return value[: kind.length] if kind.kind == "vector" and isinstance(value, tuple) else value
