@@ -17,7 +17,8 @@ from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
-from .module import UNIFORM, Block, Function, Instruction, Module
+from .messages import ALONE
+from .module import BUFFERS, UNIFORM, Block, Function, Instruction, Module
 from .opcodes import REFUSED
 from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
 from .values import UNDEFINED, Value, both, either, negated, refuse, select, static, truth, wrapped
@@ -54,6 +55,11 @@ class Machine:
         self.module = module
         self._given, self._textures = dict(globals or {}), dict(textures or {})
         self._globals = {id: Pointer(Cell(self._initial(one))) for id, one in module.variables.items()}
+        self._read_only = {
+            id(self._globals[variable].cell): one
+            for variable, one in module.variables.items()
+            if one.operands[0] in BUFFERS or one.operands[0] == UNIFORM
+        }
         self._flows: dict[int, Flow] = {}
         self._named: dict[int, frozenset[int]] = {}  # globals by function
         self._stack: list[int] = []
@@ -221,7 +227,7 @@ class Machine:
             raise refuse("discard", "return a value: a BSDF has no fragments to discard")
         elif one.name == "refused":
             what = REFUSED.get(operands[0], f"SPIR-V's instruction {operands[0]}")
-            raise refuse(what, "a BSDF is a function of directions and parameters alone")
+            raise refuse(what, ALONE)
         return True
 
     def _check_rounds(self, frame: Frame, label: int, mask: Value) -> None:
@@ -269,6 +275,8 @@ class Machine:
         target, value = self._get(frame, one.operands[0]), self._get(frame, one.operands[1])
         if not isinstance(target, Pointer):
             raise TypeError("a store to no pointer")
+        if id(target.cell) in self._read_only:
+            raise refuse(f"a write to the buffer '{self._buffer(target)}'", ALONE)
         if not target.path:
             calls.named(value, self.module.names.get(target.cell.id, ""))
         own = id(target.cell) in frame.own
@@ -278,6 +286,13 @@ class Machine:
             mask = True
         target.store(value, mask)
         self._work.copied(target.cell.value)
+
+    def _buffer(self, target: Pointer) -> str:
+        """The name of a buffer, or of its member if it has none itself, as in GLSL."""
+        one = self._read_only[id(target.cell)]
+        inside = self.module.type(one.type).parts[0]
+        member = self.module.members.get((inside, target.path[0])) if target.path and static(target.path[0]) else None
+        return self.module.names.get(one.result) or member or self.module.names.get(inside, "")
 
     def _unread_elsewhere(self, frame: Frame, label: int, cell: Cell) -> bool:
         """Whether lanes outside this block never read a variable's present value, so that its store needs no mask: all

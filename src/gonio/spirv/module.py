@@ -17,6 +17,8 @@ from .values import UNDEFINED, Value, refuse, wrapped
 SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
 MAGIC = 0x07230203
 UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
+BUFFERS = (2, 9, 12)  # storage classes of blocks: uniform, push constants, storage
+_DEBUG = "NonSemantic.Shader.DebugInfo.100"
 MAX_BYTES = 1 << 26
 MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
 MAX_LEAVES = 1 << 16  # scalars in one value
@@ -159,6 +161,8 @@ class _Parser:
             self.file, self.line = module.strings.get(words[0], self.where), words[1]
         elif opcode == 317:  # OpNoLine
             self.line = 0
+        elif opcode == 12 and module.sets.get(words[2]) == _DEBUG:
+            self._debug(words[1], words[3], words[4:])
         elif opcode == 11:  # OpExtInstImport
             module.sets[words[0]] = _text(words[1:])
         elif 19 <= opcode <= 39:
@@ -172,6 +176,17 @@ class _Parser:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
         elif self.block is not None and opcode != 0:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
+
+    def _debug(self, result: int, number: int, operands: tuple[int, ...]) -> None:
+        """Lines as Slang's compiler states them, in place of OpLine."""
+        if number == 35:  # DebugSource
+            file = self.module.strings.get(operands[0], "")
+            self.module.strings[result] = self.where if file in ("", "0") else file  # "0" is the text itself
+        elif number == 103:  # DebugLine
+            line = self.module.constants.get(operands[1], 0)
+            self.file, self.line = self.module.strings.get(operands[0], self.where), line if type(line) is int else 0
+        elif number == 104:  # DebugNoLine
+            self.line = 0
 
     def _instruction(self, name: str, words: tuple[int, ...]) -> None:
         if name in ("Function", "FunctionParameter", "Label", "FunctionEnd"):
