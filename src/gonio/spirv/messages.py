@@ -26,8 +26,8 @@ def explained(message: str, printed: str) -> tuple[str, str]:
         a, b = pair.groups()
         what = f"'{a}' calls itself" if a == b else f"'{a}' and '{b}' call each other"
         return f"recursion: {what}", "a loop of known length"
-    if found := _BUILTIN.search(message):
-        name = found[1] or found[2]
+    if builtin := _BUILTIN.search(message):
+        name = builtin[1] or builtin[2]
         for pattern, kind in _KINDS.items():
             if re.fullmatch(pattern, name):
                 return f"{kind} ({name})", ALONE
