@@ -23,7 +23,7 @@ from random import Random
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fuzz import untrusted  # noqa: F401  (declares more targets)
+from fuzz import shader_files, untrusted  # noqa: F401  (declare more targets)
 from fuzz.mutation import mutated
 from fuzz.targets import HERE, TARGETS, Target
 

@@ -1,5 +1,6 @@
 """Shader text against closed forms, on symbols in 64 bits, and constructs that are refused, with their lines."""
 
+import types
 from pathlib import Path
 
 import gonio as go
@@ -206,3 +207,15 @@ def test_signs_are_read_and_written_as_bits(tmp_path: Path, formula: str) -> Non
     wo, wi = pairs / np.linalg.norm(pairs, axis=-1, keepdims=True)
     values = go.Shader(tmp_path / "signs.glsl").f(wo, wi, precision="float64")[:, 0]
     np.testing.assert_allclose(values, 2.0 + SIGNS[formula](wi[:, 0], wo[:, 1]), rtol=1e-12)
+
+
+def test_powers_of_negative_numbers_are_nan_in_the_emitted_text_too(tmp_path: Path) -> None:
+    (tmp_path / "a.glsl").write_text("float brdf(vec3 L, vec3 V) { return 0.1 + pow(L.x, 2.0) + pow(L.x, -0.5); }")
+    material = go.Shader(str(tmp_path / "a.glsl"))
+    wo = np.array([[0.0, 0.0, 1.0]] * 3)
+    wi = np.array([[-0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [0.6, 0.0, 0.8]])
+    file = types.ModuleType("written")
+    exec(compile(go.emit(material, "numpy"), "written.py", "exec"), file.__dict__)
+    expected = [np.nan, np.inf, 0.8 * (0.1 + 0.36 + 0.6**-0.5)]
+    for values in (material.eval(wo, wi, precision="float64"), file.eval(wo, wi)):
+        np.testing.assert_allclose(values[:, 0], expected, rtol=1e-7)

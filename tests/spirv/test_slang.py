@@ -124,3 +124,20 @@ def test_without_the_compiler_it_is_named(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(MachineError, match="no compiler of Slang is installed") as refused:
         compile_text("float f() { return 1; }", "my.slang", language="slang")
     assert "slangpy" in refused.value.hint
+
+
+@needs_slang
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("double d = double(L.x) * 0.5;", "doubles and 16-bit types are not read"),
+        ("float d = WaveActiveSum(L.x);", "a subgroup operation"),
+        ("c[0] = 1.0; float d = 0.0;", "a write to the buffer 'c'"),
+    ],
+)
+def test_what_is_rejected_has_file_and_line(tmp_path: Path, line: str, what: str) -> None:
+    body = f"{{\n  {line}\n  return float3(d); }}"
+    text = f"RWStructuredBuffer<float> c;\nfloat3 brdf(float3 L, float3 V, float3 N) {body}"
+    with pytest.raises(InputError, match=what) as refused:
+        go.Shader(written(tmp_path, text))
+    assert refused.value.where == "my.slang:4"  # `written` adds a line

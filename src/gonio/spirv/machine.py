@@ -17,12 +17,13 @@ from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
-from .module import UNIFORM, Block, Function, Instruction, Module
+from .messages import ALONE
+from .module import BUFFERS, UNIFORM, Block, Function, Instruction, Module
 from .opcodes import REFUSED
 from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
 from .values import UNDEFINED, Value, both, either, negated, refuse, select, static, truth, wrapped
+from .work import Work
 
-MAX_INSTRUCTIONS = 1_000_000  # per call from outside
 MAX_ITERATIONS = 4096  # of a loop whose counter is known
 MAX_VARYING = 256  # of a loop that only values can end
 MAX_DEPTH = 64  # of calls
@@ -54,17 +55,22 @@ class Machine:
         self.module = module
         self._given, self._textures = dict(globals or {}), dict(textures or {})
         self._globals = {id: Pointer(Cell(self._initial(one))) for id, one in module.variables.items()}
+        self._read_only = {
+            id(self._globals[variable].cell): one
+            for variable, one in module.variables.items()
+            if one.operands[0] in BUFFERS or one.operands[0] == UNIFORM
+        }
         self._flows: dict[int, Flow] = {}
         self._named: dict[int, frozenset[int]] = {}  # globals by function
         self._stack: list[int] = []
-        self._count = 0
+        self._work = Work(module)
 
     def call(self, function: Function, arguments: Sequence[Value]) -> Value:
         """The result of a function. Arguments that are pointers get a variable of their own.
 
         Raises InputError, with the line of the file, for constructs that are not read and for damaged modules.
         """
-        self._count, self._stack = 0, []
+        self._work, self._stack = Work(self.module), []
         kinds = [self.module.type(kind).kind for _, kind in function.parameters]
         if len(kinds) != len(arguments):
             raise refuse(f"a function of {len(kinds)} arguments, {len(arguments)} given")
@@ -133,6 +139,13 @@ class Machine:
         frame.values.update({id: value for (id, _), value in zip(function.parameters, arguments, strict=True)})
         frame.waiting[next(iter(function.blocks))] = True, {}
         self._stack.append(function.id)
+        self._work.enter(function)
+        with graph.unnamed():
+            self._blocks(frame)
+        self._stack.pop()
+        return frame.result
+
+    def _blocks(self, frame: Frame) -> None:
         while frame.waiting:
             label = min(frame.waiting, key=frame.flow.order.__getitem__)
             mask, phis = frame.waiting.pop(label)
@@ -140,9 +153,7 @@ class Machine:
                 mask = negated(frame.returned)  # all lanes are here: a shorter expression of the same mask
             for id, value in phis.items():
                 self._keep(frame, id, value, mask)
-            self._block(frame, function.blocks[label], mask)
-        self._stack.pop()
-        return frame.result
+            self._block(frame, frame.function.blocks[label], mask)
 
     def _flow(self, function: Function) -> Flow:
         try:
@@ -157,10 +168,8 @@ class Machine:
         one: Instruction | None = None
         try:
             for one in block.instructions:
-                self._count += 1
+                self._work.step(frame.function)
                 graph.foreign = f"{one.file}:{one.line}" if one.line else ""
-                if self._count > MAX_INSTRUCTIONS:
-                    raise refuse(f"more than {MAX_INSTRUCTIONS} steps", "fewer iterations of its loops")
                 if one.name in _FLOW:
                     if self._leave(frame, block, one, mask):
                         return
@@ -175,15 +184,17 @@ class Machine:
             if error.where or one is None or not one.line:
                 raise
             raise InputError(error.what, f"{one.file}:{one.line}", error.hint) from error
-        except (IndexError, KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        except _DAMAGE as error:
             place = f"{one.file}:{one.line}" if one is not None and one.line else "SPIR-V"
-            what = f"the SPIR-V is damaged: {one.name if one else ''}: {type(error).__name__} {error}"
+            reason = error.what if isinstance(error, graph.RecordingError) else error
+            what = f"the SPIR-V is damaged: {one.name if one else ''}: {type(error).__name__} {reason}"
             raise InputError(what, place, "compile it again") from error
 
     def _keep(self, frame: Frame, id: int, value: Value, mask: Value) -> None:
         """A value of an id; lanes that left its loop keep theirs where it is used after the loop."""
         if id in frame.flow.lasting and id in frame.values and not isinstance(value, Pointer):
             value = select(mask, value, frame.values[id])
+        self._work.copied(value)
         frame.values[id] = value
 
     def _leave(self, frame: Frame, block: Block, one: Instruction, mask: Value) -> bool:
@@ -216,7 +227,7 @@ class Machine:
             raise refuse("discard", "return a value: a BSDF has no fragments to discard")
         elif one.name == "refused":
             what = REFUSED.get(operands[0], f"SPIR-V's instruction {operands[0]}")
-            raise refuse(what, "a BSDF is a function of directions and parameters alone")
+            raise refuse(what, ALONE)
         return True
 
     def _check_rounds(self, frame: Frame, label: int, mask: Value) -> None:
@@ -249,7 +260,8 @@ class Machine:
             return self._run(function, arguments, mask)
         named = calls.globals_of(self.module, function, self._named)
         cells = {id: self._globals[id].cell for id in sorted(named)}
-        return calls.recorded(calls.Recorded(self.module, function, self._run, cells), arguments, mask)
+        with self._work.shared(function):
+            return calls.recorded(calls.Recorded(self.module, function, self._run, cells), arguments, mask)
 
     # ------------------------------------------------------------------ values
 
@@ -263,6 +275,8 @@ class Machine:
         target, value = self._get(frame, one.operands[0]), self._get(frame, one.operands[1])
         if not isinstance(target, Pointer):
             raise TypeError("a store to no pointer")
+        if id(target.cell) in self._read_only:
+            raise refuse(f"a write to the buffer '{self._buffer(target)}'", ALONE)
         if not target.path:
             calls.named(value, self.module.names.get(target.cell.id, ""))
         own = id(target.cell) in frame.own
@@ -271,6 +285,14 @@ class Machine:
         elif not static(mask) and self._unread_elsewhere(frame, label, target.cell):
             mask = True
         target.store(value, mask)
+        self._work.copied(target.cell.value)
+
+    def _buffer(self, target: Pointer) -> str:
+        """The name of a buffer, or of its member if it has none itself, as in GLSL."""
+        one = self._read_only[id(target.cell)]
+        inside = self.module.type(one.type).parts[0]
+        member = self.module.members.get((inside, target.path[0])) if target.path and static(target.path[0]) else None
+        return self.module.names.get(one.result) or member or self.module.names.get(inside, "")
 
     def _unread_elsewhere(self, frame: Frame, label: int, cell: Cell) -> bool:
         """Whether lanes outside this block never read a variable's present value, so that its store needs no mask: all
@@ -349,6 +371,8 @@ class Machine:
         raise refuse(f"the function {number} of SPIR-V's GLSL.std.450 (packing or bits)", "compute with floats")
 
 
+_DAMAGE = (IndexError, KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError,
+           graph.RecordingError)  # fmt: skip
 _FLOW = frozenset({"LoopMerge", "Branch", "BranchConditional", "Switch", "Return", "ReturnValue", "Kill",
                    "Unreachable", "refused"})  # fmt: skip
 _IMAGES = frozenset({"SampledImage", "Image", "ImageSample", "ImageFetch", "ImageQuerySize"})

@@ -17,6 +17,8 @@ from .values import UNDEFINED, Value, refuse, wrapped
 SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
 MAGIC = 0x07230203
 UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
+BUFFERS = (2, 9, 12)  # storage classes of blocks: uniform, push constants, storage
+_DEBUG = "NonSemantic.Shader.DebugInfo.100"
 MAX_BYTES = 1 << 26
 MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
 MAX_LEAVES = 1 << 16  # scalars in one value
@@ -75,6 +77,7 @@ class Module:
     sets       ids of instruction sets -> their names
     refused    ids of functions that a front end could not translate -> why
     defaults   names of uniforms -> their values where the text has some
+    costs      ids of functions -> instructions of a call, callees included; known when one has run
     """
 
     types: dict[int, Type] = field(default_factory=dict)
@@ -87,6 +90,7 @@ class Module:
     strings: dict[int, str] = field(default_factory=dict)
     refused: dict[int, InputError] = field(default_factory=dict)
     defaults: dict[str, Value] = field(default_factory=dict)
+    costs: dict[int, int] = field(default_factory=dict)
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""
@@ -126,8 +130,8 @@ def parse(data: bytes, where: str = "SPIR-V") -> Module:
     """The module in the bytes of a .spv. Raises InputError if it is none, or for types that are not read."""
     try:
         return _Parser(data, where).module
-    except InputError:
-        raise
+    except InputError as error:
+        raise InputError(error.what, error.where or where, error.hint or "compile it again") from None
     except (IndexError, KeyError, struct.error, OverflowError, ValueError, RecursionError) as error:
         raise InputError(f"the SPIR-V is damaged: {type(error).__name__} {error}", where, "compile it again") from None
 
@@ -157,9 +161,13 @@ class _Parser:
             self.file, self.line = module.strings.get(words[0], self.where), words[1]
         elif opcode == 317:  # OpNoLine
             self.line = 0
+        elif opcode == 12 and module.sets.get(words[2]) == _DEBUG:
+            self._debug(words[1], words[3], words[4:])
         elif opcode == 11:  # OpExtInstImport
             module.sets[words[0]] = _text(words[1:])
         elif 19 <= opcode <= 39:
+            if words[0] in module.types:  # a type that changes could contain itself
+                raise ValueError(f"two types of id {words[0]}")
             module.types[words[0]] = self._type(opcode, words)
         elif opcode in NAMES:
             self._instruction(NAMES[opcode], words)
@@ -168,6 +176,17 @@ class _Parser:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
         elif self.block is not None and opcode != 0:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
+
+    def _debug(self, result: int, number: int, operands: tuple[int, ...]) -> None:
+        """Lines as Slang's compiler states them, in place of OpLine."""
+        if number == 35:  # DebugSource
+            file = self.module.strings.get(operands[0], "")
+            self.module.strings[result] = self.where if file in ("", "0") else file  # "0" is the text itself
+        elif number == 103:  # DebugLine
+            line = self.module.constants.get(operands[1], 0)
+            self.file, self.line = self.module.strings.get(operands[0], self.where), line if type(line) is int else 0
+        elif number == 104:  # DebugNoLine
+            self.line = 0
 
     def _instruction(self, name: str, words: tuple[int, ...]) -> None:
         if name in ("Function", "FunctionParameter", "Label", "FunctionEnd"):
@@ -182,6 +201,8 @@ class _Parser:
         elif self.block is not None:
             self._append(one)
         elif name == "Variable":
+            if self.module.type(kind).kind != "pointer":
+                raise ValueError(f"a variable of id {result} whose type is no pointer")
             self.module.variables[result] = one
             if operands[0] == UNIFORM and len(operands) > 1:
                 self.module.defaults[self.module.names.get(result, "")] = self.module.constants[operands[1]]
@@ -222,7 +243,7 @@ class _Parser:
             size = sum(known(part).size for part in parts)
             return Type(kind, parts, len(parts), self._bounded(max(size, 1)))
         elif kind == "pointer":
-            return Type(kind, (words[2],), words[1])
+            return Type(kind, (words[2],), words[1]) if words[2] in self.module.types else Type("opaque")
         elif kind == "image":
             return Type(kind, (), words[2] + 1)
         else:

@@ -11,7 +11,7 @@ import ctypes
 import sys
 from pathlib import Path
 
-SPIRV, SLANG, COMPUTE = 6, 1, 6  # of slang.h: target, language of the source, stage
+SPIRV, SLANG, COMPUTE, STANDARD = 6, 1, 6, 2  # of slang.h: target, language of the source, stage, debug information
 
 
 def compile_file(library: str, source: str, output: str) -> int:
@@ -23,6 +23,7 @@ def compile_file(library: str, source: str, output: str) -> int:
     request = pointer(slang.spCreateCompileRequest(pointer(slang.spCreateSession(None))))
     slang.spAddCodeGenTarget(request, SPIRV)
     slang.spSetOptimizationLevel(request, 0)
+    slang.spSetDebugInfoLevel(request, STANDARD)
     unit = slang.spAddTranslationUnit(request, SLANG, text(b"shader"))
     slang.spAddTranslationUnitSourceString(request, unit, text(b"shader.slang"), text(Path(source).read_bytes()))
     entry = slang.spAddEntryPoint(request, unit, text(b"gonio_entry"), COMPUTE)

@@ -64,10 +64,11 @@ def _power(x: Value, y: Value) -> Value:
         return where(y > 0.0, 0.0 if x == 0.0 else math.nan, math.nan)
     positive = x > 0.0
     value = ops.exp(y * ops.log(ops.where(positive, x, 1.0)))
+    # 0, or NaN where x < 0: a root stays in an emitted text, where 0 / 0 would be simplified; its gradient is finite
+    domain = ops.sqrt(ops.where(x < 0.0, x, 0.0))
     if static(y) and y <= 0.0:
-        return ops.where(positive, value, 1.0 / ops.where(x < 0.0, 0.0, x) if y < 0.0 else value)
-    # 0 / 0 where x < 0; its gradient is finite at x = 0, where the one of log is not
-    return ops.where(positive, value, (0.0 * x) / ops.where(x < 0.0, 0.0, 1.0))
+        return ops.where(positive, value, 1.0 / domain if y < 0.0 else value)
+    return ops.where(positive, value, domain)
 
 
 power = _function(np.power, _power)

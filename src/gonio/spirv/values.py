@@ -56,6 +56,8 @@ def numeric(value: Value) -> Value:
         return 0.0
     if isinstance(value, Bits):
         raise refuse("a bit operation on an integer that varies", "compute with floats")
+    if not _computes(value):
+        raise refuse(f"a {type(value).__name__.lower()} in place of a number", "compile it again")
     return float(value) if isinstance(value, int) else value
 
 

@@ -270,7 +270,8 @@ def bounds(declared: Declared) -> tuple[float, float, Any]:
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
     """The fields of a parameter: one, or one per component of vectors that are no colors."""
-    name = f"{declared.name}_" if declared.name in _RESERVED else declared.name.lstrip("_")
+    name = declared.name.lstrip("_")
+    name = f"{name}_" if name in _RESERVED else name
     uniform = declared.uniform
     doc = uniform.doc or f"{declared.shape} {declared.name} of the shader"
     low, high, default = bounds(declared)

@@ -75,6 +75,9 @@ class Program:
             names.add(name)
             shape = self.module.shape(type)
             if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
+                if not name.lstrip("_").isidentifier():  # it becomes a name in Python; SPIR-V's may be any text
+                    hint = "letters, digits and _ that begin with a letter; of SPIR-V: compile it with names"
+                    raise InputError(f"{name[:40]!r} as the name of a parameter", self.where, hint)
                 uniform = self._stated(name) or Uniform()
                 if uniform.default is None and name in self.module.defaults:
                     uniform = replace(uniform, default=self.module.defaults[name])
@@ -165,7 +168,12 @@ class Program:
             kind = self.module.type(type)
             return self.module.zero(kind.parts[0] if kind.kind == "pointer" else type)
         if meaning != "parameter":
-            value = _GIVEN[meaning](directions)
+            try:
+                value = _GIVEN[meaning](directions)
+            except KeyError as error:
+                what = f"'{meaning}' as an argument of a function that is not given {error.args[0]!r}"
+                hint = "eval and pdf have light and view, sample view and u, albedo the view"
+                raise InputError(what, self.where, hint) from None
             kind = self.module.type(type)
             kind = self.module.type(kind.parts[0]) if kind.kind == "pointer" else kind
             return value[: kind.length] if kind.kind == "vector" and isinstance(value, tuple) else value

@@ -118,11 +118,12 @@ class _Called:
 
 
 def _is_power(node: graph.Node) -> bool:
-    """Whether it is the 0 / 0 that stands for a shader's power of a negative number: its divisor chooses 0 or 1."""
-    divisor = node.args[1] if node.op == "div" else None
-    if not isinstance(divisor, graph.Node) or divisor.op != "where":
+    """Whether it is the root that stands for a shader's power of a negative number: of x where x < 0, else of 0."""
+    base = node.args[0] if node.op == "sqrt" else None
+    if not isinstance(base, graph.Node) or base.op != "where" or _constant(base.args[2]) != 0.0:
         return False
-    return [_constant(one) for one in divisor.args[1:]] == [0.0, 1.0]
+    below = base.args[0]
+    return isinstance(below, graph.Node) and below.op == "lt" and below.args[0] is base.args[1]
 
 
 def _constant(one: object) -> object:

@@ -1,0 +1,67 @@
+"""The limits of a call: instructions, and seconds.
+
+A short text can ask for any amount of work: twenty functions that call the one before twice are a million calls. The
+largest shader of an engine that we know, the program of three-gpu-pathtracer, runs 4,054 instructions, and a loop
+of 4,096 rounds over a page of code 200,000.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import Iterator
+
+from .module import Function, Module
+from .values import Value, refuse
+
+MAX_INSTRUCTIONS = 250_000  # per call from outside
+SECONDS = 20.0  # of the thread, per call from outside: a single instruction may compute an array of 65,536 numbers
+COPIED = 256  # numbers of an array whose copy counts as one instruction more, in time and memory
+_HINT = "store what a function returned and use it again; shorten loops"
+
+
+class Work:
+    """What a call has done so far, by function. Raises InputError beyond the limits."""
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self.instructions, self.calls = Counter[int](), Counter[int]()
+        self.total, self.end = 0, time.thread_time() + SECONDS
+
+    def enter(self, function: Function) -> None:
+        """A call begins."""
+        self.calls[function.id] += 1
+
+    def step(self, function: Function) -> None:
+        """An instruction runs."""
+        self._add(function, 1)
+        if time.thread_time() > self.end:
+            raise refuse(f"over {SECONDS:g} s to run the shader once: {self._most()}", _HINT)
+
+    @contextlib.contextmanager
+    def shared(self, function: Function) -> Iterator[None]:
+        """A call that is recorded once for all calls alike: each counts, since each runs when values are computed."""
+        before = self.total
+        yield
+        if self.total > before:
+            self.module.costs[function.id] = max(self.total - before, self.module.costs.get(function.id, 0))
+        else:
+            self.enter(function)
+            self._add(function, self.module.costs.get(function.id, 0))
+
+    def _add(self, function: Function, count: int) -> None:
+        self.instructions[function.id] += count
+        self.total += count
+        if self.total > MAX_INSTRUCTIONS:
+            raise refuse(f"more than {MAX_INSTRUCTIONS:,} instructions: {self._most()}", _HINT)
+
+    def copied(self, value: Value) -> None:
+        """A value was made; one of many numbers counts as several instructions."""
+        if isinstance(value, tuple):
+            self.total += len(value) // COPIED
+
+    def _most(self) -> str:
+        (id, count), *_ = self.instructions.most_common(1)
+        name = self.module.names.get(id, str(id)).partition("(")[0]
+        return f"{count:,} in {self.calls[id]:,} calls of '{name}'"
