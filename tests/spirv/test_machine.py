@@ -181,3 +181,12 @@ def test_texels_are_fetched_by_integers() -> None:
         return Machine(module, {}, {"t": table}).call(module.function("f")[0], [x])
 
     np.testing.assert_array_equal(ops.record(formula, x="float").evaluate(x=X), np.where(X < 0.5, 2.0, 3.0))
+
+
+def test_nested_loops_of_known_length_are_counted_apart() -> None:
+    text = "float f(float x) { float s = 0.0; for (int i = 0; i < %d; ++i) for (int j = 0; j < %d; ++j) %s return s; }"
+    np.testing.assert_allclose(value(text % (70, 70, "s += x;")), 4900 * X, rtol=1e-12)
+    with pytest.raises(InputError, match="a loop of more than 4096 iterations"):
+        value(text % (1, 5000, "s += x;"))
+    with pytest.raises(InputError, match="more than 1000000 steps"):
+        value(text % (4000, 4000, "s += 1.0;"))

@@ -85,6 +85,7 @@ class Adapter:
     lossless_tolerance  the loss that is meant in a white furnace, None makes no claim
     includes     folders, relative to the shader, from which it may include
     defines      macros
+    unset_is_zero  whether variables and inputs that nothing sets are 0; else a shader that reads one is refused
     """
 
     function: str = ""
@@ -99,6 +100,7 @@ class Adapter:
     albedo_tolerance: float = 0.01
     lossless_tolerance: float | None = None
     transmits: bool = False
+    unset_is_zero: bool = False
     language: str = ""
     doc: str = ""
     includes: tuple[str, ...] = ()
@@ -122,9 +124,9 @@ def read(path: Path) -> Adapter:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"no adapter: {error}", str(path), "TOML as `gonio adopt` writes it") from None
     kinds = {"function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
-             "sample_arguments": list, "transmits": bool, "language": str, "doc": str, "includes": list,
-             "defines": dict, "parameters": dict, "textures": dict, "albedo": str, "albedo_arguments": list,
-             "albedo_tolerance": float, "lossless_tolerance": float}  # fmt: skip
+             "sample_arguments": list, "transmits": bool, "unset_is_zero": bool, "language": str, "doc": str,
+             "includes": list, "defines": dict, "parameters": dict, "textures": dict, "albedo": str,
+             "albedo_arguments": list, "albedo_tolerance": float, "lossless_tolerance": float}  # fmt: skip
     for key, value in content.items():
         if key not in kinds:
             raise InputError(f"unknown key '{key}'", str(path), did_you_mean(key, list(kinds)))

@@ -16,6 +16,7 @@ from ...material.sample import Sample
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend
 from ...ops.types import Value
 from ...spirv.values import leaves, numeric, truth, where
+from .declared import INTEGERS
 
 if TYPE_CHECKING:
     from .program import Program
@@ -56,8 +57,11 @@ class _ShaderFile(BSDF):
         values: dict[str, Value] = {}
         for name, fields in self.fields.items():
             given = [getattr(self, field) for field in fields]
-            if self.program.parameters[name].shape == "vec3":
+            shape = self.program.parameters[name].shape
+            if shape == "vec3":
                 values[name] = tuple(ops.channels(given[0]))
+            elif shape in INTEGERS:
+                values[name] = int(given[0])
             else:
                 values[name] = given[0] if len(given) == 1 else tuple(given)
         return values
