@@ -374,3 +374,47 @@ def test_a_fit_frees_a_uniform_that_is_1(tmp_path: Path) -> None:
     Path(f"{file}.toml").write_text("[parameters.gloss]\ndefault = 1.0\nlow = 0.0\nhigh = 1.0\n")
     assert [one.path for one in free_of(go.Shader(file), {})] == ["gloss"]
     assert "albedo" not in [one.path for one in free_of(go.Conductor(), {})]
+
+
+def test_quoted_include_is_found_beside_the_shader(tmp_path: Path) -> None:
+    folder = tmp_path / "own"
+    (folder / "parts").mkdir(parents=True)
+    (folder / "named").mkdir()
+    written(folder, "half.glsl", '#include "parts/more.glsl"\nfloat half_of(float x) { return more(0.5 * x); }')
+    written(folder / "parts", "more.glsl", '#include "least.glsl"\nfloat more(float x) { return x + LEAST; }')
+    written(folder / "parts", "least.glsl", "#define LEAST 0.1\n")
+    written(folder / "named", "half.glsl", "float half_of(float x) { return 0.0; }")
+    text = "#include %s\nvec3 brdf(vec3 L, vec3 V) { return vec3(half_of(0.4)); }"
+    file = written(folder, "a.glsl", text % '"half.glsl"')
+    for adapter in ("", "includes = ['named']"):
+        written(folder, "a.glsl.toml", adapter)
+        np.testing.assert_allclose(go.Shader(file).eval(WO, WI, precision="float64")[:, 0], 0.3 * WI[:, 2], rtol=1e-6)
+    written(tmp_path, "outside.glsl", "float half_of(float x) { return x; }")
+    for name in ('"../outside.glsl"', "<outside>"):
+        written(folder, "b.glsl", text % name)
+        with pytest.raises(InputError, match=r"outside.* lies in no folder"):
+            go.Shader(str(folder / "b.glsl"))
+
+
+@pytest.mark.parametrize("suffix", ["glsl", "hlsl"])
+def test_messages_name_the_included_file(tmp_path: Path, suffix: str) -> None:
+    written(tmp_path, f"lib.{suffix}", "float half_of(float x) {\n  discard; return x; }\n")
+    types = ("vec3", "vec3(half_of(0.4))") if suffix == "glsl" else ("float3", "half_of(0.4)")
+    text = '#include "lib.%s"\nT brdf(T L, T V) { return %s; }'.replace("T", types[0])
+    file = written(tmp_path, f"a.{suffix}", text % (suffix, types[1]))
+    with pytest.raises(InputError, match="discard") as error:
+        go.Shader(file)
+    assert error.value.where == f"{tmp_path / f'lib.{suffix}'}:2"
+    written(tmp_path, f"lib.{suffix}", "\nfloat half_of(float x) { return missing; }\n")
+    with pytest.raises(InputError, match="missing") as error:
+        go.Shader(file)
+    assert error.value.where == f"{tmp_path / f'lib.{suffix}'}:2"
+
+
+def test_texel_at_constant_coordinates_meets_values(tmp_path: Path) -> None:
+    text = """uniform sampler2D t;
+vec3 brdf(vec3 L, vec3 V) { return L.z * (texture(t, vec2(0.75, 0.25)).rgb + texelFetch(t, ivec2(0, 1), 0).rgb); }"""
+    np.save(tmp_path / "table.npy", np.arange(4.0).reshape(2, 2, 1) / 30)
+    written(tmp_path, "a.glsl.toml", '[textures.t]\nfile = "table.npy"\nfilter = "nearest"\n')
+    made = go.Shader(written(tmp_path, "a.glsl", text))
+    np.testing.assert_allclose(made.eval(WO, WI, precision="float64")[:, 0], 0.1 * WI[:, 2] ** 2, rtol=1e-6)

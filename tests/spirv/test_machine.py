@@ -219,3 +219,12 @@ def test_powers_of_negative_numbers_are_nan_in_the_emitted_text_too(tmp_path: Pa
     expected = [np.nan, np.inf, 0.8 * (0.1 + 0.36 + 0.6**-0.5)]
     for values in (material.eval(wo, wi, precision="float64"), file.eval(wo, wi)):
         np.testing.assert_allclose(values[:, 0], expected, rtol=1e-7)
+
+
+def test_nested_loops_of_known_length_are_counted_apart() -> None:
+    text = "float f(float x) { float s = 0.0; for (int i = 0; i < %d; ++i) for (int j = 0; j < %d; ++j) %s return s; }"
+    np.testing.assert_allclose(value(text % (70, 70, "s += x;")), 4900 * X, rtol=1e-12)
+    with pytest.raises(InputError, match="a loop of more than 4096 iterations"):
+        value(text % (1, 5000, "s += x;"))
+    with pytest.raises(InputError, match="more than 250,000 instructions"):
+        value(text % (4000, 4000, "s += 1.0;"))

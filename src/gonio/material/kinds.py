@@ -302,6 +302,42 @@ class ChoiceParameter(Parameter):
             raise InputError(f"unknown {self.name} '{value}'", location, did_you_mean(str(value), list(known)))
 
 
+@dataclass(frozen=True)
+class IntegerParameter(ChoiceParameter):
+    """A whole number that shapes the code, held as text: a choice, in which every number of the range may be made.
+
+    `choices` lists those that are tried: the first ones of a large range.
+    """
+
+    @property
+    def choices(self) -> dict[str, str]:
+        default = float(self.default)
+        low = self.low if math.isfinite(self.low) else min(0.0, default)
+        high = self.high if math.isfinite(self.high) else max(_LEAST - 1.0, default)
+        listed = (str(int(low) + place) for place in range(min(int(high - low) + 1, _MOST)))
+        return dict.fromkeys((*listed, str(int(default))), "")
+
+    @property
+    def range(self) -> str:
+        low = f" >= {self.low:g}" if math.isfinite(self.low) else ""
+        return f"a whole number{low}" + (f" <= {self.high:g}" if math.isfinite(self.high) else "")
+
+    def coerce(self, value: object, location: str) -> Value:
+        self.check(value, location)
+        return str(int(float(str(value))))
+
+    def check(self, value: object, location: str) -> None:
+        try:
+            number = math.nan if isinstance(value, bool) else float(str(value))
+        except ValueError:
+            number = math.nan
+        if not number.is_integer() or not self.low <= number <= self.high:
+            raise InputError(f"{str(value)[:40]} given, {self.range} expected", location)
+
+
+_LEAST, _MOST = 4, 16  # integers that are tried of a range without an end
+
+
 class FlagParameter(Parameter):
     """A switch that shapes the code."""
 

@@ -32,6 +32,7 @@ from .kinds import (
 from .kinds import ChoiceParameter as ChoiceParameter
 from .kinds import Floats as Floats
 from .kinds import IndexParameter as IndexParameter
+from .kinds import IntegerParameter as IntegerParameter
 from .kinds import Material as Material
 from .kinds import Parameter as Parameter
 from .kinds import Value as Value

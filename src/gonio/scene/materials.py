@@ -51,7 +51,7 @@ from ..catalog.documents import Document
 from ..catalog.texts import SHADER
 from ..errors import GonioError, GonioWarning, InputError
 from ..material import BSDF, Parameter, models
-from ..material.parameters import ChoiceParameter, IndexParameter
+from ..material.parameters import ChoiceParameter, IndexParameter, IntegerParameter
 from ..measure import SAMPLE, parted
 from ..optics.dispersion import DispersiveIndex
 from .files import located
@@ -301,6 +301,11 @@ def _chosen(parameter: ChoiceParameter, key: str) -> Callable[[object, Validatio
                 return outside.member(value, context.get("folder"), key, parameter.family)
             except InputError as error:
                 raise invalid(f"{error.where}: {error.what}", error.hint) from None
+        if isinstance(parameter, IntegerParameter):
+            try:
+                return str(parameter.coerce(value, key))
+            except InputError as error:
+                raise invalid(error.what, error.hint) from None
         known = parameter.choices
         if not isinstance(value, str) or value not in known:
             *names, last = [f"'{name}'" for name in known]
@@ -312,6 +317,8 @@ def _chosen(parameter: ChoiceParameter, key: str) -> Callable[[object, Validatio
 
 
 def _choice_schema(parameter: ChoiceParameter) -> dict[str, Any]:
+    if isinstance(parameter, IntegerParameter):
+        return {"type": ["integer", "string"]}
     names: dict[str, Any] = {"type": "string", "enum": list(parameter.choices)}
     return names if parameter.family is None else {"anyOf": [names, {"type": "string", "pattern": _CODE}]}
 

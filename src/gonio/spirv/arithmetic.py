@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import ops
 from .bits import flipped, joined, masked, shifted_left, shifted_right
-from .values import UNDEFINED, Bits, Value, both, either, folded, negated, numeric, refuse, select, static, truth
+from .values import Bits, Undefined, Value, both, either, folded, lost, negated, numeric, refuse, select, static
 
 
 def elementwise(function: Callable[..., Value], *values: Value) -> Value:
@@ -27,10 +27,22 @@ def elementwise(function: Callable[..., Value], *values: Value) -> Value:
     return tuple(elementwise(function, *row) for row in zip(*rows, strict=True))
 
 
+def passing(function: Callable[..., Value]) -> Callable[..., Value]:
+    """A function of scalars that passes on the first undefined one."""
+
+    def passed(*scalars: Value) -> Value:
+        undefined = lost(scalars)
+        return function(*scalars) if undefined is None else undefined
+
+    return passed
+
+
 def _float(plain: Callable[..., object], on_values: Callable[..., Value]) -> Callable[..., Value]:
     """A function of floats: folded by NumPy if all are known."""
 
     def function(*values: Value) -> Value:
+        if (undefined := lost(values)) is not None:
+            return undefined
         floats = [numeric(value) for value in values]
         if all(map(static, floats)):
             return folded(plain, *floats)
@@ -97,7 +109,7 @@ def is_infinite(x: Value) -> Value:
 
 def _as_integer(x: Value) -> Value:
     """An integer: a plain one, or a float with a whole value."""
-    return 0 if x is UNDEFINED else int(x) if static(x) else x
+    return int(x) if static(x) else x
 
 
 def _integer(plain: Callable[..., int], on_values: Callable[..., Value] | None) -> Callable[..., Value]:
@@ -166,11 +178,11 @@ COMPARED: dict[str, Callable[..., Value]] = {
     "ILessEqual": _compare(operator.le),
 }
 LOGIC: dict[str, Callable[..., Value]] = {
-    "LogicalOr": lambda a, b: either(truth(a), truth(b)),
-    "LogicalAnd": lambda a, b: both(truth(a), truth(b)),
-    "LogicalNot": lambda a: negated(truth(a)),
-    "LogicalEqual": lambda a, b: _same(truth(a), truth(b)),
-    "LogicalNotEqual": lambda a, b: negated(_same(truth(a), truth(b))),
+    "LogicalOr": either,
+    "LogicalAnd": both,
+    "LogicalNot": negated,
+    "LogicalEqual": lambda a, b: _same(a, b),
+    "LogicalNotEqual": lambda a, b: negated(_same(a, b)),
 }
 
 
@@ -208,14 +220,16 @@ def matrix_vector(matrix: tuple[Value, ...], vector: tuple[Value, ...]) -> Value
 def choose(mask: Value, a: Value, b: Value) -> Value:
     """OpSelect: by one mask, or component by component."""
     if isinstance(mask, tuple):
-        return tuple(select(truth(m), x, y) for m, x, y in zip(mask, a, b, strict=True))
-    return select(truth(mask), a, b)
+        return tuple(choose(m, x, y) for m, x, y in zip(mask, a, b, strict=True))
+    if isinstance(mask, Undefined):
+        return elementwise(lambda x, y: mask, a, b)
+    return select(mask, a, b)
 
 
 WHOLE: dict[str, Callable[..., Value]] = {
     "Dot": dot,
-    "Any": lambda v: reduce(either, map(truth, v)),
-    "All": lambda v: reduce(both, map(truth, v)),
+    "Any": lambda v: reduce(either, v),
+    "All": lambda v: reduce(both, v),
     "Transpose": transpose,
     "MatrixTimesVector": matrix_vector,
     "VectorTimesMatrix": lambda v, m: tuple(dot(v, column) for column in m),

@@ -11,7 +11,7 @@ import math
 import struct
 
 from .. import ops
-from .values import UNDEFINED, Bits, Value, numeric, refuse, static, wrapped
+from .values import Bits, Value, numeric, refuse, static, wrapped
 
 MANTISSA = 23  # bits
 BIAS = 127
@@ -20,8 +20,6 @@ SIGN, MAGNITUDE = 0x80000000, 0x7FFFFFFF
 
 def cast(value: Value, kind: str) -> Value:
     """The bits of a scalar as another type, "float", "int" or "uint"."""
-    if value is UNDEFINED:
-        return 0.0 if kind == "float" else 0
     if static(value):
         words = struct.pack("<f", value) if isinstance(value, float) else struct.pack("<I", wrapped(int(value), False))
         if kind == "float":

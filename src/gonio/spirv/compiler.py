@@ -37,7 +37,7 @@ _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re
 _MISSING = "'%s' lies in no folder that may be included from"
 _ERROR = re.compile(r"'#error' : gonio_missing (\d+)")
 _CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # of another error
-_FOLDER = "name the folder in the adapter: includes = ['FOLDER']"
+_FOLDER = "name its folder in the adapter: includes = ['FOLDER'], ['.'] for #include <FILE> beside the shader"
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 # of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
 _REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
@@ -71,6 +71,7 @@ def compile_text(
     language: str = "glsl",
     defines: Mapping[str, str] | None = None,
     folders: Sequence[Path] = (),
+    own_folder: Path | None = None,
     read: list[Path] | None = None,
 ) -> bytes:
     """The SPIR-V of a text.
@@ -79,10 +80,11 @@ def compile_text(
     language  "glsl", "hlsl" or "slang"
     defines   macros; a `main` of the text is renamed, and globals are assigned in one of ours
     folders   where #include may read
+    own_folder  the text's: where #include "FILE" looks first, None for none
     read      gets the files that are included
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
     """
-    sources = _Sources(name, folders, defines or {})
+    sources = _Sources(name, folders, defines or {}, own_folder)
     try:
         expanded = sources.expanded(text, name, 0)
     finally:
@@ -99,7 +101,7 @@ def compile_text(
     if language == "glsl":
         old = "".join(f"#define {a} {b}\n" for a, b in _OLD.items() if re.search(rf"\b{a}\b", expanded))
         entry = "\n#undef main\nvoid main() {}\n"
-        head = f"#version 450\n{head}{old}"
+        head = f"#version 450\n#extension GL_GOOGLE_cpp_style_line_directive : enable\n{head}{old}"
     else:
         if re.search(r"\bselect\s*\(", expanded) and not re.search(r"\w\s+select\s*\([^;]*?\)\s*\{", expanded):
             head += "#define select(mask, a, b) ((mask) ? (a) : (b))\n"  # HLSL 2021's, which glslang lacks
@@ -162,8 +164,9 @@ def _without_members(text: str) -> str:
 class _Sources:
     """The text with its includes, which get numbers by which the compiler's messages name them."""
 
-    def __init__(self, name: str, folders: Sequence[Path], defines: Mapping[str, str]) -> None:
+    def __init__(self, name: str, folders: Sequence[Path], defines: Mapping[str, str], own_folder: Path | None) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
+        self.own_folders = [own_folder.resolve()] if own_folder is not None else []
         self.defines, self.missing = defines, list[str]()
         self.once: dict[Path, list[Context]] = {}  # guarded files, and the conditions under which they were included
 
@@ -177,7 +180,7 @@ class _Sources:
         def include(match: re.Match[str]) -> str:
             line = text.count("\n", 0, match.start()) + first
             file, _, literal = match[1].partition("#")
-            path, under = self._located(file, name), (*outer, *context(text, match.start()))
+            path, under = self._located(file, name, match[0].count('"') > 1), (*outer, *context(text, match.start()))
             if path is None:
                 if under:  # perhaps in a branch that is left out, as headers for several languages have them
                     self.missing.append(file)
@@ -196,10 +199,17 @@ class _Sources:
             self.names.append(str(path))
             number = len(self.names) - 1
             inside = self.expanded(content, str(path), depth + 1, start, under)
-            copy = guarded(content, f"#line {start} {number}\n{inside}", f"GONIO_ONCE_{self.names.index(str(path))}")
-            return f"{copy}\n#line {line + 1} {own}"
+            copy = guarded(
+                content, f"#line {start} {self.mark(number)}\n{inside}", f"GONIO_ONCE_{self.names.index(str(path))}"
+            )
+            return f"{copy}\n#line {line + 1} {self.mark(own)}"
 
         return _INCLUDE.sub(include, text)
+
+    def mark(self, number: int) -> str:
+        """A file's name for #line, by which instructions name it; its number if the name cannot be quoted."""
+        name = self.names[number]
+        return f'"{name}"' if not set(name) & set('"\\\n') else str(number)
 
     def _varied(self, content: str, after: str, where: str) -> str:
         """An included text, once per index or with other names, as the rest of the line of its include states."""
@@ -234,13 +244,16 @@ class _Sources:
         if self.size + size > MAX_TEXT:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
-    def _located(self, file: str, name: str) -> Path | None:
-        """An include of the file `name`: in the named folders, or beside an include that is itself in one of them."""
-        nearby = [Path(name).parent] if name in self.names[1:] else []
-        for folder in [*self.folders, *nearby]:
+    def _located(self, file: str, name: str, quoted: bool) -> Path | None:
+        """An include of the file `name`: of the text itself, if in quotes, beside it; in the named folders; of an
+        include beside it, if that is in one of them."""
+        included = name in self.names[1:]
+        first, last = ([], [Path(name).parent]) if included else (self.own_folders if quoted else [], [])
+        allowed = [*self.folders, *self.own_folders]
+        for folder in [*first, *self.folders, *last]:
             for suffix in _SUFFIXES:
                 path = (folder / f"{file}{suffix}").resolve()
-                if any(path.is_relative_to(one) for one in self.folders) and path.is_file():
+                if any(path.is_relative_to(one) for one in allowed) and path.is_file():
                     return path
         return None
 
@@ -306,7 +319,9 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
 
 
 def _place(sources: _Sources, name: str, number: str, line: str) -> str:
-    """The user's file and line, from the compiler's number of a file."""
+    """The user's file and line, from the compiler's number or name of a file."""
+    if number in sources.names:
+        return f"{number}:{line}" if line else number
     place = int(number) if number.isdecimal() else 0
     file = sources.names[place] if place < len(sources.names) else name
     return f"{file}:{line}" if line else file

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from .. import ops
 from .module import MAX_LEAVES, Module
-from .values import UNDEFINED, Value, both, leaves, numeric, refuse, select, static
+from .values import Undefined, Value, both, leaves, refuse, select, static
 
 MAX_DYNAMIC = 64  # items of an array that is indexed by a value that varies, unless all are constants
 MAX_NESTED = 16
 
 
 class Cell:
-    """A variable: its value, and its id in its function."""
+    """A variable: its value, and its id in its function; `partial` if parts of it may be undefined."""
 
-    __slots__ = ("id", "value")
+    __slots__ = ("id", "partial", "value")
 
-    def __init__(self, value: Value, id: int = 0) -> None:
-        self.value, self.id = value, id
+    def __init__(self, value: Value, id: int = 0, partial: bool = True) -> None:
+        self.value, self.id, self.partial = value, id, partial
 
 
 class Pointer:
@@ -31,19 +32,36 @@ class Pointer:
     def __init__(self, cell: Cell, path: tuple[Value, ...] = ()) -> None:
         self.cell, self.path = cell, path
 
-    def load(self) -> Value:
+    def load(self, where: str = "") -> Value:
+        """The value; undefined parts get the file and line of this read."""
         value = self.cell.value
         for index in self.path:
             value = at(value, index)
-        return value
+        if not self.cell.partial:
+            return value
+        result = placed(value, where)
+        self.cell.partial = bool(self.path) or result is not value
+        return result
 
     def store(self, value: Value, mask: Value) -> None:
         self.cell.value = _stored(self.cell.value, self.path, value, mask)
 
 
+def placed(value: Value, where: str) -> Value:
+    """A value whose undefined scalars have the place at which they are read; the same object if it has none."""
+    if isinstance(value, Undefined):
+        return value.at(where)
+    if not isinstance(value, tuple):
+        return value
+    parts = tuple(placed(part, where) for part in value)
+    return value if all(map(operator.is_, parts, value)) else parts
+
+
 def _stored(old: Value, path: tuple[Value, ...], value: Value, mask: Value) -> Value:
     if not path:
         return select(mask, value, old)
+    if isinstance(old, Undefined) or isinstance(path[0], Undefined):
+        raise (old if isinstance(old, Undefined) else path[0]).error()
     if not isinstance(old, tuple):
         raise TypeError("an index into a number")
     index, rest = path[0], path[1:]
@@ -62,6 +80,10 @@ def _inside(value: tuple[Value, ...], index: Value) -> int:
 
 def at(value: Value, index: Value) -> Value:
     """A part of a composite; an index that varies selects among the parts."""
+    if isinstance(value, Undefined):
+        return value
+    if isinstance(index, Undefined):
+        raise index.error()
     if not isinstance(value, tuple):
         raise TypeError("an index into a number")
     if static(index):
@@ -80,16 +102,6 @@ def at(value: Value, index: Value) -> Value:
 
 def _shaped(like: Value, flat: object) -> Value:
     return tuple(_shaped(part, flat) for part in like) if isinstance(like, tuple) else next(flat)  # type: ignore[call-overload]
-
-
-def undefined(module: Module, type: int) -> Value:
-    """The value of a variable without an initial one, part by part."""
-    kind = module.type(type)
-    if kind.kind == "struct":
-        return tuple(undefined(module, part) for part in kind.parts)
-    if kind.kind in ("vector", "matrix", "array"):
-        return (undefined(module, kind.parts[0]),) * kind.length
-    return UNDEFINED
 
 
 def scalars(value: Value) -> list[Value]:
@@ -129,12 +141,6 @@ def _access(module: Module, type: int, base: Value, *path: Value) -> Value:
     return Pointer(base.cell, (*base.path, *path))
 
 
-def _load(module: Module, type: int, pointer: Value, *more: Value) -> Value:
-    if not isinstance(pointer, Pointer):
-        raise TypeError("no pointer")
-    return pointer.load()
-
-
 def _insert_dynamic(module: Module, type: int, vector: Value, value: Value, index: Value) -> Value:
     return _stored(vector, (index,), value, True)
 
@@ -142,7 +148,6 @@ def _insert_dynamic(module: Module, type: int, vector: Value, value: Value, inde
 COMPOSED: dict[str, Callable[..., Value]] = {
     "CompositeConstruct": _construct,
     "AccessChain": _access,
-    "Load": _load,
     "VectorExtractDynamic": lambda module, type, vector, index: at(vector, index),
     "VectorInsertDynamic": _insert_dynamic,
 }
@@ -156,7 +161,7 @@ def literal(name: str, values: list[Value], numbers: Sequence[int]) -> Value:
     if name == "CompositeExtract":
         value = values[0]
         for number in numbers:
-            value = value[number] if isinstance(value, tuple) else _no_part()
+            value = value[number] if isinstance(value, tuple) else _no_part(value)
         return value
     if name == "CompositeInsert":
         _size(values[0])
@@ -165,10 +170,7 @@ def literal(name: str, values: list[Value], numbers: Sequence[int]) -> Value:
     return tuple(0.0 if number == 0xFFFFFFFF else both_vectors[number] for number in numbers)
 
 
-def _no_part() -> Value:
+def _no_part(value: Value) -> Value:
+    if isinstance(value, Undefined):
+        return value
     raise TypeError("a part of a number")
-
-
-def as_floats(value: Value) -> list[Value]:
-    """The scalars of a vector, undefined ones as 0."""
-    return [numeric(leaf) for leaf in leaves(value)]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import ops
+from ..ops.table import fetch_in_numpy
 from .arithmetic import floor, multiply
 from .standard import fract
-from .values import Value, leaves, numeric, refuse, static, where
+from .values import Undefined, Value, leaves, lost, numeric, refuse, static, where
 
 WRAPS = ("clamp", "repeat")
 FILTERS = ("linear", "nearest")
@@ -21,15 +22,24 @@ class Texture:
 
     wrap    "clamp" to the edge, or "repeat"
     filter  "linear" between the centers of texels, or "nearest"
+    dimensions, declared  of the shader's declaration: 0 and "" if it is unknown; else the number of coordinates, and
+                          what kind of texture that is not read it is
     """
 
     name: str
     table: ops.Table | None
     wrap: str = "clamp"
     filter: str = "linear"
+    dimensions: int = 0
+    declared: str = ""
 
     def texels(self) -> ops.Table:
-        """The table. Raises InputError if there is none."""
+        """The table. Raises InputError if there is none, or none of the declared kind."""
+        if self.declared:
+            raise refuse(f"'{self.name}' is {self.declared}", "tables are textures of one, two or three dimensions")
+        if self.table is not None and self.dimensions not in (0, len(self.table.shape)):
+            what = f"the texture '{self.name}' has {self.dimensions} dimensions, its table {len(self.table.shape)}"
+            raise refuse(what, "an .npy with one axis per dimension, and one of channels")
         if self.table is None:
             raise refuse(f"the texture '{self.name}' has no file", f"[textures] {self.name} = 'FILE' in the adapter")
         return self.table
@@ -38,6 +48,8 @@ class Texture:
 def sampled(name: str, values: list[Value]) -> Value:
     """An instruction on textures."""
     texture = values[0]
+    if isinstance(texture, Undefined):
+        raise texture.error()
     if not isinstance(texture, Texture):
         raise TypeError("no texture")
     if name in ("SampledImage", "Image"):
@@ -45,21 +57,30 @@ def sampled(name: str, values: list[Value]) -> Value:
     table = texture.texels()
     if name == "ImageQuerySize":
         return tuple(reversed(table.shape))
+    if (undefined := lost(leaves(values[1]))) is not None:
+        return (undefined,) * 4
     places = [numeric(leaf) for leaf in leaves(values[1])][: len(table.shape)]
     if len(places) != len(table.shape):
         raise refuse(f"{len(places)} coordinates of the texture '{texture.name}' of shape {table.shape}")
     places = places[::-1]  # u runs along a row, the last axis
     places = _varying(places)
     if name == "ImageFetch":
-        return _four(ops.fetch(table, *places))
+        return _four(_fetched(table, places))
     if texture.filter == "nearest":
         at = [_wrapped(x, texture.wrap) for x in places]
-        return _four(ops.fetch(table, *[floor(multiply(x, float(n))) for x, n in zip(at, table.shape, strict=True)]))
+        return _four(_fetched(table, [floor(multiply(x, float(n))) for x, n in zip(at, table.shape, strict=True)]))
     if texture.wrap == "clamp":
         return _four(ops.lookup(table, *places))
     padded = _padded(table)
     inner = [(fract(x) * float(n) + 1.0) / float(n + 2) for x, n in zip(places, table.shape, strict=True)]
     return _four(ops.lookup(padded, *inner))
+
+
+def _fetched(table: ops.Table, places: list[Value]) -> tuple[Value, ...]:
+    """The channels of a texel: plain numbers at a place that is known."""
+    if all(map(static, places)):
+        return tuple(float(channel) for channel in fetch_in_numpy(table, *places))
+    return ops.fetch(table, *places)
 
 
 def _varying(places: list[Value]) -> list[Value]:

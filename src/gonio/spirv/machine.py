@@ -12,19 +12,34 @@ from collections.abc import Mapping, Sequence
 from ..errors import InputError
 from ..ops import graph
 from . import calls, composites
-from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise
+from .arithmetic import COMPARED, FLOATS, INTEGERS, LOGIC, WHOLE, elementwise, passing
 from .bits import cast
 from .composites import Cell, Pointer
 from .flow import Flow, flow_of
 from .images import Texture, sampled
+from .inputs import initial
 from .messages import ALONE
 from .module import BUFFERS, UNIFORM, Block, Function, Instruction, Module
 from .opcodes import REFUSED
 from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
-from .values import UNDEFINED, Value, both, either, negated, refuse, select, static, truth, wrapped
+from .values import (
+    UNDEFINED,
+    Undefined,
+    Value,
+    both,
+    either,
+    leaves,
+    lost,
+    negated,
+    refuse,
+    select,
+    static,
+    truth,
+    wrapped,
+)
 from .work import Work
 
-MAX_ITERATIONS = 4096  # of a loop whose counter is known
+MAX_ITERATIONS = 4096  # of a loop whose counter is known, each time it is entered
 MAX_VARYING = 256  # of a loop that only values can end
 MAX_DEPTH = 64  # of calls
 
@@ -45,16 +60,23 @@ class Frame:
 class Machine:
     """A module ready to run.
 
-    globals  name of a global -> its value; others are 0. Members of a block without a name are globals themselves.
+    globals  name of a global -> its value. Members of a block without a name are globals themselves.
     textures name of a sampler -> its texture
+    zero     whether variables that nothing sets are 0; else they are refused where a result depends on them
     """
 
     def __init__(
-        self, module: Module, globals: Mapping[str, Value] | None = None, textures: Mapping[str, Texture] | None = None
+        self,
+        module: Module,
+        globals: Mapping[str, Value] | None = None,
+        textures: Mapping[str, Texture] | None = None,
+        zero: bool = False,
     ) -> None:
-        self.module = module
-        self._given, self._textures = dict(globals or {}), dict(textures or {})
-        self._globals = {id: Pointer(Cell(self._initial(one))) for id, one in module.variables.items()}
+        self.module, self._zero = module, zero
+        self._globals = {
+            id: Pointer(Cell(initial(module, one, globals or {}, textures or {}, zero)))
+            for id, one in module.variables.items()
+        }
         self._read_only = {
             id(self._globals[variable].cell): one
             for variable, one in module.variables.items()
@@ -96,33 +118,6 @@ class Machine:
             if self.module.names.get(id) == name:
                 return one.cell.value
         raise KeyError(name)
-
-    # ------------------------------------------------------------------ globals
-
-    def _initial(self, one: Instruction) -> Value:
-        kind = self.module.type(one.type)
-        inside = kind.parts[0]
-        name = self.module.names.get(one.result, "")
-        if len(one.operands) > 1 and not (one.operands[0] == UNIFORM and name in self._given):
-            return self.module.constants[one.operands[1]]
-        if name in self._textures:
-            return self._textures[name]
-        if name in self._given:
-            return self._given[name]
-        if self.module.type(inside).kind == "struct":
-            return self._struct(inside)
-        if self.module.type(inside).kind in ("sampled image", "image", "sampler"):
-            return Texture(name, None)
-        return self.module.zero(inside)
-
-    def _struct(self, id: int) -> Value:
-        """A uniform block, by the names of its members."""
-        parts = self.module.type(id).parts
-        names = [self.module.members.get((id, place), "") for place in range(len(parts))]
-        return tuple(
-            self._given[name] if name in self._given else self.module.zero(part)
-            for name, part in zip(names, parts, strict=True)
-        )
 
     # ------------------------------------------------------------------ control flow
 
@@ -210,7 +205,7 @@ class Machine:
             self._edge(frame, block.label, operands[1], both(mask, condition))
             self._edge(frame, block.label, operands[2], both(mask, negated(condition)))
         elif one.name == "Switch":
-            selector, rest = self._get(frame, operands[0]), mask
+            selector, rest = truth(self._get(frame, operands[0])), mask
             for literal, target in zip(operands[2::2], operands[3::2], strict=True):
                 known = static(selector)
                 equal = wrapped(int(selector), False) == literal if known else selector == float(wrapped(literal, True))
@@ -232,14 +227,17 @@ class Machine:
 
     def _check_rounds(self, frame: Frame, label: int, mask: Value) -> None:
         count = frame.rounds[label] = frame.rounds.get(label, 0) + 1
-        if count > MAX_ITERATIONS or (count > MAX_VARYING and not static(mask)):
-            limit = MAX_VARYING if not static(mask) else MAX_ITERATIONS
-            hint = "bound its counter by a constant"
-            raise refuse(f"a loop without a known end, more than {limit} iterations", hint)
+        if count > MAX_VARYING and not static(mask):
+            what = f"a loop without a known end, more than {MAX_VARYING} iterations"
+            raise refuse(what, "bound its counter by a constant")
+        if count > MAX_ITERATIONS:
+            raise refuse(f"a loop of more than {MAX_ITERATIONS} iterations", "fewer, or a table of its results")
 
     def _edge(self, frame: Frame, source: int, target: int, mask: Value) -> None:
         if mask is False:
             return
+        if target in frame.rounds and source not in frame.flow.loops[target][0]:
+            frame.rounds[target] = 0  # the loop is entered anew
         before, phis = frame.waiting.get(target, (False, {}))
         fresh = dict(phis)
         for one in frame.function.blocks[target].instructions:
@@ -308,9 +306,8 @@ class Machine:
     def _value(self, frame: Frame, one: Instruction) -> Value:
         name = one.name
         if name == "Variable":
-            cell = Cell(UNDEFINED if len(one.operands) < 2 else self._get(frame, one.operands[1]), one.result)
-            if cell.value is UNDEFINED:
-                cell.value = composites.undefined(self.module, self.module.type(one.type).parts[0])
+            known = self._get(frame, one.operands[1]) if len(one.operands) > 1 else self._unset(one)
+            cell = Cell(known, one.result)
             frame.own.add(id(cell))
             frame.values[-one.result] = cell  # keeps it alive, so that its identity is its own
             return Pointer(cell)
@@ -322,18 +319,32 @@ class Machine:
             return composites.literal(name, values, one.operands[count:])
         arguments = one.operands[:2] if name in ("ImageSample", "ImageFetch") else one.operands  # no literals
         values = [self._get(frame, id) for id in arguments]
+        if name == "Load":
+            if not isinstance(values[0], Pointer):
+                raise TypeError("no pointer")
+            return values[0].load(f"{one.file}:{one.line}" if one.line else "")
         if name in _IMAGES:
             return sampled(name, values)
         if name in composites.COMPOSED:
             return composites.COMPOSED[name](self.module, one.type, *values)
         return self._arithmetic(one, values)
 
+    def _unset(self, one: Instruction) -> Value:
+        """The value of a variable of a function before its first store."""
+        inside = self.module.type(one.type).parts[0]
+        if self._zero:
+            return self.module.zero(inside)
+        what = f"the variable '{self.module.names.get(one.result, '')}' is read before it is assigned"
+        return self.module.undefined(inside, Undefined(what, "give it an initial value"))
+
     def _arithmetic(self, one: Instruction, values: list[Value]) -> Value:
         name = one.name
         self._check_width(one.type)
-        for table in (FLOATS, COMPARED, LOGIC):
+        if name in LOGIC:
+            return elementwise(LOGIC[name], *values)
+        for table in (FLOATS, COMPARED):
             if name in table:
-                return elementwise(table[name], *values)
+                return elementwise(passing(table[name]), *values)
         if name in INTEGERS:
             kind = self.module.type(one.type)
             signed = (self.module.type(kind.parts[0]) if kind.parts else kind).kind == "int"
@@ -342,13 +353,13 @@ class Machine:
                 value = INTEGERS[name](*scalars)
                 return wrapped(value, signed) if isinstance(value, int) else value
 
-            return elementwise(on_integers, *values)
+            return elementwise(passing(on_integers), *values)
         if name in WHOLE:
             return WHOLE[name](*values)
         if name == "Bitcast":
             kind = self.module.type(one.type)
             scalar = (self.module.type(kind.parts[0]) if kind.parts else kind).kind
-            return elementwise(lambda part: cast(part, scalar), *values)
+            return elementwise(passing(lambda part: cast(part, scalar)), *values)
         raise refuse(f"the bits of a number ({name})", "compute with floats")
 
     def _check_width(self, id: int) -> None:
@@ -364,10 +375,13 @@ class Machine:
             return UNDEFINED  # debug information
         self._check_width(one.type)
         number, values = one.operands[1], [self._get(frame, id) for id in one.operands[2:]]
+        undefined = lost(leaf for value in values for leaf in leaves(value))
+        if number in GEOMETRIC and undefined is not None:
+            return self.module.undefined(one.type, undefined)
         if number in GEOMETRIC:
             return GEOMETRIC[number](*values)
         if number in ELEMENTWISE or number in WHOLE_NUMBERS:
-            return elementwise(ELEMENTWISE.get(number) or WHOLE_NUMBERS[number], *values)
+            return elementwise(passing(ELEMENTWISE.get(number) or WHOLE_NUMBERS[number]), *values)
         raise refuse(f"the function {number} of SPIR-V's GLSL.std.450 (packing or bits)", "compute with floats")
 
 

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from .opcodes import NAMES, REFUSED, TYPES
-from .values import UNDEFINED, Value, refuse, wrapped
+from .values import UNDEFINED, Undefined, Value, refuse, wrapped
 
 SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
 MAGIC = 0x07230203
 UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
 BUFFERS = (2, 9, 12)  # storage classes of blocks: uniform, push constants, storage
+UNIFORMS = (UNIFORM, *BUFFERS)
 _DEBUG = "NonSemantic.Shader.DebugInfo.100"
 MAX_BYTES = 1 << 26
 MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
@@ -78,6 +79,8 @@ class Module:
     refused    ids of functions that a front end could not translate -> why
     defaults   names of uniforms -> their values where the text has some
     costs      ids of functions -> instructions of a call, callees included; known when one has run
+    images     ids of image types whose textures are not read -> what they are
+    entered    whether entry points are among the functions
     """
 
     types: dict[int, Type] = field(default_factory=dict)
@@ -91,6 +94,8 @@ class Module:
     refused: dict[int, InputError] = field(default_factory=dict)
     defaults: dict[str, Value] = field(default_factory=dict)
     costs: dict[int, int] = field(default_factory=dict)
+    images: dict[int, str] = field(default_factory=dict)
+    entered: bool = True
 
     def type(self, id: int) -> Type:
         """A type. Raises InputError for an id that names none."""
@@ -112,6 +117,15 @@ class Module:
         if kind.kind in ("vector", "matrix", "array"):
             return (self.zero(kind.parts[0]),) * kind.length
         return UNDEFINED
+
+    def undefined(self, id: int, why: Undefined = UNDEFINED) -> Value:
+        """The value of a type whose every scalar is undefined."""
+        kind = self.type(id)
+        if kind.kind == "struct":
+            return tuple(self.undefined(part, why) for part in kind.parts)
+        if kind.kind in ("vector", "matrix", "array"):
+            return (self.undefined(kind.parts[0], why),) * kind.length
+        return why
 
     def shape(self, id: int) -> str:
         """A type in GLSL's words: "float", "vec3"."""
@@ -245,10 +259,19 @@ class _Parser:
         elif kind == "pointer":
             return Type(kind, (words[2],), words[1]) if words[2] in self.module.types else Type("opaque")
         elif kind == "image":
-            return Type(kind, (), words[2] + 1)
+            return self._image(words)
         else:
             return Type(kind, (words[1],) if kind == "sampled image" else ())
         return Type(kind, parts, count, self._bounded(count * known(parts[0]).size))
+
+    def _image(self, words: tuple[int, ...]) -> Type:
+        result, _, dimension, depth, arrayed, samples, *_ = words
+        unread = {3: "a cube map", 4: "a rectangle texture", 5: "a texture buffer", 6: "a subpass input"}
+        reasons = [unread.get(dimension, ""), "a shadow texture" if depth == 1 else "",
+                   "an array of textures" if arrayed else "", "a multisample texture" if samples else ""]  # fmt: skip
+        if any(reasons):
+            self.module.images[result] = next(filter(None, reasons))
+        return Type("image", (), dimension + 1)
 
     def _bounded(self, size: int) -> int:
         if size > MAX_LEAVES:
@@ -264,8 +287,10 @@ class _Parser:
             return True
         if one.name in ("ConstantFalse", "SpecConstantFalse"):
             return False
-        if one.name in ("ConstantNull", "Undef"):
+        if one.name == "ConstantNull":
             return self.module.zero(one.type)
+        if one.name == "Undef":
+            return self.module.undefined(one.type)
         if one.name in ("ConstantComposite", "SpecConstantComposite"):
             return tuple(self.module.constants[part] for part in one.operands)
         if one.name == "SpecConstantOp":

@@ -6,6 +6,7 @@ varies is held as a float with a whole value.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
@@ -19,10 +20,25 @@ Value = Any  # bool, int, float, a Dr.Jit value, a symbol, or a tuple of values
 
 
 class Undefined:
-    """The value of a variable before its first store: any value serves."""
+    """A scalar that nothing determines. Arithmetic passes it on; it is refused where it decides a branch, an index or a
+    result, so that only what a formula depends on is refused.
 
-    def __repr__(self) -> str:
-        return "undefined"
+    firm  whether it stays where lanes are merged, as an input without a value does. The value of a local variable
+          before its first store does not: any value serves in lanes that do not read it.
+    """
+
+    __slots__ = ("firm", "hint", "what", "where")
+
+    def __init__(self, what: str, hint: str = "", firm: bool = False, where: str = "") -> None:
+        self.what, self.hint, self.firm, self.where = what, hint, firm, where
+
+    def at(self, where: str) -> Undefined:
+        """The same, read at a file and line; the first place stays."""
+        return self if self.where else Undefined(self.what, self.hint, self.firm, where)
+
+    def error(self) -> InputError:
+        """The error for a use."""
+        return InputError(self.what, self.where, self.hint)
 
 
 class Bits:
@@ -37,7 +53,7 @@ class Bits:
         self.number, self.exponent, self.part = number, exponent, part
 
 
-UNDEFINED: Final = Undefined()
+UNDEFINED: Final = Undefined("a value that nothing computes")
 
 
 def refuse(what: str, hint: str = "", where: str = "") -> InputError:
@@ -51,9 +67,10 @@ def static(value: Value) -> bool:
 
 
 def numeric(value: Value) -> Value:
-    """A scalar for arithmetic on floats: whole numbers that are known become floats, undefined ones 0."""
-    if value is UNDEFINED:
-        return 0.0
+    """A scalar for arithmetic on floats: whole numbers that are known become floats. Raises InputError for undefined
+    ones."""
+    if isinstance(value, Undefined):
+        raise value.error()
     if isinstance(value, Bits):
         raise refuse("a bit operation on an integer that varies", "compute with floats")
     if not _computes(value):
@@ -62,8 +79,15 @@ def numeric(value: Value) -> Value:
 
 
 def truth(value: Value) -> Value:
-    """A scalar for logic: undefined ones are false."""
-    return False if value is UNDEFINED else value
+    """A scalar that decides. Raises InputError for undefined ones."""
+    if isinstance(value, Undefined):
+        raise value.error()
+    return value
+
+
+def lost(values: Iterable[Value]) -> Undefined | None:
+    """The first undefined scalar, None if all are defined."""
+    return next((value for value in values if isinstance(value, Undefined)), None)
 
 
 def both(a: Value, b: Value) -> Value:
@@ -72,7 +96,7 @@ def both(a: Value, b: Value) -> Value:
         return b if a else False
     if static(b):
         return a if b else False
-    return a & b
+    return lost((a, b)) or a & b
 
 
 def either(a: Value, b: Value) -> Value:
@@ -81,22 +105,23 @@ def either(a: Value, b: Value) -> Value:
         return True if a else b
     if static(b):
         return True if b else a
-    return a | b
+    return lost((a, b)) or a | b
 
 
 def negated(a: Value) -> Value:
     """not a."""
-    return not a if static(a) else ~a
+    return not a if static(a) else a if isinstance(a, Undefined) else ~a
 
 
 def select(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where the mask holds, else `b`, part by part of composites; undefined parts take the other value."""
+    """`a` where the mask holds, else `b`, part by part of composites; undefined parts take the other value, unless they
+    are firm."""
     if static(mask):
         return a if mask else b
-    if a is b or b is UNDEFINED:
+    if isinstance(a, Undefined) or isinstance(b, Undefined):
+        return _merged(a, b)
+    if a is b:
         return a
-    if a is UNDEFINED:
-        return b
     if isinstance(a, tuple) or isinstance(b, tuple):
         if not isinstance(a, tuple) or not isinstance(b, tuple) or len(a) != len(b):
             raise refuse("a selection between values of two types")
@@ -108,6 +133,15 @@ def select(mask: Value, a: Value, b: Value) -> Value:
     if not _computes(a) or not _computes(b):
         raise refuse("a selection between two textures or pointers", "sample both, and select between the colors")
     return where(mask, numeric(a), numeric(b))
+
+
+def _merged(a: Value, b: Value) -> Value:
+    """Two values of which one is undefined."""
+    if not isinstance(a, Undefined):
+        a, b = b, a
+    if isinstance(b, tuple):
+        return tuple(_merged(a, part) for part in b)
+    return a if a.firm else b
 
 
 def where(mask: Value, a: Value, b: Value) -> Value:

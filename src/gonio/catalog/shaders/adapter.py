@@ -96,6 +96,7 @@ class Adapter:
     includes     folders, relative to the shader, from which it may include
     defines      macros
     where        the file that says so, for errors
+    unset_is_zero  whether variables and inputs that nothing sets are 0; else a shader that reads one is refused
     """
 
     function: str = ""
@@ -113,6 +114,7 @@ class Adapter:
     albedo_tolerance: float = 0.01
     lossless_tolerance: float | None = None
     transmits: bool = False
+    unset_is_zero: bool = False
     language: str = ""
     doc: str = ""
     includes: tuple[str, ...] = ()
@@ -142,7 +144,7 @@ def read(path: Path) -> Adapter:
 KINDS: dict[str, type] = {
     "function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
     "sample_arguments": list, "derive": str, "derive_arguments": list, "struct": str, "transmits": bool,
-    "language": str, "doc": str, "includes": list, "defines": dict, "parameters": dict, "textures": dict,
+    "unset_is_zero": bool, "language": str, "doc": str, "includes": list, "defines": dict, "parameters": dict, "textures": dict,
     "albedo": str, "albedo_arguments": list, "albedo_tolerance": float, "lossless_tolerance": float,
 }  # fmt: skip
 
@@ -246,8 +248,8 @@ def _macro(value: object) -> str:
 
 
 def _language(key: str, value: str, where: str, over: Adapter) -> str:
-    if value not in ("glsl", "hlsl", "wgsl"):
-        raise InputError(f"unknown language '{value}'", where, "glsl, hlsl or wgsl")
+    if value not in ("glsl", "hlsl", "slang", "wgsl"):
+        raise InputError(f"unknown language '{value}'", where, "glsl, hlsl, slang or wgsl")
     return value
 
 

@@ -24,9 +24,10 @@ from ...spirv import Module, compile_text, parse, translated
 from . import adapter as adapters
 from . import emitted, explorer, tables
 from .adapter import Adapter
+from .declared import INTEGERS, Declared, integer
 from .material import _SampledShaderFile, _ShaderFile
 from .names import options_in, parted, with_options
-from .program import Declared, Program
+from .program import Program
 
 _LANGUAGES = {".hlsl": "hlsl", ".slang": "slang", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
@@ -180,13 +181,14 @@ def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str,
 def _compiled(
     text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path], files: list[Path]
 ) -> Module:
-    """The module of a text; `folders` begin with the shader's own, in which #include of GLSL and HLSL does not look.
+    """The module of a text; `folders` begin with the shader's own, in which #include <FILE> does not look.
 
     files  gets the files that it includes
     """
     if language == "wgsl":
         return translated(text, where, defines, folders, files)
-    binary = compile_text(text, where, language=language, defines=defines, folders=folders[1:], read=files)
+    own, *named = folders
+    binary = compile_text(text, where, language=language, defines=defines, folders=named, own_folder=own, read=files)
     return parse(binary, where)
 
 
@@ -262,10 +264,13 @@ _RESERVED = {*dir(_SampledShaderFile), *keyword.kwlist, *_SCENES, "program"}
 def bounds(declared: Declared) -> tuple[float, float, Any]:
     """Range and default of a parameter; by its name where the adapter does not say."""
     uniform = declared.uniform
-    guess = (0.0, 1.0) if _UNIT.search(declared.name) else (-np.inf, np.inf)
+    named = declared.shape not in INTEGERS and _UNIT.search(declared.name)
+    any_number = 0.0 if declared.shape == "uint" else -np.inf, np.inf
+    guess = (0.0, 1.0) if named else any_number
     low = guess[0] if uniform.low is None else float(uniform.low)
     high = guess[1] if uniform.high is None else float(uniform.high)
-    return low, high, min(max(0.5, low), high) if uniform.default is None else uniform.default
+    start = 0.0 if declared.shape in INTEGERS else 0.5
+    return low, high, min(max(start, low), high) if uniform.default is None else uniform.default
 
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
@@ -297,6 +302,8 @@ def _fields(declared: Declared) -> list[tuple[str, Any]]:
         ]
     if isinstance(default, tuple):
         raise InputError(f"{len(default)} defaults of {declared.shape} {declared.name}", "adapter", "one number")
+    if declared.shape in INTEGERS:
+        return [(name, integer(default, doc, low, high))]
     return [(name, kinds.number(float(default), doc, low=low, high=high, unit=uniform.unit))]
 
 

@@ -16,6 +16,7 @@ from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, backend
 from ...ops.types import Value
 from ...spirv.values import leaves, numeric, truth, where
+from .declared import INTEGERS
 
 if TYPE_CHECKING:
     from .program import Program
@@ -65,6 +66,8 @@ class _ShaderFile(BSDF):
                 values[name] = given[0].x, given[0].y
             elif declared.shape == "vec3":
                 values[name] = tuple(ops.channels(given[0]))
+            elif declared.shape in INTEGERS:
+                values[name] = int(given[0])
             else:
                 values[name] = given[0] if len(given) == 1 else tuple(given)
         return values

@@ -6,26 +6,21 @@ import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...errors import InputError
-from ...spirv import Machine, Module
+from ...spirv import Module
 from ...spirv.arithmetic import elementwise
-from ...spirv.composites import Cell, Pointer
+from ...spirv.composites import Cell, Pointer, placed
+from ...spirv.entry import prepared
 from ...spirv.images import Texture
-from ...spirv.module import UNIFORM, Function
+from ...spirv.module import UNIFORMS, Function
+from ...spirv.reach import Part, blocks_of, called, read, written
 from ...spirv.replay import Replayed
 from ...spirv.standard import normalize
 from ...spirv.values import Value, leaves, numeric
 from .adapter import Adapter, Uniform, check_range, meaning_of
-
-
-class Declared(NamedTuple):
-    """A parameter of a shader: where it is, its shape ("float", "vec3", ...), and what the adapter says."""
-
-    name: str
-    shape: str
-    uniform: Uniform
+from .declared import PLAIN, Declared, Piece, assembled, pieces
 
 
 class Program:
@@ -69,20 +64,18 @@ class Program:
 
     def _declared(self) -> Iterator[Declared]:
         names: set[str] = set()
-        for name, type in (*self._uniforms(), *self._arguments()):
+        for name, shape, default in (*self._uniforms(), *self._arguments()):
             if name in names:
                 continue
             names.add(name)
-            shape = self.module.shape(type)
-            if shape in ("float", "bool", "int", "uint", "vec2", "vec3", "vec4"):
-                if not name.lstrip("_").isidentifier():  # it becomes a name in Python; SPIR-V's may be any text
-                    hint = "letters, digits and _ that begin with a letter; of SPIR-V: compile it with names"
-                    raise InputError(f"{name[:40]!r} as the name of a parameter", self.where, hint)
-                uniform = self._stated(name) or Uniform()
-                if uniform.default is None and name in self.module.defaults:
-                    uniform = replace(uniform, default=self.module.defaults[name])
-                    check_range(name, uniform, self.adapter.where or self.where)
-                yield Declared(name, shape, uniform)
+            if not name.lstrip("_").isidentifier():  # it becomes a name in Python; SPIR-V's may be any text
+                hint = "letters, digits and _ that begin with a letter; of SPIR-V: compile it with names"
+                raise InputError(f"{name[:40]!r} as the name of a parameter", self.where, hint)
+            uniform = self._stated(name) or Uniform()
+            if uniform.default is None and default is not None:
+                uniform = replace(uniform, default=default)
+                check_range(name, uniform, self.adapter.where or self.where)
+            yield Declared(name, shape, uniform)
         unknown = [name for name in self.adapter.parameters if not {name, name.removesuffix("_")} & names]
         if unknown:
             known = ", ".join(sorted(names)) or "none"
@@ -94,25 +87,63 @@ class Program:
         stated = self.adapter.parameters
         return stated.get(name, stated.get(f"{name}_"))
 
-    def _uniforms(self) -> Iterator[tuple[str, int]]:
+    def _uniforms(self) -> Iterator[Piece]:
+        """The parameters in uniforms; in matrices, arrays and structs only those that a function reads."""
         module = self.module
+        starts = [*(function.id for function, _ in self.formulas.values()), *(one.id for one in self._entries)]
+        used = read(module, blocks_of(module, starts))
+        for name, type, part in self._globals:
+            reads = {(id, None if part[1] is None else member) for id, member in used}
+            if module.shape(type) in PLAIN or part in reads or (part[0], None) in used:
+                yield from pieces(module, name, type, module.defaults.get(name))
+
+    @functools.cached_property
+    def _globals(self) -> list[tuple[str, int, Part]]:
+        """Name, type and place of uniforms, and of members of their blocks."""
+        module, result = self.module, list[tuple[str, int, Part]]()
         for id, one in module.variables.items():
-            storage, inside = module.type(one.type).length, module.type(one.type).parts[0]
-            if storage not in (UNIFORM, 2, 9, 12):  # and uniform block, push, storage
+            inside = module.type(one.type).parts[0]
+            if one.operands[0] not in UNIFORMS:
                 continue
             name = module.names.get(id, "")
             if module.type(inside).kind != "struct":
-                yield name, inside
+                result.append((name, inside, (id, None)))
                 continue
             for place, part in enumerate(module.type(inside).parts):
-                yield module.members.get((inside, place), f"{name}_{place}"), part
+                result.append((module.members.get((inside, place), f"{name}_{place}"), part, (id, place)))
+        return result
 
-    def _arguments(self) -> Iterator[tuple[str, int]]:
+    @functools.cached_property
+    def _entries(self) -> list[Function]:
+        """The functions that assign globals before a formula is called: those that the compiler needs, which hold the
+        initial values, and the text's own `main` if a formula reads what it assigns."""
+        module, formulas = self.module, [function.id for function, _ in self.formulas.values()]
+        ours = module.function("gonio_entry")  # of HLSL
+        mains = module.function("main" if ours else "gonio_main")
+        reached = {id for id, _ in read(module, blocks_of(module, formulas))}
+        calls = {*formulas, *called(blocks_of(module, formulas))}
+        needed = [
+            one
+            for one in mains
+            if one.id not in calls and reached & written(module, blocks_of(module, [one.id], formulas))
+        ]
+        return [*(ours or [one for one in module.function("main") if not one.parameters]), *needed]
+
+    @functools.cached_property
+    def _examples(self) -> list[int]:
+        """The functions at which the compiler's entry point begins to call every function, so that none is dropped: of
+        HLSL one that does so, of Slang all."""
+        module = self.module
+        of_slang = any(module.names.get(id, "").startswith("gonio_") for id in module.variables)
+        return list(module.functions) if of_slang else [one.id for one in module.function("@gonio_entry")]
+
+    def _arguments(self) -> Iterator[Piece]:
         """Arguments of the functions that are parameters; the members of structs."""
         for function, meanings in self.formulas.values():
             for (id, type), meaning in zip(function.parameters, meanings, strict=True):
                 if meaning == "parameter":
-                    yield from self._members(self.module.names.get(id, "argument"), type)
+                    for name, part in self._members(self.module.names.get(id, "argument"), type):
+                        yield from pieces(self.module, name, part)
 
     def _members(self, name: str, type: int) -> Iterator[tuple[str, int]]:
         kind = self.module.type(type)
@@ -137,21 +168,26 @@ class Program:
         return self._replayed[formula](values=values, directions=directions)
 
     def _run(self, formula: str, values: dict[str, Value], directions: dict[str, Value]) -> Value:
-        machine = Machine(self.module, values, self.textures)
-        for start in self.module.function("main") or self.module.function("gonio_entry"):
-            if not start.parameters:  # it assigns the initial values of globals
-                machine.call(start, ())
+        module, zero = self.module, self.adapter.unset_is_zero
+        inputs = {name: assembled(module, name, type, values, zero) for name, type, _ in self._globals}
         function, meanings = self.formulas[formula]
+        starts = [function.id, *self._examples]
         given = dict(directions)
         if "derived" in meanings:
             derive, of_parameters = self.formulas["derive"]
-            given["derived"] = machine.call(derive, self._given(derive, of_parameters, values, directions))
-        if "result" not in meanings:
-            return machine.call(function, self._given(function, meanings, values, given))
-        place = function.parameters[meanings.index("result")][1]
-        cell = Cell(self.module.zero(self.module.type(place).parts[0]))
-        machine.call(function, self._given(function, meanings, values, {**given, "result": Pointer(cell)}))
-        return cell.value
+            starts.append(derive.id)
+        machine = prepared(module, inputs, self.textures, zero, self._entries, starts)
+        try:
+            if "derived" in meanings:
+                given["derived"] = machine.call(derive, self._given(derive, of_parameters, values, directions))
+            if "result" not in meanings:
+                return placed(machine.call(function, self._given(function, meanings, values, given)), self.where)
+            place = function.parameters[meanings.index("result")][1]
+            cell = Cell(module.zero(module.type(place).parts[0]))
+            machine.call(function, self._given(function, meanings, values, {**given, "result": Pointer(cell)}))
+            return placed(cell.value, self.where)
+        except InputError as error:
+            raise InputError(error.what, error.where or self.where, error.hint) from error
 
     def _given(
         self, function: Function, meanings: Sequence[str], values: dict[str, Value], given: dict[str, Value]
@@ -186,7 +222,7 @@ class Program:
                 self._argument(part, meaning, member, values, directions)
                 for part, member in zip(kind.parts, members, strict=True)
             )
-        return values[name] if name in values else self.module.zero(type)
+        return assembled(self.module, name, type, values, self.adapter.unset_is_zero)
 
     def color(self, value: Value) -> Value:
         """A result as a color: a number is gray."""

@@ -34,7 +34,7 @@ class Emitter:
     """
 
     def __init__(self) -> None:
-        self.module = Module(sets={STANDARD: "GLSL.std.450"})
+        self.module = Module(sets={STANDARD: "GLSL.std.450"}, entered=False)
         self.where, self.line = "", 0
         self.structs: dict[str, tuple[tuple[str, ...], tuple[Type, ...]]] = {}
         self.function: Function | None = None
