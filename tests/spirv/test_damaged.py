@@ -7,7 +7,7 @@ from pathlib import Path
 import gonio as go
 import pytest
 from gonio.errors import InputError
-from gonio.spirv import parse
+from gonio.spirv import Machine, parse
 
 FLOAT, VECTOR, POINTER, VARIABLE, FUNCTION_TYPE, FUNCTION, A, B, LABEL, SUM, VOID = range(1, 12)
 Words = list[tuple[int, ...]]
@@ -89,3 +89,22 @@ def test_meanings_that_a_function_is_not_given(tmp_path: Path) -> None:
     (tmp_path / "a.spv.toml").write_text('function = "brdf"\nalbedo = "brdf"\nalbedo_arguments = ["light", "view"]')
     with pytest.raises(InputError, match="'light' as an argument of a function that is not given 'light'"):
         _shader(tmp_path, _module())
+
+
+def test_a_variable_that_is_stored_into_its_parts_stays_bounded() -> None:
+    def change(code: Words) -> None:
+        pointer, part, integer = 60, 65, 66
+        at = code.index((61, FLOAT, 20, VARIABLE))
+        grown: Words = [(59, pointer, 61, 7)]
+        for number in range(100, 204, 4):
+            grown.append((61, VECTOR, number, 61))
+            for place in (1, 2, 3):
+                grown += [(65, part, number + place, 61, 61 + place), (62, number + place, number)]
+        code[at:at] = [*grown, (61, VECTOR, 301, 61), (129, VECTOR, 302, 301, 301)]
+        at = code.index((33, FUNCTION_TYPE, FLOAT, VECTOR, VECTOR))
+        constants = [(43, integer, 62 + place, place) for place in range(3)]
+        code[at:at] = [(32, pointer, 7, VECTOR), (32, part, 7, FLOAT), (21, integer, 32, 1), *constants]
+
+    module = parse(_module(change))
+    with pytest.raises(InputError, match="more than 65536 numbers"):
+        Machine(module).call(module.function("brdf")[0], [(0.0, 0.0, 1.0)] * 2)

@@ -44,6 +44,7 @@ class Pointer:
         return result
 
     def store(self, value: Value, mask: Value) -> None:
+        _size(value)  # a variable that is stored into its own parts would grow without end
         self.cell.value = _stored(self.cell.value, self.path, value, mask)
 
 
