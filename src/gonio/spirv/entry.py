@@ -125,7 +125,7 @@ def prepared(
     entry, machine = Entry(module, globals, textures, zero, frozenset(until)), Machine(module, globals, textures, zero)
     for start in starts:
         entry.start(start)
-    machine._globals = entry._globals
+    machine._globals, machine._read_only = entry._globals, entry._read_only
     return machine
 
 

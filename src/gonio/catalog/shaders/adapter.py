@@ -144,7 +144,8 @@ def read(path: Path) -> Adapter:
 KINDS: dict[str, type] = {
     "function": str, "arguments": list, "cosine": bool, "pdf": str, "pdf_arguments": list, "sample": str,
     "sample_arguments": list, "derive": str, "derive_arguments": list, "struct": str, "transmits": bool,
-    "unset_is_zero": bool, "language": str, "doc": str, "includes": list, "defines": dict, "parameters": dict, "textures": dict,
+    "unset_is_zero": bool, "language": str, "doc": str, "includes": list, "defines": dict,
+    "parameters": dict, "textures": dict,
     "albedo": str, "albedo_arguments": list, "albedo_tolerance": float, "lossless_tolerance": float,
 }  # fmt: skip
 
