@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
-from ..catalog.shaders.program import of_struct
+from ..catalog.shaders.guesses import of_struct
 from ..errors import InputError
 from ..material import BSDF, recording
 from ..ops import graph

@@ -13,8 +13,9 @@ from ...errors import InputError
 from .adapter import Adapter
 from .emitted import manifest_of
 from .files import bounds, read
+from .guesses import candidates
 from .names import names_shader, options_in, parted
-from .program import Program, candidates
+from .program import Program
 
 
 class Adopted(NamedTuple):

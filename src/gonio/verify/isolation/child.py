@@ -18,11 +18,7 @@ import dataclasses
 import os
 import pickle
 import queue
-import signal
-import subprocess
 import sys
-import tempfile
-import threading
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -33,23 +29,19 @@ import psutil
 
 from ...errors import GonioWarning, InputError, MachineError
 from . import watch
+from .process import BETWEEN, LOADING, STARTING, Call, Process
 
 if TYPE_CHECKING:
     from ..report import Report
     from ..verdict import Card, Unread
 
-STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
 ISOLATED = "isolated"  # location of the error about a material that cannot be sent
 OTHERS = "*"  # key of all parameter values except the given ones
-GRACE = 1.0  # seconds beyond the limit: the alarm inside the process stops a loop in Python without a new process
-LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take several
 LOOK = 0.05  # seconds between two checks of time and memory
-MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before it fills the disk
 STRIKES = 3  # crashes of a method after which it is called at the given values only; of a card outside of any call
 
 Progress = Callable[[int, int, str], None]
 Tell = Callable[[str], None]
-Call = tuple[str, str, str]  # a method, and the material's values as a key and in words
 
 
 class Item(NamedTuple):
@@ -139,105 +131,6 @@ def trial(
             worker.close()
 
 
-class _Worker:
-    """One process: its card and step, since when, and the call in progress."""
-
-    def __init__(self, task: Task, limit: float, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
-        self.folder = tempfile.TemporaryDirectory(prefix="gonio-verify-", ignore_cleanup_errors=True)
-        self.log = Path(self.folder.name, "printed")
-        self.counted = 0  # bytes of the log whose lines are counted
-        start = "from gonio.verify.isolation import worker; worker.main()"
-        code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
-        with self.log.open("ab") as log:
-            self.process = psutil.Popen(
-                [sys.executable, "-P", "-c", code],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                start_new_session=True,  # Ctrl-C is for the parent; processes of the BSDF end with the session
-            )
-        self.busy, self.reason = True, ""
-        self.begins(-1, STARTING)
-        self.order(task, limit)
-        threading.Thread(target=self._read, args=(answers,), daemon=True).start()
-
-    def order(self, *order: object) -> None:
-        """Send an order; if the process has ended, the end of its answers reports it."""
-        assert self.process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):
-            self.process.stdin.write(pickle.dumps(order))
-            self.process.stdin.flush()
-
-    def begins(self, card: int, step: str) -> None:
-        self.card, self.step, self.since = card, step, time.monotonic()
-        self.call: Call | None = None
-
-    def over(self, limit: float, memory: float) -> str:
-        """The limit that it exceeds, as text; "" if none."""
-        limit, grace = (limit, GRACE) if self.card >= 0 else (max(limit, LOAD), 0.0)
-        if self.busy and time.monotonic() - self.since > limit + grace:
-            return watch.words(limit) if self.card >= 0 else f"no end after {limit:g} s"
-        with contextlib.suppress(psutil.Error, OSError):
-            if self.process.memory_info().rss > memory:
-                return f"more than {memory / 1e9:.3g} GB of memory"
-            if self.log.stat().st_size > MAX_PRINTED:
-                return f"it printed more than {MAX_PRINTED >> 20} MB"
-        return ""
-
-    def end(self, reason: str = "") -> None:
-        """Kill the process and those that it started."""
-        self.reason = self.reason or reason
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            if hasattr(os, "killpg"):
-                os.killpg(self.process.pid, signal.SIGKILL)
-            else:
-                self.process.kill()
-        self.process.wait()
-
-    def why(self) -> str:
-        """The reason for the end of its answers."""
-        try:
-            code = self.process.wait(timeout=1.0)
-        except psutil.TimeoutExpired:
-            code = None
-        if self.reason or code is None:
-            return self.reason or "it closed the pipe to the process that watches it"
-        if code >= 0:
-            return f"the process ended itself with exit code {code}"
-        return f"the process crashed: {getattr(code, 'name', code)}"
-
-    def lines(self) -> int:
-        """Number of lines printed since the last call."""
-        with self.log.open("rb") as file:
-            file.seek(self.counted)
-            text = file.read()
-        self.counted += len(text)
-        return text.count(b"\n") + bool(text and not text.endswith(b"\n"))
-
-    def last_line(self) -> str:
-        """The last line that it printed."""
-        with contextlib.suppress(OSError):
-            lines = self.log.read_bytes()[-4096:].decode(errors="replace").strip().splitlines()
-            return lines[-1].strip()[:200] if lines else ""
-        return ""
-
-    def close(self) -> None:
-        """End the process and remove its files."""
-        self.end()
-        for stream in (self.process.stdin, self.process.stdout):
-            with contextlib.suppress(OSError):
-                stream.close()  # type: ignore[union-attr]
-        self.folder.cleanup()
-
-    def _read(self, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
-        assert self.process.stdout is not None
-        try:
-            while True:
-                answers.put((self, pickle.load(self.process.stdout)))
-        except Exception:  # the end, or bytes that the BSDF wrote into the pipe
-            answers.put((self, None))
-
-
 @dataclasses.dataclass
 class _State:
     """The state of a card that is being tested.
@@ -283,8 +176,8 @@ class _Pool:
     ) -> None:
         self.task, self.jobs, self.limit, self.memory = task, jobs, limit, memory
         self.progress, self.tell = progress, tell
-        self.answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
-        self.workers = [_Worker(task, limit, self.answers) for _ in range(jobs)]
+        self.answers: queue.Queue[tuple[Process, Any]] = queue.Queue()
+        self.workers = [Process(task, limit, self.answers) for _ in range(jobs)]
         self.states: list[_State] | None = None  # once a process has loaded the targets
         self.waiting: list[int] = []  # numbers of the cards that no process judges yet
         self.laws: list[str] = []
@@ -317,7 +210,7 @@ class _Pool:
                 worker.order(number, self.states[number].skip, self.states[number].forbidden, threshold)
         loading = sum(worker.card < 0 for worker in self.workers)
         for _ in range(min(len(self.waiting) - loading, self.jobs - len(self.workers))):
-            self.workers.append(_Worker(self.task, self.limit, self.answers))
+            self.workers.append(Process(self.task, self.limit, self.answers))
 
     def _listen(self) -> None:
         """Handle the answers that arrive within a moment, and end processes that exceed their limits."""
@@ -336,7 +229,7 @@ class _Pool:
 
     # ------------------------------------------------------------------ the answers of a process, by their names
 
-    def _step(self, worker: _Worker, card: int, step: str) -> None:
+    def _step(self, worker: Process, card: int, step: str) -> None:
         worker.begins(card, step)
         if self.progress and self.states:
             steps = len(self.states) * len(self.laws)
@@ -344,7 +237,7 @@ class _Pool:
         if step in self.laws:
             self.begun.add((card, step))
 
-    def _result(self, worker: _Worker, card: int, law: str, result: str) -> None:
+    def _result(self, worker: Process, card: int, law: str, result: str) -> None:
         assert self.states is not None
         if len(self.states) == 1:
             self._tell(card, f"{law}: {result}")
@@ -354,10 +247,10 @@ class _Pool:
             self.told.add((card, text))
             self.tell(text)
 
-    def _call(self, worker: _Worker, *call: str) -> None:
+    def _call(self, worker: Process, *call: str) -> None:
         worker.call = (call[0], call[1], call[2]) if call else None
 
-    def _loaded(self, worker: _Worker, titles: list[str], laws: list[str], unread: list[Unread]) -> None:
+    def _loaded(self, worker: Process, titles: list[str], laws: list[str], unread: list[Unread]) -> None:
         self.unread = unread
         if self.states is None:
             self.laws, self.states = laws, [_State(title) for title in titles]
@@ -366,7 +259,7 @@ class _Pool:
         worker.begins(0, BETWEEN)
         worker.lines()  # printed while it loaded
 
-    def _card(self, worker: _Worker, number: int, card: Card) -> None:
+    def _card(self, worker: Process, number: int, card: Card) -> None:
         assert self.states is not None
         worker.busy = False
         printed = worker.lines()
@@ -378,17 +271,17 @@ class _Pool:
             failed = [one.law for one in card.verdicts if one.failed]
             self._tell(number, f"{card.title}: {'fails ' + ', '.join(failed) if failed else 'holds'}")
 
-    def _warning(self, worker: _Worker, text: str) -> None:
+    def _warning(self, worker: Process, text: str) -> None:
         if text not in self.warned:
             self.warned.add(text)
             warnings.warn(text, GonioWarning, stacklevel=2)
 
-    def _error(self, worker: _Worker, error: Exception, trace: str = "") -> None:
+    def _error(self, worker: Process, error: Exception, trace: str = "") -> None:
         if trace and os.environ.get("GONIO_DEBUG"):
             print(trace, file=sys.stderr)
         raise error
 
-    def _lost(self, worker: _Worker, reason: str) -> None:
+    def _lost(self, worker: Process, reason: str) -> None:
         """A process has ended: its card is judged again without the step or the call in progress."""
         last = worker.last_line()
         worker.close()

@@ -1,0 +1,129 @@
+"""One process of a trial, as the parent sees it: its card and step, since when, and the call in progress.
+
+This module imports nothing of Gonio or NumPy at the top: the first process starts before this one loads the rest.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from . import watch
+
+STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
+GRACE = 1.0  # seconds beyond the limit: the alarm inside the process stops a loop in Python without a new process
+LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take several
+MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before it fills the disk
+
+Call = tuple[str, str, str]  # a method, and the material's values as a key and in words
+
+
+class Process:
+    """One process: its card and step, since when, and the call in progress."""
+
+    def __init__(self, task: object, limit: float, answers: queue.Queue[tuple[Process, Any]]) -> None:
+        self.folder = tempfile.TemporaryDirectory(prefix="gonio-verify-", ignore_cleanup_errors=True)
+        self.log = Path(self.folder.name, "printed")
+        self.counted = 0  # bytes of the log whose lines are counted
+        start = "from gonio.verify.isolation import worker; worker.main()"
+        code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
+        with self.log.open("ab") as log:
+            self.process = psutil.Popen(
+                [sys.executable, "-P", "-c", code],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                start_new_session=True,  # Ctrl-C is for the parent; processes of the BSDF end with the session
+            )
+        self.busy, self.reason = True, ""
+        self.begins(-1, STARTING)
+        self.order(task, limit)
+        threading.Thread(target=self._read, args=(answers,), daemon=True).start()
+
+    def order(self, *order: object) -> None:
+        """Send an order; if the process has ended, the end of its answers reports it."""
+        assert self.process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.write(pickle.dumps(order))
+            self.process.stdin.flush()
+
+    def begins(self, card: int, step: str) -> None:
+        self.card, self.step, self.since = card, step, time.monotonic()
+        self.call: Call | None = None
+
+    def over(self, limit: float, memory: float) -> str:
+        """The limit that it exceeds, as text; "" if none."""
+        limit, grace = (limit, GRACE) if self.card >= 0 else (max(limit, LOAD), 0.0)
+        if self.busy and time.monotonic() - self.since > limit + grace:
+            return watch.words(limit) if self.card >= 0 else f"no end after {limit:g} s"
+        with contextlib.suppress(psutil.Error, OSError):
+            if self.process.memory_info().rss > memory:
+                return f"more than {memory / 1e9:.3g} GB of memory"
+            if self.log.stat().st_size > MAX_PRINTED:
+                return f"it printed more than {MAX_PRINTED >> 20} MB"
+        return ""
+
+    def end(self, reason: str = "") -> None:
+        """Kill the process and those that it started."""
+        self.reason = self.reason or reason
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            if hasattr(os, "killpg"):
+                os.killpg(self.process.pid, signal.SIGKILL)
+            else:
+                self.process.kill()
+        self.process.wait()
+
+    def why(self) -> str:
+        """The reason for the end of its answers."""
+        try:
+            code = self.process.wait(timeout=1.0)
+        except psutil.TimeoutExpired:
+            code = None
+        if self.reason or code is None:
+            return self.reason or "it closed the pipe to the process that watches it"
+        if code >= 0:
+            return f"the process ended itself with exit code {code}"
+        return f"the process crashed: {getattr(code, 'name', code)}"
+
+    def lines(self) -> int:
+        """Number of lines printed since the last call."""
+        with self.log.open("rb") as file:
+            file.seek(self.counted)
+            text = file.read()
+        self.counted += len(text)
+        return text.count(b"\n") + bool(text and not text.endswith(b"\n"))
+
+    def last_line(self) -> str:
+        """The last line that it printed."""
+        with contextlib.suppress(OSError):
+            lines = self.log.read_bytes()[-4096:].decode(errors="replace").strip().splitlines()
+            return lines[-1].strip()[:200] if lines else ""
+        return ""
+
+    def close(self) -> None:
+        """End the process and remove its files."""
+        self.end()
+        for stream in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(OSError):
+                stream.close()  # type: ignore[union-attr]
+        self.folder.cleanup()
+
+    def _read(self, answers: queue.Queue[tuple[Process, Any]]) -> None:
+        assert self.process.stdout is not None
+        try:
+            while True:
+                answers.put((self, pickle.load(self.process.stdout)))
+        except Exception:  # the end, or bytes that the BSDF wrote into the pipe
+            answers.put((self, None))
