@@ -146,6 +146,9 @@ ERRORS = {
     "includes = [1]": r"matte\.glsl\.toml: includes = \[1\]",
     "[defines]\nA = [1]": r"matte\.glsl\.toml: defines\.A",
     'arguments = ["light", "derived"]': r"matte\.glsl\.toml: arguments: 'derived' without a function",
+    f"[parameters.gloss]\ndefault = 1{'0' * 400}": r"matte\.glsl\.toml: parameters\.gloss: default = 1000",
+    f"[parameters.albedo]\nlow = -1{'0' * 400}": r"parameters\.albedo: low = -1000",
+    "[parameters.gloss]\nhigh = nan": r"parameters\.gloss: high = nan",
     '[parameters.gloss]\nkind = "beta"': r"parameters\.gloss: unknown kind 'beta'",
 }
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -268,6 +269,10 @@ def _uniform(name: str, value: object, where: str, over: Uniform) -> Uniform:
     numbers = default if isinstance(default, list) else [] if default is None else [default]
     if not all(isinstance(one, int | float) for one in numbers) or (isinstance(default, list) and not default):
         raise InputError(f"parameters.{name}: default = {default!r:.40}", where, "a number, or a list of numbers")
+    ends = [(key, value[key]) for key in ("low", "high") if key in value]
+    for key, one in [*(("default", one) for one in numbers), *ends]:
+        if not (-LARGEST <= one <= LARGEST) and not (key != "default" and one in (math.inf, -math.inf)):
+            raise InputError(f"parameters.{name}: {key} = {str(one)[:40]}", where, "a number that 64 bits can hold")
     if value.get("kind", "") not in UNIFORMS:
         raise InputError(f"parameters.{name}: unknown kind '{value['kind']}'", where, ", ".join(UNIFORMS[1:]))
     made = replace(over, **{**value, "default": over.default if default is None else _plain(default)})
@@ -286,6 +291,7 @@ def check_range(name: str, uniform: Uniform, where: str) -> None:
         raise InputError(what, where, "the default lies between low and high")
 
 
+LARGEST = sys.float_info.max
 UNIFORMS = ("", "alpha", "angle", "fixed")
 
 
