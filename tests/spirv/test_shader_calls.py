@@ -68,3 +68,19 @@ def test_a_tree_of_calls_is_recorded_once_a_function(tmp_path: Path) -> None:
     (tmp_path / "tree.glsl").write_text("\n".join(lines))
     text = bundle(go.Shader(tmp_path / "tree.glsl"), "glsl", ["eval"]).text
     assert text.count("float f10(float x)") == 1 and len(text) < 20_000  # 1,024 calls of f0
+
+
+def test_numbers_that_functions_return_may_bound_loops(tmp_path: Path) -> None:
+    (tmp_path / "bounds.glsl").write_text("""
+int steps(float x) { return 3; }
+void both(float x, out int n, out float y) { n = 4; y = 2.0 * x; }
+vec3 brdf(vec3 light, vec3 view, vec3 normal) {
+    int n; float y; float s = 0.0;
+    both(light.z, n, y);
+    for (int i = 0; i < n; i++) for (int j = 0; j < steps(light.x); j++) s += y;
+    return vec3(s);
+}
+""")
+    wo, wi = directions(1), directions(2)
+    values = go.Shader(tmp_path / "bounds.glsl").eval(wo, wi, precision="float64")
+    np.testing.assert_allclose(values[:, 0], 24.0 * wi[:, 2] ** 2, rtol=1e-12)
