@@ -84,3 +84,47 @@ vec3 brdf(vec3 light, vec3 view, vec3 normal) {
     wo, wi = directions(1), directions(2)
     values = go.Shader(tmp_path / "bounds.glsl").eval(wo, wi, precision="float64")
     np.testing.assert_allclose(values[:, 0], 24.0 * wi[:, 2] ** 2, rtol=1e-12)
+
+
+def test_bits_go_into_functions_and_come_out(tmp_path: Path) -> None:
+    (tmp_path / "bits.glsl").write_text("""
+uint word(float x) { return floatBitsToUint(x); }
+float exponent(uint bits, float scale) { return scale * float(int(bits >> 23) - 127); }
+void parts(float x, out uint sign, out uint size) { uint w = word(x); sign = w & 0x80000000u; size = w & 0x7FFFFFFFu; }
+vec3 brdf(vec3 light, vec3 view, vec3 normal) {
+    uint sign; uint size;
+    parts(light.x, sign, size);
+    float back = uintBitsToFloat(sign | size);
+    return vec3(exponent(word(light.z), 0.5), back, exponent(word(view.z), 0.5));
+}
+""")
+    wo, wi = directions(5), directions(6)
+    values = go.Shader(tmp_path / "bits.glsl").eval(wo, wi, precision="float64")
+    levels = [0.5 * np.floor(np.log2(w[:, 2])) for w in (wi, wo)]
+    np.testing.assert_allclose(values, np.stack([levels[0], wi[:, 0], levels[1]], axis=1) * wi[:, 2:], rtol=1e-12)
+
+
+def test_a_function_of_a_texture_is_recorded_once(tmp_path: Path) -> None:
+    np.save(tmp_path / "table.npy", np.linspace(0.0, 1.0, 16).reshape(4, 4, 1))
+    (tmp_path / "mine.toml").write_text('[textures]\ntable = "table.npy"\n')
+    (tmp_path / "mine.glsl").write_text("""
+uniform sampler2D table;
+float look(sampler2D t, float u) { return texture(t, vec2(u, u * u)).x; }
+vec3 brdf(vec3 light, vec3 view, vec3 normal) { return vec3(look(table, light.z) + look(table, view.z)); }
+""")
+    text = bundle(go.Shader(tmp_path / "mine.glsl"), "glsl", ["eval"]).text
+    assert text.count("float look(") == 1
+
+
+def test_a_varying_integer_changes_its_sign_type(tmp_path: Path) -> None:
+    (tmp_path / "cells.glsl").write_text("""
+vec3 brdf(vec3 light, vec3 view, vec3 normal) {
+    int cell = int(floor(8.0 * light.x));
+    uint word = uint(cell);
+    return vec3(word < 4u ? 1.0 : 0.0, float(int(word)), float(int(uint(view.z * 100.0))));
+}
+""")
+    wo, wi = directions(5), directions(6)
+    cell = np.floor(8.0 * wi[:, 0])
+    expected = np.stack([(cell >= 0) & (cell < 4), cell, np.floor(wo[:, 2] * 100.0)], axis=1) * wi[:, 2:]
+    np.testing.assert_allclose(go.Shader(tmp_path / "cells.glsl").eval(wo, wi, precision="float64"), expected, rtol=1e-9)

@@ -18,7 +18,7 @@ import html
 import inspect
 import itertools
 import sys
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -205,7 +205,8 @@ class Graph:
         if missing:
             raise RecordingError(f"no value for {', '.join(missing)}", self.entry.name)
         with np.errstate(all="ignore"):
-            return _run(self.entry, [given[n.replace(".", "_")] for n in self.entry.parameters])
+            results = iter(results_of(self.entry, [given[n.replace(".", "_")] for n in self.entry.parameters]))
+        return rebuild(self.entry.result, lambda _: next(results), Node)
 
 
 def _written(node: Node) -> str:
@@ -411,26 +412,28 @@ def symbol(kind: str) -> Node:
 # --------------------------------------------------------------------------- evaluation in NumPy
 
 
-def _run(function: Function, arguments: list) -> Value:
-    values: list[Value] = []
+def results_of(function: Function, arguments: Sequence[Value]) -> list[Value]:
+    """The results of a function in NumPy, one for each value in the structure that it returns."""
+    results = [node for _, node in _flatten(function.result, "")]
+    last = {arg: node for node in function.nodes for arg in node.args if isinstance(arg, Node)}
+    for node in results:
+        last.pop(node, None)
+    values: dict[Node, Value] = {}
     remaining = iter(arguments)
-
-    def get(arg: Value) -> Value:
-        return values[arg.index] if isinstance(arg, Node) else arg
-
     for node in function.nodes:
-        args = [get(a) for a in node.args]
+        args = [values[arg] if isinstance(arg, Node) else arg for arg in node.args]
+        for arg in node.args:  # arrays that are needed no more make room for the next
+            if isinstance(arg, Node) and last.get(arg) is node:
+                values.pop(arg, None)
         if node.op == "parameter":
-            values.append(next(remaining))
+            values[node] = next(remaining)
         elif node.op == "constant":
-            values.append(np.asarray(node.static))
+            values[node] = np.asarray(node.static)
         elif node.op == "call":
-            values.append(_run(node.static, args))
+            inner = results_of(node.static, args)
+            values[node] = inner[0] if isinstance(node.static.result, Node) else inner
         elif node.op == "element":
-            # results may hold text and None too, which are not counted
-            kinds = leaves(node.args[0].static.result)
-            parts = [part for part, kind in zip(leaves(args[0]), kinds, strict=True) if isinstance(kind, Node)]
-            values.append(parts[node.static])
+            values[node] = args[0][node.static]
         else:
-            values.append(operate(node.op, node.static, args))
-    return rebuild(function.result, get, Node)
+            values[node] = operate(node.op, node.static, args)
+    return [values[node] for node in results]

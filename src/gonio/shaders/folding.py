@@ -60,21 +60,11 @@ def _value(node: graph.Node, arguments: list[Any], known: Mapping[graph.Node, An
     if any(one is None for one in arguments):
         return None
     if node.op == "call":
-        return _called(node.static, arguments)
+        results = graph.results_of(node.static, arguments)
+        return results[0] if isinstance(node.static.result, graph.Node) else results
     if node.op == "element":
         return arguments[0][node.static]
     return operate(node.op, node.static, arguments)
-
-
-def _called(function: graph.Function, arguments: list[Any]) -> Any:
-    """The results of a function, as a list if there are several."""
-    values: dict[graph.Node, Any] = dict(zip(_parameters(function), arguments, strict=True))
-    for node in function.nodes:
-        given = [values[one] if isinstance(one, graph.Node) else one for one in node.args]
-        values[node] = _value(node, given, values)
-    if isinstance(function.result, graph.Node):
-        return values[function.result]
-    return [values[node] for _, node in graph._flatten(function.result, "")]
 
 
 def _numbers(node: graph.Node, value: Any) -> Numbers:

@@ -18,8 +18,8 @@ BIAS = 127
 SIGN, MAGNITUDE = 0x80000000, 0x7FFFFFFF
 
 
-def cast(value: Value, kind: str) -> Value:
-    """The bits of a scalar as another type, "float", "int" or "uint"."""
+def cast(value: Value, before: str, kind: str) -> Value:
+    """The bits of a scalar as another type: "float", "int" or "uint", both before and after."""
     if static(value):
         words = struct.pack("<f", value) if isinstance(value, float) else struct.pack("<I", wrapped(int(value), False))
         if kind == "float":
@@ -31,6 +31,13 @@ def cast(value: Value, kind: str) -> Value:
         if kind != "float" or value.number is not None:
             return value.number if kind == "float" else value
         return _power_of_two(value.exponent - float(BIAS))
+    if before != "float" and kind != "float":  # a number with a whole value, negative ones modulo 2^32
+        value = numeric(value)
+        return (
+            ops.where(value < 0.0, value + 2.0**32, value)
+            if kind == "uint"
+            else ops.where(value < 2.0**31, value, value - 2.0**32)
+        )
     if kind == "float":
         raise refuse("a float from the bits of an integer that varies", "compute with floats")
     return Bits(value, None)
@@ -82,7 +89,7 @@ def joined(a: Value, b: Value) -> Value:
     if not isinstance(sign, Bits) or sign.part != "sign":
         raise refuse("a bit operation on an integer that varies", "compute with floats")
     if not isinstance(size, Bits) and static(size) and wrapped(int(size), False) < SIGN:
-        size = Bits(float(cast(int(size), "float")), None, "magnitude")
+        size = Bits(float(cast(int(size), "uint", "float")), None, "magnitude")
     if not isinstance(size, Bits) or size.part != "magnitude":
         raise refuse("a bit operation on an integer that varies", "compute with floats")
     number = ops.abs(sign.number) * 0.0 + size.number if static(size.number) else size.number

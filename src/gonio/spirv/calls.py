@@ -17,6 +17,7 @@ from typing import Any
 from ..ops import graph
 from .composites import Cell, Pointer
 from .module import Function, Module
+from .reach import blocks_of
 from .values import Value, leaves
 
 Run = Callable[[Function, Sequence[Value], Value], Value]
@@ -25,11 +26,8 @@ Run = Callable[[Function, Sequence[Value], Value], Value]
 def globals_of(module: Module, function: Function, known: dict[int, frozenset[int]]) -> frozenset[int]:
     """The ids of the globals that a function and its callees may name; `known` remembers them by function."""
     if function.id not in known:
-        known[function.id] = frozenset()  # of a recursion, which is refused when it runs
-        every = [one for block in function.blocks.values() for one in block.instructions]
-        named = {id for one in every for id in one.operands if id in module.variables}
-        called = [module.functions.get(one.operands[0]) for one in every if one.name == "FunctionCall" and one.operands]
-        known[function.id] = frozenset(named).union(*(globals_of(module, one, known) for one in called if one))
+        every = [one for block in blocks_of(module, [function.id]) for one in block.instructions]
+        known[function.id] = frozenset(id for one in every for id in one.operands if id in module.variables)
     return known[function.id]
 
 

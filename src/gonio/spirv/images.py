@@ -16,7 +16,7 @@ WRAPS = ("clamp", "repeat")
 FILTERS = ("linear", "nearest")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Texture:
     """A texture: its table, (rows, columns, channels), row 0 at v = 0; None where no file was named.
 

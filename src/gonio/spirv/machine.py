@@ -327,7 +327,16 @@ class Machine:
             return sampled(name, values)
         if name in composites.COMPOSED:
             return composites.COMPOSED[name](self.module, one.type, *values)
+        if name == "Bitcast":
+            source = frame.function.types.get(one.operands[0], one.type)  # constants are numbers
+            before, after = self._scalar(source), self._scalar(one.type)
+            return elementwise(passing(lambda part: cast(part, before, after)), *values)
         return self._arithmetic(one, values)
+
+    def _scalar(self, id: int) -> str:
+        """The kind of a scalar type, or of a vector's components."""
+        kind = self.module.type(id)
+        return (self.module.type(kind.parts[0]) if kind.parts else kind).kind
 
     def _unset(self, one: Instruction) -> Value:
         """The value of a variable of a function before its first store."""
@@ -346,8 +355,7 @@ class Machine:
             if name in table:
                 return elementwise(passing(table[name]), *values)
         if name in INTEGERS:
-            kind = self.module.type(one.type)
-            signed = (self.module.type(kind.parts[0]) if kind.parts else kind).kind == "int"
+            signed = self._scalar(one.type) == "int"
 
             def on_integers(*scalars: Value) -> Value:
                 value = INTEGERS[name](*scalars)
@@ -356,10 +364,6 @@ class Machine:
             return elementwise(passing(on_integers), *values)
         if name in WHOLE:
             return WHOLE[name](*values)
-        if name == "Bitcast":
-            kind = self.module.type(one.type)
-            scalar = (self.module.type(kind.parts[0]) if kind.parts else kind).kind
-            return elementwise(passing(lambda part: cast(part, scalar)), *values)
         raise refuse(f"the bits of a number ({name})", "compute with floats")
 
     def _check_width(self, id: int) -> None:

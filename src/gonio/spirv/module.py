@@ -8,6 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 from ..errors import InputError
@@ -66,6 +67,12 @@ class Function:
     type: int
     parameters: list[tuple[int, int]] = field(default_factory=list)
     blocks: dict[int, Block] = field(default_factory=dict)
+
+    @cached_property
+    def types(self) -> dict[int, int]:
+        """The types of its values, by id; of a function that has been read."""
+        every = [one for block in self.blocks.values() for one in block.instructions]
+        return {**dict(self.parameters), **{one.result: one.type for one in every}}
 
 
 @dataclass

@@ -6,7 +6,7 @@ varies is held as a float with a whole value.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +32,15 @@ class Undefined:
     def __init__(self, what: str, hint: str = "", firm: bool = False, where: str = "") -> None:
         self.what, self.hint, self.firm, self.where = what, hint, firm, where
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Undefined) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[str, str, bool, str]:
+        return self.what, self.hint, self.firm, self.where
+
     def at(self, where: str) -> Undefined:
         """The same, read at a file and line; the first place stays."""
         return self if self.where else Undefined(self.what, self.hint, self.firm, where)
@@ -51,6 +60,12 @@ class Bits:
 
     def __init__(self, number: Value, exponent: Value, part: str = "") -> None:
         self.number, self.exponent, self.part = number, exponent, part
+
+    def __parts__(self) -> dict[str, Value]:
+        return {"number": self.number, "exponent": self.exponent, "part": self.part}
+
+    def __with_parts__(self, parts: Mapping[str, Value]) -> Bits:
+        return Bits(**parts)
 
 
 UNDEFINED: Final = Undefined("a value that nothing computes")
