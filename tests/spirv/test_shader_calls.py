@@ -127,4 +127,5 @@ vec3 brdf(vec3 light, vec3 view, vec3 normal) {
     wo, wi = directions(5), directions(6)
     cell = np.floor(8.0 * wi[:, 0])
     expected = np.stack([(cell >= 0) & (cell < 4), cell, np.floor(wo[:, 2] * 100.0)], axis=1) * wi[:, 2:]
-    np.testing.assert_allclose(go.Shader(tmp_path / "cells.glsl").eval(wo, wi, precision="float64"), expected, rtol=1e-9)
+    values = go.Shader(tmp_path / "cells.glsl").eval(wo, wi, precision="float64")
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
