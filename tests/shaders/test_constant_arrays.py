@@ -51,7 +51,8 @@ class Striped(go.BSDF):
 def test_numbered_constants_are_an_array(language: str) -> None:
     text = go.emit(go.KullaConty(GOLD), language)
     assert DECLARED[language] in text and "derived.missing_c, " in text
-    assert not re.search(r"\b(missing_)?c_\d+\b", re.sub(r"(//|#|\"\"\").*", "", text))
+    code = re.sub(r'(//|#|""").*|"[^"]*"', "", text)  # without comments, and tables as text, which hold any letters
+    assert not re.search(r"\b(missing_)?c_\d+\b", code)
 
 
 def test_the_page_may_have_them_one_by_one() -> None:
