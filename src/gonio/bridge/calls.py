@@ -36,6 +36,7 @@ def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Ans
         ("types", trial.types),
         ("shading frame", trial.rotated_frame),
         ("texture coordinates", trial.textured),
+        ("eval_null_transmission", trial.null_transmission),
         ("eval_diffuse_reflectance", trial.diffuse_reflectance),
     ):
         trial.difference = None
@@ -237,6 +238,18 @@ class _Trial:
         return self.unlike("a sample's pdf", "pdf with other si.uv", density, pdf) or self.unlike(
             "weight x pdf", "eval with other si.uv", self.color(weight)[smooth] * density, value
         )
+
+    def null_transmission(self) -> str:
+        """What passes unscattered, as integrators with shadow rays through surfaces ask for it, is what null samples
+        carry. The base class, and thus a plugin without this call, answers 0."""
+        null = self.lit & (
+            np.broadcast_to(np.asarray(self.drawn.sampled_type.numpy()), COUNT) & int(mi.BSDFFlags.Null) > 0
+        )
+        value = self.color(self.bsdf.eval_null_transmission(self.si))
+        if null.sum() < 20 or not value.any():
+            return ""
+        carried = (self.weight * _rows(self.drawn.pdf))[null]
+        return self.unlike("eval_null_transmission", "weight x pdf of null samples", value[null], carried)
 
     def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
         """Components requested one by one add up to the sum, and their samples are of the requested component."""

@@ -21,7 +21,7 @@ from typing import Any
 from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 
-_CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w+)")
+_CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w[\w-]*)")
 PREFIX = "gonio_file_"  # of such modules' names in sys.modules
 
 Stamp = tuple[int, int]
@@ -111,7 +111,7 @@ def _folder_of_caller() -> Path | None:
 
 def files_in(text: str) -> list[Path]:
     """The files that a material's text names, for inner materials and members too."""
-    return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w+", text)]
+    return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w[\w-]*", text)]
 
 
 def with_imports(path: Path) -> list[Path]:

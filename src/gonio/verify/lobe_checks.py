@@ -123,7 +123,9 @@ def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray)
     inverse = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * refracted
     text, cause = "not refracted by Snell's law with the eta of the sample", ""
     wrong = off > SINGLE
-    if wrong.any() and inverse[wrong].max() < SINGLE:
+    if wrong.any() and np.abs(i + o)[wrong].max() < SINGLE:
+        cause = "the light passes straight on, and its `eta` is not 1: that of another lobe?"
+    elif wrong.any() and inverse[wrong].max() < SINGLE:
         text += ", but with 1 / eta"
         cause = "Snell's law holds with 1 / eta: refracted the wrong way, or `eta` is that of the other side?"
     return _miss(off, text, o, i, cause)
@@ -193,7 +195,9 @@ def modes(probe: Probe) -> Misses:
         verb = "transmits" if through[row] else "reflects"
         text = f"{verb} {ratio} times as much radiance as power, {expected} expected (1 / eta^2)"
         total = np.sum(probe.power.carried[rows] * probe.power.valid[rows][..., None], axis=1)
-        yield _miss(off, text, o, i, _power_of_index(radiance, power, eta, through & exists, total))
+        cause = _power_of_index(radiance, power, eta, through & exists, total)
+        cause = cause or _one_side(radiance, power, eta, through & exists, o[:, 2] > 0.0)
+        yield _miss(off, text, o, i, cause)
 
 
 def _power_of_index(
@@ -210,17 +214,32 @@ def _power_of_index(
         return bool(np.all(np.abs(full - carried + scale * carried - 1.0) < 1e-3))
 
     for exponent, right, wrong in (
+        (-1.0, "1 / eta in place of 1 / eta^2", "power has a factor of the index, which no light has"),
         (0.0, "the factor 1 / eta^2 is missing", "power has the factor 1 / eta^2, which only radiance has"),
         (2.0, "the factor 1 / eta^2 is inverted", "the two modes are exchanged"),
         (-4.0, "the factor 1 / eta^2 is applied twice", "power has the factor eta^2, which no light has"),
     ):
         if np.all(np.abs(ratio / eta[usable] ** exponent - 1.0) < 1e-3):
             of_power = not conserved(1.0) and conserved(squared if exponent >= 0.0 else 1.0 / squared)
-            text = f"eta^{exponent:g}" if exponent else "1"
+            text = "1 / eta" if exponent == -1.0 else f"eta^{exponent:g}" if exponent else "1"
             known = of_power or conserved(1.0)
             return (
                 f"radiance over power is {text}: {wrong if of_power else right if known else f'{right}, or {wrong}'}?"
             )
+    return ""
+
+
+def _one_side(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, outside: np.ndarray) -> str:
+    """The cause where radiance over power is right from one side of the surface only."""
+    ratio = radiance.sum(1) / np.maximum(power.sum(1), 1e-12)
+    for right, wrong, name in ((outside, ~outside, "inside"), (~outside, outside, "outside")):
+        a, b = usable & right, usable & wrong
+        if min(a.sum(), b.sum()) < 4 or np.abs(eta[b] - 1.0).max() < FLAT:
+            continue
+        if np.all(np.abs(ratio[a] * eta[a] ** 2.0 - 1.0) < 1e-3):
+            for exponent, text in ((2.0, "inverted"), (0.0, "missing"), (-4.0, "applied twice"), (-1.0, "1 / eta")):
+                if np.all(np.abs(ratio[b] / eta[b] ** exponent - 1.0) < 1e-3):
+                    return f"radiance from {name} has the factor 1 / eta^2 {text}, that from the other side is right?"
     return ""
 
 
@@ -238,7 +257,32 @@ def way_back(probe: Probe) -> Misses:
         off = _relative(there, back) * exists
         row = int(np.argmax(off))
         one_way, other_way = distinct(there[row].mean(), back[row].mean())
-        yield _miss(off, f"carries {one_way} of the power one way and {other_way} the other", o, i)
+        cause = _of_way_back(probe, o, i, off)
+        yield _miss(off, f"carries {one_way} of the power one way and {other_way} the other", o, i, cause)
+
+
+def _of_way_back(probe: Probe, o: np.ndarray, i: np.ndarray, off: np.ndarray) -> str:
+    """The cause where what is reflected from the denser side follows Schlick's curve of the angle there, and what is
+    carried through differs by angle alone."""
+    inside = np.flatnonzero((o[:, 2] * i[:, 2] < 0.0) & (off > 1e-4))
+    if inside.size < 4:
+        return ""
+    wo, power = probe.wo, probe.power
+    reflected = np.sum(power.carried * (power.valid & ~power.through(wo))[..., None], axis=1).mean(1)
+    for side in (1.0, -1.0):
+        rows = (wo[:, 2] * side > 0.0) & (reflected > 0.0) & (reflected < 0.999)
+        x = (1.0 - np.abs(wo[rows, 2])) ** 5
+        if rows.sum() < 4 or np.ptp(x) < 0.01:
+            continue
+        # r0 + (1 - r0) x, solved for r0
+        r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))
+        bent = np.abs(np.sum(power.eta[rows] * power.through(wo)[rows], axis=1)) < 1.0  # the other side is thinner
+        if np.abs(r0 + (1.0 - r0) * x - reflected[rows]).max() < 1e-4 and bent.mean() > 0.5:
+            where = "outside" if side > 0.0 else "inside"
+            return (
+                f"from {where} it reflects by Schlick's curve of the angle there: that of the transmitted angle is due?"
+            )
+    return ""
 
 
 def fresnel(probe: Probe) -> Misses:
@@ -288,6 +332,9 @@ def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndar
     return (np.abs(value - expected) / most).max(1), expected
 
 
+KEPT = (("y", np.array([-1.0, 1.0, 1.0])), ("x", np.array([1.0, -1.0, 1.0])), ("x and y", np.array([1.0, 1.0, -1.0])))
+
+
 def rotation(probe: Probe) -> Misses:
     """Isotropic lobes rotate with wo."""
     if not probe.subject.isotropic:
@@ -298,7 +345,10 @@ def rotation(probe: Probe) -> Misses:
         carried, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
         other, exists = lobes.along(lobes.rows_of(rotated, rows), directions.rotated(i, angle[rows]))
         lost = np.where(exists | (carried.max(1) < FORWARD), 0.0, np.inf)
-        yield _miss(lost, "declared isotropic, but a turn of the view moves the lobe", o, i)
+        cause = next(
+            (f"the sampled direction keeps {k} of wo: a sign?" for k, m in KEPT if np.abs(i - o * m).max() < 1e-4), ""
+        )
+        yield _miss(lost, "declared isotropic, but a turn of the view moves the lobe", o, i, cause)
         off = _relative(carried, other) * exists
         yield _miss(off, "declared isotropic, but a turn of the view changes what the lobe carries", o, i)
 

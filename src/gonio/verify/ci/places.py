@@ -12,7 +12,7 @@ from ...catalog import shaders
 from ...errors import GonioError
 from ..verdict import DECLARED, FAIL, NOT_TRIED, Card, Unread, Verdict
 
-_CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
+_CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w[\w-]*)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
 
 

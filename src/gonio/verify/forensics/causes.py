@@ -204,3 +204,29 @@ def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
     """The region of the bad pairs as text, "" if no simple region contains exactly these."""
     place = _place(wo, wi, bad) if bad.any() and not bad.all() else None
     return place[0] if place else ""
+
+
+DENSE = 0.3  # share of a place's pairs that are bad
+
+
+def within(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
+    """The tightest simple region that contains all bad pairs, among others, as text; "" if none is tight: opposite
+    azimuths, and intervals of an angle."""
+    if bad.sum() < 4:
+        return ""
+    apart = np.sum(wo[:, :2] * wi[:, :2], axis=1) < 0.0
+    regions = {"where the azimuths of wo and wi differ by more than 90 degrees": apart}
+    for name, values in _angles(wo, wi):
+        low, high = float(values[bad].min()), float(values[bad].max())
+        inside = (values >= low) & (values <= high)
+        words = (
+            f"beyond {low:.3g}" if high > 89.0 else f"within {high:.3g}" if low < 1.0 else f"of {low:.3g} to {high:.3g}"
+        )
+        regions[f"at angles {words} degrees ({name})"] = inside
+        if not np.any(bad & ~apart):
+            regions[f"at angles {words} degrees ({name}), with azimuths that differ by more than 90"] = inside & apart
+    density = {
+        words: float((bad & rows).sum() / rows.sum()) for words, rows in regions.items() if not np.any(bad & ~rows)
+    }
+    best = max(density, key=density.__getitem__, default="")
+    return best if best and density[best] > DENSE and density[best] > 2.0 * float(bad.mean()) else ""

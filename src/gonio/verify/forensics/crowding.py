@@ -106,7 +106,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         if inside <= 0.0 or total < 1000.0:
             return None
         scale = total / inside
-        left = _effect(expected * scale, held.observed)
+        left = effect(expected * scale, held.observed)
         if formula == "1":
             before = float(np.hypot(left, np.log(scale)))
             if before < BEFORE:
@@ -158,14 +158,14 @@ def _sides(held: Blocks) -> Cause | None:
             return None
         scaled[side] = expected[side] * (o / e)
         shares.append(o / e)
-    if _effect(scaled, held.observed) > EFFECT or abs(np.log(shares[0] / shares[1])) < BEFORE:
+    if effect(scaled, held.observed) > EFFECT or abs(np.log(shares[0] / shares[1])) < BEFORE:
         return None
     above, below = shares
     agree = f"samples over pdf are {above:.3g} above the surface and {below:.3g} below it, the same within each side"
     return Cause(f"{agree}: the choice between reflection and transmission?", "samples choose the side")
 
 
-def _effect(expected: np.ndarray, observed: np.ndarray) -> float:
+def effect(expected: np.ndarray, observed: np.ndarray) -> float:
     """Root mean square of observed / expected - 1 beyond the noise of the counts."""
     order = np.argsort(expected)
     low = expected[order] < FULL
@@ -193,7 +193,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
     for formula, guess, value in densities:
         yield Factor(formula, guess, functools.partial(over_pdf, value=value))
     if not subject.transmits:
-        yield from factors.cosines(("(o.m)", "cos_m", "cos_i"))
+        yield from factors.cosines(("(o.m)", "cos_m", "cos_i", "sin_i"))
     yield from factors.indices(subject, (2, -2, 4, -4), "eta^2 of the Jacobian of refraction", [*factors.SIDES])
     for text, guess, other in factors.widths(subject):
         yield Factor(f"those of {text}", guess, functools.partial(over_pdf, value=other.pdf))

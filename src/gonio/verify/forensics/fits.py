@@ -247,6 +247,7 @@ def _schlick_quotient(ratio: Ratio, r: np.ndarray, x: np.ndarray, y: np.ndarray)
 
 
 DEGREE = 9
+KNOTS = 97  # of a function with kinks, such as a smooth step at the horizon
 
 
 def _one_direction(ratio: Ratio) -> Fit | None:
@@ -256,9 +257,14 @@ def _one_direction(ratio: Ratio) -> Fit | None:
         return None
     o, i = (np.abs(w[:, 2:]) for w in (ratio.wo, ratio.wi))
     powers = np.arange(1, DEGREE + 1)
-    columns = np.column_stack([o**powers - i**powers, np.log(o / i)])
-    solved = np.linalg.lstsq(columns, np.log(r), rcond=None)[0]
-    quality = holds(ratio, r / np.exp(columns @ solved))
+    smooth = np.column_stack([o**powers - i**powers, np.log(o / i)])
+    knots = np.linspace(0.0, 1.0, KNOTS)
+    tents = [np.maximum(1.0 - np.abs(w - knots) * (KNOTS - 1), 0.0) for w in (o, i)]
+    for columns in (smooth, np.column_stack([tents[0] - tents[1], np.log(o / i)])):
+        solved = np.linalg.lstsq(columns, np.log(r), rcond=None)[0]
+        quality = holds(ratio, r / np.exp(columns @ solved))
+        if quality is not None:
+            break
     if quality is None:
         return None
     guess = "a term of one direction only, in place of the half vector or of both directions"

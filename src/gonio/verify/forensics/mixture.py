@@ -17,7 +17,7 @@ from ..cells import height, pseudo_angle
 from ..figures import SampleCells
 from ..subject import Subject
 from .crowding import Blocks
-from .ratio import Cause
+from .ratio import Cause, written
 
 SWEEP = 512  # values of the number that may choose
 TRIALS = 24  # values of the other two
@@ -75,7 +75,17 @@ def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
     elif abs(weights.sum() - 1.0) < SHARE:
         guess = "the probability of the choice is another one in the pdf"
     else:
-        return None
+        ratios = weights / shares
+        wrong = np.flatnonzero(np.abs(weights - shares) > 0.5 * SHARE)
+        if len(wrong) != 1 or ratios[wrong[0]] < 0.05:
+            return None
+        number = wrong[0] + 1
+        words += (
+            f": the density of lobe {number} is {written(float(ratios[wrong[0]]), 0.004)} times that of its samples"
+        )
+        return Cause(
+            f"{words}: its normalization, or its share of the choice, left out or squared?", "weights of lobes"
+        )
     return Cause(f"{words}: {guess}?", "weights of lobes")
 
 

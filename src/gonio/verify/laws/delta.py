@@ -102,6 +102,15 @@ def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
     factor = weight / pdf
     if np.ptp(pdf) > 0.1 and np.ptp(factor) < 1e-3 * factor.mean():
         return "the weight of delta samples is proportional to the probability of their choice: not divided by it?"
+    off = np.abs(share - pdf)
+    if np.mean(off > 0.03) > 0.2:
+        row = int(np.argmax(off))
+        words = f"lobes are chosen with another probability than their pdf states, {share[row]:.2g} and {pdf[row]:.2g}"
+        clamped = off > 0.03
+        one = float(np.median(share[clamped]))
+        if np.abs(share[clamped] - one).max() < 0.02 or np.abs(share[clamped] - 1.0 + one).max() < 0.02:
+            return f"{words}: the choice is clamped?"
+        return f"{words}: two formulas for the choice?"
     return ""
 
 

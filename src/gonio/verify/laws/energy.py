@@ -14,7 +14,7 @@ from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
-from ..forensics import channels, losses
+from ..forensics import channels, gains, losses
 from ..forensics.causes import place_of
 from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
@@ -127,6 +127,19 @@ class Energy(Law):
         mix = channels.mixed(there, *pairs(there, 4096, seed)) if there.has_density else None
         if mix is not None and not _gains_in_gray(there, curves, effort, seed):
             yield mix
+        yield from self._of_albedo(curves)
+        view = directions.single(directions.at(np.array(gains.VIEWS), 37.0))
+        coarse = dataclasses.replace(effort, accuracy=1e-3, full=False)
+
+        def albedo(one: Subject) -> np.ndarray:
+            # a guide of its own would take seconds
+            one = dataclasses.replace(one, drawn_by=subject.sampler) if subject.guided else one
+            return _quadrature(one, view, coarse, seed)[0]
+
+        yield from gains.causes(white, albedo)
+
+    def _of_albedo(self, curves: AlbedoCurves) -> Iterator[Cause]:
+        """What the curves themselves say of a gain."""
         # the right albedo is known only where nothing is absorbed
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:

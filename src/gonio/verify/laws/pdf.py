@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from .. import directions, estimators, histogram, severity
 from ..cells import place
 from ..effort import Effort
 from ..figures import SampleCells
-from ..forensics import crowding, mixture
+from ..forensics import crowding, misplaced, mixture
 from ..forensics.causes import nothing_below
 from ..forensics.ratio import Cause
 from ..subject import Subject
@@ -114,12 +115,15 @@ class Pdf(Law):
         views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
         oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
         oblique_tests = _chi_square(there, FEW, seed, oblique)
-        for explain in (crowding.named, mixture.named):
+        for explain in (crowding.named, mixture.named, misplaced.named):
             for tested in oblique_tests:
                 held = crowding.blocks(tested.cells)
                 cause = explain(there, tested.cells, held, seed) if held is not None else None
                 if cause is not None:
                     yield cause
+        clamped = _clamped(there, oblique[:1], seed)
+        if clamped:
+            yield Cause(f"{clamped}: a random number that is clamped, which the pdf does not count?", "u clamped")
         if _reused(there, oblique[:1], seed):
             yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
         for note in finding.notes:
@@ -127,18 +131,44 @@ class Pdf(Law):
                 yield Cause(note, "pdf where no sample occurs")
 
 
-SWEEP = 512  # values of u.x
-TRIALS = 32  # values of the other two numbers
-JUMP = 0.2  # of a direction from one value of u.x to the next: another lobe
+SWEEP = 512  # values of one number
+TRIALS = 32  # values of the other two
+JUMP = 0.2  # of a direction from one value to the next: another lobe
+STILL = 1e-7  # of a direction, that has not moved
+
+
+def _swept(subject: Subject, wo: np.ndarray, dimension: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (TRIALS, SWEEP, 3) of samples while one number runs through [0, 1), and which of them are smooth."""
+    u = np.repeat(directions.numbers(np.random.default_rng([seed, 45]), TRIALS), SWEEP, axis=0)
+    u[:, dimension] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
+    s = subject.sample(np.repeat(wo, len(u), axis=0), u)
+    return s.wi.reshape(TRIALS, SWEEP, 3), ((s.pdf > 0.0) & ~s.delta).reshape(TRIALS, SWEEP)
+
+
+def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
+    """The ends of [0, 1) at which a number does not move the direction that it moves elsewhere, in words."""
+    for dimension, name in enumerate(("first", "second", "third")):
+        wi, fine = _swept(subject, wo, dimension, seed)
+        moves = np.abs(np.diff(wi, axis=1)).max(2) > STILL
+        both = fine[:, 1:] & fine[:, :-1]
+        if both.mean() < 0.5 or (moves & both).sum() < 0.2 * both.sum():
+            continue
+        still = np.all(~moves | ~both, axis=0)  # for all values of the other two
+        low = int(np.argmin(still)) if still[0] else 0
+        high = int(np.argmin(still[::-1])) if still[-1] else 0
+        if (low > 1 and both[:, :low].any()) or (high > 1 and both[:, -high:].any()):
+            ends = [f"below {low / SWEEP:.2g}"] if low > 1 else []
+            ends += [f"above {1.0 - high / SWEEP:.3g}"] if high > 1 else []
+            return f"samples do not move while the {name} random number is {' and '.join(ends)}"
+    return ""
 
 
 def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
-    """Whether the azimuth covers 2 pi u.x, and not 2 pi, over the part of [0, 1) that chooses a lobe."""
-    others = directions.numbers(np.random.default_rng([seed, 45]), TRIALS)
-    u = np.repeat(others, SWEEP, axis=0)
-    u[:, 0] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
-    s = subject.sample(np.repeat(wo, len(u), axis=0), u)
-    wi, fine = s.wi.reshape(TRIALS, SWEEP, 3), ((s.pdf > 0.0) & ~s.delta).reshape(TRIALS, SWEEP)
+    """Whether u.x chooses a lobe and then directs it as if it still had all of [0, 1): over its part the azimuth covers
+    less than 2 pi, or the polar angle does not reach the middle of the lobe, which is at one end of [0, 1)."""
+    wi, fine = _swept(subject, wo, 0, seed)
+    if _misses_the_middle(wo[0], wi, fine):
+        return True
     phi = np.arctan2(wi[..., 1], wi[..., 0])
     short = 0
     for row in range(TRIALS):
@@ -150,6 +180,31 @@ def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
                 short += 1
                 break
     return short > 0.8 * TRIALS
+
+
+ASIDE = np.cos(np.radians(8.0))  # from the middle of a lobe
+MOVED = np.radians(10.0)  # of the polar angle over a part
+
+
+def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool:
+    """Whether u.x moves a lobe's polar angle over its part of [0, 1), and no end of the part is near the lobe's middle:
+    the normal, the mirror direction, or the normal as the half vector."""
+    m = wi + wo
+    m = m / np.maximum(np.linalg.norm(m, axis=-1, keepdims=True), 1e-9)
+    cosines = [wi[..., 2], np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1), np.abs(m[..., 2]), np.sum(wi * wo, axis=-1)]
+    jumps = (np.abs(np.diff(wi, axis=1)).max(2) > JUMP).mean(0) > 0.7  # a choice is made at the same value always
+    ends = [0, *(np.flatnonzero(jumps) + 1), SWEEP]
+    for first, last in itertools.pairwise(ends):
+        length = (last - first) / SWEEP
+        part = slice(first, last)
+        usable = fine[:, part].mean(1) > 0.5
+        if not 0.1 < length < 0.9 or usable.sum() < TRIALS // 2 or not jumps.any():
+            continue
+        angles = [np.arccos(np.clip(cosine[usable, part], -1.0, 1.0)) for cosine in cosines]
+        polar = [a for a in angles if np.mean(np.std(a, axis=0)) < 0.01 and np.ptp(a.mean(0)) > MOVED]
+        if polar and all(np.cos(a.min()) < ASIDE for a in polar):
+            return True
+    return False
 
 
 _KINDS = {

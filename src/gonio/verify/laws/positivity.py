@@ -15,7 +15,7 @@ from ...ops import Precision, backend
 from .. import directions, estimators, ranges, severity
 from ..effort import Effort
 from ..forensics import extremes, origin
-from ..forensics.causes import place_of
+from ..forensics.causes import place_of, within
 from ..forensics.ratio import Cause
 from ..subject import Fault, Subject, guarded
 from ..verdict import Finding
@@ -135,8 +135,9 @@ class Positivity(Law):
                 yield Cause(f"eval is {fault} only where {words}: {guess}?", f"{fault} where {words}")
                 return
         yield from self._of_settings(subject, finding, effort, seed, fault, "eval")
-        if place := place_of(wo, wi, bad):
-            yield Cause(f"eval is {fault} only {place}", f"{fault} {place}")
+        if place := place_of(wo, wi, bad) or within(wo, wi, bad):
+            guess = ": a term that is not clamped?" if fault == "negative" else ""
+            yield Cause(f"eval is {fault} only {place}{guess}", f"{fault} {place}")
 
     def _of_settings(
         self, subject: Subject, finding: Finding, effort: Effort, seed: int, fault: str, what: str

@@ -86,9 +86,14 @@ class Weight(Law):
             value = subject.eval(o, i, mode)
             if _gray(s.weight[rows]) and not _gray(value):
                 yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
-            clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30))
+            clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30), "eval / pdf")
             if clamped:
                 yield Cause(f"the weight is {clamped}", "clamped weight")
+            largest = value.max(1, keepdims=True), s.weight[rows].max(1, keepdims=True)
+            lit = (largest[0] > 0.0) & (largest[1] > 0.0)
+            divisor = _clamped((largest[0] / np.where(lit, largest[1], 1.0))[lit[:, 0]], pdf[lit[:, 0]], "pdf")
+            if divisor:
+                yield Cause(f"eval over the weight is {divisor}", "clamped weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
@@ -161,8 +166,11 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
 
 
-def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
-    """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else ""."""
+def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
+    """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else "".
+
+    name  of the right ones
+    """
     if not len(weight):
         return ""
     off = np.abs(weight - right) > 0.01 * np.maximum(weight, right)
@@ -175,9 +183,9 @@ def _clamped(weight: np.ndarray, right: np.ndarray) -> str:
         return ""
     rest = weight[~off]  # within the same bound
     if np.all(right[off] > values) and np.all(rest <= most * 1.001):
-        return f"{most:.4g} wherever eval / pdf is larger: clamped to at most {most:.4g}?"
+        return f"{most:.4g} wherever {name} is larger: clamped to at most {most:.4g}?"
     if np.all(right[off] < values) and np.all(rest >= most * 0.999):
-        return f"{most:.4g} wherever eval / pdf is smaller: clamped to at least {most:.4g}?"
+        return f"{most:.4g} wherever {name} is smaller: clamped to at least {most:.4g}?"
     return ""
 
 

@@ -1,0 +1,173 @@
+"""Why a material reflects more light than arrives: the part of it that gains, and how the gain depends on parameters.
+
+Without absorption a part that is normalized reflects at most 1. So the albedos of the lossless variant tell
+
+    parts       with one color 1 and the others 0: which part gains alone, or whether only their sum does
+    parameters  proportional to a power of one: a normalization lacks it; or no gain at one end of its range
+    views       1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ...errors import GonioError
+from ...material import BSDF, tree
+from ..subject import Fault, Subject
+from .ratio import Cause, written
+
+Albedo = Callable[[Subject], np.ndarray]  # of a subject at NORMAL, then at OBLIQUE: (views, channels)
+
+VIEWS = (2.0, 40.0, 60.0, 75.0, 85.0)  # degrees of wo; the first stands for the normal
+GAIN = 5e-3
+VALUES = 5  # of a parameter
+SPAN = 4.0  # by which a parameter is divided and multiplied
+POWER = 0.15  # by which an exponent may differ from an integer
+RESIDUAL = 0.05  # of a logarithm: Fresnel's terms and losses at the horizon vary as well
+NARROW = 0.3  # largest width at which little light is lost at the horizon
+MOST = 6  # parameters, or colors
+
+
+def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
+    """What a gain depends on; `white` is the subject without absorption."""
+    if not isinstance(white.model, BSDF) or white.stochastic:
+        return
+    here = albedo(white)
+    if here.max() < 1.0 + GAIN:
+        return
+    part = _parts(white, albedo, float(here.max()))
+    power = _power(white, albedo, here)
+    if power is not None:
+        yield Cause(f"{power.words}{part and ', ' + part}", power.key)
+    elif part:
+        yield Cause(part, "gain of a part")
+    view = _views(here)
+    if view is not None:
+        yield view
+
+
+def _parts(white: Subject, albedo: Albedo, here: float) -> str:
+    """Which color's part gains alone, in words; "" if there are no two colors."""
+    colors = {
+        leaf.path: leaf.parameter
+        for leaf in tree.leaves(white.model)
+        if leaf.parameter.kind == "spectrum" and not leaf.parameter.inner and leaf.path not in white.model.fixed
+    }
+    if not 2 <= len(colors) <= MOST:
+        return ""
+    alone: dict[str, float] = {}
+    for path in colors:
+        black: dict[str, Any] = {other: _low(parameter) for other, parameter in colors.items() if other != path}
+        value = _of(white, black, albedo)
+        if value is None:
+            return ""
+        alone[path] = float(value.max())
+    wrong = [path for path, value in alone.items() if value > 1.0 + GAIN]
+    text = ", ".join(f"{value:.4g} with {path} alone" for path, value in alone.items())
+    if not wrong:
+        return (
+            f"the parts reflect {text}, and {here:.4g} together: one of them is not reduced by what the other reflects?"
+        )
+    if len(wrong) < len(colors):
+        return f"the largest albedo is {text}: the normalization of the part with {' and '.join(wrong)}?"
+    return ""
+
+
+def _low(parameter: Any) -> float:
+    return max(float(parameter.low), 0.0) if np.isfinite(parameter.low) else 0.0
+
+
+def _of(subject: Subject, values: dict[str, Any], albedo: Albedo) -> np.ndarray | None:
+    try:
+        value = albedo(subject.replace(**values))
+    except (GonioError, Fault, ValueError, TypeError):
+        return None
+    return value if np.all(np.isfinite(value)) else None
+
+
+# --------------------------------------------------------------------------- parameters
+
+
+def _numbers(white: Subject) -> Iterator[tuple[str, str, Callable[[float], Any], float, float, float]]:
+    """Numeric parameters but colors and angles, widths one at a time: name, path, the value of a number, the number now,
+    and its range."""
+    for leaf in tree.leaves(white.model):
+        parameter, value = leaf.parameter, leaf.value
+        if not parameter.numeric or parameter.white is not None or parameter.kind in ("angle", "spectrum"):
+            continue
+        low, high = float(getattr(parameter, "low", -np.inf)), float(getattr(parameter, "high", np.inf))
+        if parameter.kind == "alpha":
+            pair = tuple(float(one) for one in value) if isinstance(value, tuple | list) else (float(value),) * 2
+            yield f"{leaf.path}.x", leaf.path, lambda x, pair=pair: (x, pair[1]), pair[0], low, high
+            yield f"{leaf.path}.y", leaf.path, lambda y, pair=pair: (pair[0], y), pair[1], low, high
+        elif isinstance(value, int | float) and not isinstance(value, bool) and float(value) > 0.0:
+            yield leaf.path, leaf.path, lambda x: x, float(value), low, high
+
+
+def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> Cause | None:
+    """The powers of parameters to which the albedo at the normal is proportional, or the end of a range without gain."""
+    powers: dict[str, float] = {}
+    ends: list[Cause] = []
+    scale = 1.0
+    for name, path, value_of, now, low, high in list(_numbers(white))[:MOST]:
+        least = max(now / SPAN, low + 1e-3 * max(now, 1e-3)) if np.isfinite(low) else now / SPAN
+        most = min(now * SPAN, high) if np.isfinite(high) else now * SPAN
+        if path.rpartition(".")[2] == "alpha" and now < NARROW:
+            most = min(most, NARROW)
+        at = np.geomspace(least, most, VALUES) if 0.0 < least < most else np.empty(0)
+        results = [(float(x), _of(white, {path: value_of(float(x))}, albedo)) for x in at]
+        known = [(x, one) for x, one in results if one is not None]
+        if len(known) < 3:
+            continue
+        x, normal = np.log([x for x, _ in known]), np.log([max(float(one[0].mean()), 1e-9) for _, one in known])
+        slope, start = np.polyfit(x, normal, 1)
+        whole = float(np.round(slope))
+        fits = np.abs(normal - (slope * x + start)).max() < RESIDUAL and abs(slope - whole) < POWER
+        if fits and whole != 0.0:
+            powers[name] = whole
+            scale *= now**whole
+            continue
+        largest = np.array([float(one.max()) for _, one in known])
+        gains = largest > 1.0 + GAIN
+        steps = np.diff(largest)
+        if not (np.all(steps > -GAIN) or np.all(steps < GAIN)):
+            continue  # as by interference
+        if gains.all() and np.isfinite(low):  # the end itself, which has no logarithm if it is 0
+            end = _of(white, {path: value_of(low)}, albedo)
+            if end is not None and end.max() < 1.0 + GAIN:
+                x, largest, gains = np.append(x, -np.inf), np.append(largest, end.max()), np.append(gains, False)
+        if gains.any() and not gains.all() and here.max() - largest.min() > 0.5 * (here.max() - 1.0):
+            least = float(x[np.argmin(largest)])
+            none = float(np.exp(least)) if np.isfinite(least) else low
+            words = f"the largest albedo without absorption is {largest.min():.4g} at {name} = {none:.3g} and "
+            words += f"{largest.max():.4g} at {float(np.exp(x[np.argmax(largest)])):.3g}"
+            guess = f"a normalization that does not follow {name}"
+            ends.append(Cause(f"{words}: {guess}?", f"gain by {name}"))
+    if powers:
+        formula = " ".join(name if power == 1.0 else f"{name}^{power:g}" for name, power in powers.items())
+        constant = float(here[0].mean()) / scale
+        times = "" if abs(constant - 1.0) < 2.0 * RESIDUAL else f"{written(constant, RESIDUAL)} "
+        words = f"without absorption it reflects {times}{formula} at the normal"
+        return Cause(f"{words}: these powers, missing in the normalization or there too often?", f"gain {formula}")
+    return ends[0] if ends else None
+
+
+# --------------------------------------------------------------------------- views
+
+
+def _views(here: np.ndarray) -> Cause | None:
+    """1 at the normal and a power of the cosine elsewhere."""
+    a = here.mean(1)
+    if a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
+        return None
+    mu = np.cos(np.radians(VIEWS))
+    slope, start = np.polyfit(np.log(mu), np.log(np.maximum(a, 1e-9)), 1)
+    guess = "the normalization holds at the normal only, or a factor is missing at grazing views"
+    row = int(np.argmax(a))
+    words = f"without absorption it reflects {a[0]:.4g} at the normal and {a[row]:.4g} at {VIEWS[row]:g} degrees"
+    if abs(slope) > 0.05 and np.abs(np.log(a) - (slope * np.log(mu) + start)).max() < 3.0 * RESIDUAL:
+        words += f", like cos_o^{slope:.2g}"
+    return Cause(f"{words}: {guess}?", "gain at grazing views")

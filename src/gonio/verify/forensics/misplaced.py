@@ -1,0 +1,221 @@
+"""Where the samples lie that the pdf does not predict, if no single factor of `crowding` explains them.
+
+The counts o and expectations e of blocks of cells have a ratio r = o / e. Three patterns of r have a name:
+
+    the pdf in another frame     samples follow pdf(wo, M wi), with M a rotation about the normal or a mirror image
+    two parts                    r is one number c in most blocks; elsewhere only larger (the pdf lacks a lobe), or only
+                                 smaller (the pdf has a lobe that is never sampled)
+    one variable                 r is a function of one angle: the distribution of that angle is another one
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ...material import BSDF, tree
+from .. import severity
+from ..figures import SampleCells
+from ..subject import Subject
+from .crowding import BEFORE, EFFECT, Blocks, effect
+from .factors import half_vector
+from .ratio import Cause
+
+PLATEAU = 0.3  # share of the expectation in blocks of one ratio
+LEAST = 0.02  # share of all samples that lie elsewhere
+OTHER = 0.15  # of that share: differences of the other sign
+NOISE = 4.0  # standard errors
+STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
+BINS = 12
+NEAR_HORIZON, NEAR_NORMAL = 0.3, 0.95  # cosines
+FEW = 0.06  # share of the area in which a crowd is a ring or a point
+
+
+def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
+    """The pattern of the difference; None if it has none. Arguments as of `mixture.named`."""
+    expected = held.joined(held.expected)
+    if held.observed.sum() < 1000 or expected.sum() <= 0.0:
+        return None
+    before = effect(expected, held.observed)
+    if before < BEFORE:
+        return None
+    return _other_frame(subject, held, before) or _parts(subject, held) or _one_variable(held, before)
+
+
+# --------------------------------------------------------------------------- the pdf in another frame
+
+
+def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Rotations about the normal and mirror images: as text, the mistake that they suggest, and their matrix."""
+    yield (
+        "of wi rotated by 180 degrees about the normal",
+        "a direction that points the other way",
+        np.diag([-1, -1, 1.0]),
+    )
+    for k, axis in enumerate("xy"):
+        signs = np.ones(3)
+        signs[k] = -1.0
+        yield f"with the sign of wi.{axis} flipped", "a sign of a tangent", np.diag(signs)
+    exchanged = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    yield "with wi.x and wi.y exchanged", "sine and cosine of the azimuth, or x and y, exchanged", exchanged
+    for sign in (1.0, -1.0):
+        text = f"of wi rotated by {90.0 * sign:g} degrees about the normal"
+        yield text, "x and y exchanged", _rotation(np.radians(90.0 * sign))
+    guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
+    for path, angle in _angles(subject):
+        for factor in (1.0, -1.0, 2.0, -2.0):
+            words = f"{'-' if factor < 0.0 else ''}{'2 ' if abs(factor) > 1.5 else ''}{path}"
+            yield f"of wi rotated by {words}", guess, _rotation(factor * angle)
+
+
+def _angles(subject: Subject) -> Iterator[tuple[str, float]]:
+    if isinstance(subject.model, BSDF):
+        for leaf in tree.leaves(subject.model):
+            value = leaf.value
+            if leaf.parameter.kind == "angle" and isinstance(value, int | float) and abs(float(value)) > 1e-3:
+                yield leaf.path, float(value)
+
+
+def _rotation(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _other_frame(subject: Subject, held: Blocks, before: float) -> Cause | None:
+    wo = np.broadcast_to(held.wo, held.wi.shape)
+    swapped = held.joined(np.nan_to_num(subject.pdf(held.wi, wo), posinf=0.0, neginf=0.0) * held.area) * held.drawn
+    if (left := effect(swapped, held.observed)) < 3.0 * EFFECT and left < 0.3 * before:
+        words = "samples are distributed as the pdf with wo and wi exchanged: swapped arguments?"
+        return Cause(words, "samples of swapped directions")
+    for text, guess, matrix in _frames(subject):
+        density = np.nan_to_num(subject.pdf(wo, held.wi @ matrix.T), posinf=0.0, neginf=0.0)
+        expected = held.joined(density * held.area) * held.drawn
+        left = effect(expected, held.observed)
+        if left < 3.0 * EFFECT and left < 0.3 * before:
+            return Cause(f"samples are distributed as the pdf {text}: {guess}?", "samples in another frame")
+    return None
+
+
+# --------------------------------------------------------------------------- two parts
+
+
+def _parts(subject: Subject, held: Blocks) -> Cause | None:
+    e, o = held.joined(held.expected), held.observed.astype(float)
+    filled = e > 25.0
+    if not filled.any():
+        return None
+    logs = np.log(np.maximum(o[filled], 1.0) / e[filled])
+    # the ratio that most of the expectation has
+    steps = np.round(logs / STEP).astype(int)
+    weight = np.bincount(steps - steps.min(), e[filled])
+    smooth = np.convolve(weight, np.ones(5), mode="same")
+    middle = (int(np.argmax(smooth)) + steps.min()) * STEP
+    near = np.abs(logs - middle) < 2.5 * STEP
+    c = float(np.sum(o[filled][near]) / np.sum(e[filled][near]))
+    off = o - c * e
+    same = np.abs(off) < NOISE * np.sqrt(np.maximum(c * e, 1.0)) + STEP * c * e
+    total = float(o.sum())
+    more, less = float(off[~same & (off > 0.0)].sum()), float(-off[~same & (off < 0.0)].sum())
+    if (
+        e[same].sum() < PLATEAU * e.sum()
+        or max(more, less) < LEAST * total
+        or min(more, less) > OTHER * max(more, less)
+    ):
+        return None
+    lacking = more > less
+    rows = ~same & ((off > 0.0) if lacking else (off < 0.0))
+    place, ring = _place(held, np.where(rows, np.abs(off), 0.0))
+    share = severity.percent((more if lacking else less) / (total if lacking else c * float(e.sum())))
+    scale = "" if abs(c - 1.0) < 2.0 * STEP else f" times {c:.3g}"
+    if lacking:
+        if ring:
+            guess = "samples crowd there, as from a random number or an angle that is clamped"
+        elif place.startswith("within") and "horizon" in place:
+            guess = "directions from below the horizon that are mirrored up or clamped, or a lobe that the pdf lacks"
+        else:
+            guess = "a lobe that the pdf lacks"
+        return Cause(f"samples follow the pdf{scale}, but for {share} of them, {place}: {guess}?", "pdf lacks a lobe")
+    words = f"samples follow the pdf{scale}, but {share} of it, {place}, is hardly sampled"
+    return Cause(f"{words}: a part of the pdf that `sample` does not draw?", "sample lacks a lobe")
+
+
+def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
+    """Where most of a weight per block is, in words, and whether it fills a small part of the sphere."""
+    area = held.joined(held.area)
+    share = weight / max(float(weight.sum()), 1e-30)
+    order = np.argsort(-share / np.maximum(area, 1e-12))
+    most = order[: int(np.searchsorted(np.cumsum(share[order]), 0.8)) + 1]
+    small = float(area[most].sum()) < FEW * 2.0 * np.pi
+    inside = np.isin(held.block, most)
+    cell = held.area * inside * (held.expected + 1e-12 * held.drawn)
+    cosine = np.abs(held.wi[:, 2])
+    mean = float(np.average(cosine, weights=cell)) if cell.sum() > 0.0 else 0.5
+    spread = float(np.sqrt(np.average((cosine - mean) ** 2, weights=cell))) if cell.sum() > 0.0 else 1.0
+    if mean + spread < NEAR_HORIZON:
+        angle = np.degrees(np.arcsin(min(mean + 2.0 * spread, 1.0)))
+        return f"within {angle:.2g} degrees of the horizon", small
+    if mean - spread > NEAR_NORMAL:
+        return "near the normal", small
+    direction = np.average(held.wi, axis=0, weights=cell)
+    length = float(np.linalg.norm(direction))
+    if length > 0.8:
+        theta = np.degrees(np.arccos(np.clip(direction[2] / length, -1.0, 1.0)))
+        phi = np.degrees(np.arctan2(direction[1], direction[0])) % 360.0
+        return f"near wi {theta:.3g}, {phi:.3g} degrees", small
+    return "in other directions", small
+
+
+# --------------------------------------------------------------------------- one variable
+
+
+def _mirrored(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sum(wo * np.array([-1.0, -1.0, 1.0]) * wi, axis=1))
+
+
+Variable = Callable[[np.ndarray, np.ndarray], np.ndarray]
+VARIABLES: dict[str, tuple[str, Variable]] = {
+    "wi's angle to the normal": (
+        "the polar angle is drawn from another distribution than that of the pdf, or a Jacobian is wrong",
+        lambda o, i: i[:, 2],
+    ),
+    "the half vector's angle to the normal": (
+        "the half vector is drawn from another distribution than that of the pdf",
+        lambda o, i: half_vector(o, i)[:, 2],
+    ),
+    "the angle to the mirror direction": (
+        "the lobe about the mirror direction is drawn from another distribution than that of the pdf",
+        _mirrored,
+    ),
+    "wi's azimuth": (
+        "the azimuth is drawn from another distribution than that of the pdf",
+        lambda o, i: np.arctan2(i[:, 1], i[:, 0]),
+    ),
+    "the half vector's azimuth": (
+        "the half vector's azimuth is drawn from another distribution than that of the pdf",
+        lambda o, i: np.arctan2(half_vector(o, i)[:, 1], half_vector(o, i)[:, 0]),
+    ),
+}
+
+
+def _one_variable(held: Blocks, before: float) -> Cause | None:
+    """The angle on which the ratio of samples to pdf depends alone."""
+    wo = np.broadcast_to(held.wo, held.wi.shape)
+    e, o = held.joined(held.expected), held.observed.astype(float)
+    best: tuple[float, str, str, np.ndarray] | None = None
+    for name, (guess, variable) in VARIABLES.items():
+        values = variable(wo, held.wi)
+        mean = held.joined(values * held.expected) / np.maximum(e, 1e-30)
+        order = np.argsort(mean)
+        part = np.minimum((np.cumsum(e[order]) / max(e.sum(), 1e-30) * BINS).astype(int), BINS - 1)
+        number = np.empty(len(e), int)
+        number[order] = part
+        ratio = np.bincount(number, o, BINS) / np.maximum(np.bincount(number, e, BINS), 1e-30)
+        left = effect(e * ratio[number], o)
+        if left < 2.0 * EFFECT and left < 0.3 * before and (best is None or left < best[0]):
+            best = left, name, guess, ratio
+    if best is None:
+        return None
+    _, name, guess, ratio = best
+    words = f"samples over pdf depend on {name} alone, {ratio.min():.2g} to {ratio.max():.2g}"
+    return Cause(f"{words}: {guess}?", f"samples by {name}")
