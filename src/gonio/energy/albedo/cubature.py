@@ -2,8 +2,9 @@
 
 A cell is a rectangle in (theta, phi), theta measured from the nearer pole, so no cell crosses the horizon. Cells are
 first divided where the model's samples are dense and around the mirror direction, so that a lobe of a thousandth of a
-radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters. The sum of these
-differences is the reported error; it is that of the coarser value and hence conservative.
+radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters, until the error of
+the integral, which follows from these differences, is below the tolerance. They are those of the coarser values, so that
+the reported error is conservative.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ SAMPLES = 1024  # per wo
 CROWD = 32  # samples in a cell for which it is divided before the integrand is evaluated
 AROUND = 3 * (CROWD + 4)  # points that mark the mirror direction, wo and -wo
 UNSEEN = 0.01  # below this fraction of the integral implied by the samples, a cell has missed its lobe
+ALONE, SEVERAL = 4, 3  # rounds in which one sample in a cell counts; samples in a cell that count in all
+BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
@@ -47,6 +50,13 @@ def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integra
     return integrand
 
 
+# ways to divide a cell into four: parts along (theta, phi), and the places of the four quarters in units of their size
+QUADRANTS, ALONG_THETA, ALONG_PHI = 0, 1, 2
+WAYS = np.array([(2, 2), (4, 1), (1, 4)])
+PLACES = np.array([[(0, 0), (1, 0), (0, 1), (1, 1)], [(k, 0) for k in range(4)], [(0, k) for k in range(4)]])
+ONE_WAY = 0.05  # ratio of the ranges of values along both coordinates, below which only the other is divided
+
+
 class Integral(NamedTuple):
     """value and error, (directions, channels)."""
 
@@ -65,12 +75,15 @@ class _Cells(NamedTuple):
     def take(self, which: np.ndarray) -> _Cells:
         return _Cells(*[part[which] for part in self])
 
-    def quarters(self) -> _Cells:
-        """The four quarters of each cell, adjacent in the result."""
-        half = 0.5 * self.size
-        corners = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
-        low = (self.low[:, None, :] + half[:, None, :] * corners).reshape(-1, 2)
-        return _Cells(np.repeat(self.row, 4), np.repeat(self.side, 4), low, np.repeat(half, 4, axis=0))
+    def quarters(self, way: np.ndarray | None = None) -> _Cells:
+        """The four quarters of each cell, adjacent in the result.
+
+        way  a number of WAYS per cell; None for QUADRANTS
+        """
+        way = np.zeros(len(self.row), int) if way is None else way
+        size = self.size / WAYS[way]
+        low = (self.low[:, None, :] + size[:, None, :] * PLACES[way]).reshape(-1, 2)
+        return _Cells(np.repeat(self.row, 4), np.repeat(self.side, 4), low, np.repeat(size, 4, axis=0))
 
 
 def integrate(
@@ -83,36 +96,64 @@ def integrate(
     tolerance  absolute, per integral; if cells run out, the reported error is larger
     """
     cells, points = _seeded(sample, wo, seed)
-    (first,) = _values(integrand, wo, cells, _GAUSS)
+    (first,), way = _values(integrand, wo, cells, _GAUSS)
     coarse = first.integral
     channels = coarse.shape[1]
-    value, error = np.zeros((len(wo), channels)), np.zeros((len(wo), channels))
+    value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
     allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
-        fine_cells = cells.quarters()
-        inner, other = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
+        fine_cells = cells.quarters(way)
+        (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = inner.integral.reshape(-1, 4, channels)
-        difference = np.abs(coarse - fine.sum(1))
         # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
         # and if it is near their rim all of Gauss's
-        difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
+        signed = np.stack([coarse, other.integral.reshape(-1, 4, channels).sum(1)]) - fine.sum(1)
+        difference = np.abs(signed).max(0)
         difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
-        divide = difference.max(1) > allowed
+        small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
+        divide = (difference.max(1) > allowed) & ~small[cells.row]
         # the tail of a narrow lobe in a cell wider than the lobe: it contains samples, but every node is 0
         level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
-        share = np.bincount(points.cell, minlength=len(divide)) / SAMPLES
-        divide |= fine.sum(1).max(1) < UNSEEN * share * level[cells.row]
+        inside = np.bincount(points.cell, minlength=len(divide))
+        # single samples may lie where the integrand is dark at every scale, as those of a broader lobe do
+        inside = inside if depth < ALONE else np.where(inside >= SEVERAL, inside, 0)
+        divide |= fine.sum(1).max(1) < UNSEEN * inside / SAMPLES * level[cells.row]
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide
         np.add.at(value, cells.row[done], fine[done].sum(1))
-        np.add.at(error, cells.row[done], difference[done])
+        errors = errors.with_cells(cells.row[done], signed[:, done], difference[done])
         if not divide.any():
             break
-        points = points.within(cells, divide)
-        cells = fine_cells.take(np.repeat(divide, 4))
+        points = points.within(cells, divide, way)
+        cells, way = fine_cells.take(np.repeat(divide, 4)), ways[np.repeat(divide, 4)]
         coarse = fine[divide].reshape(-1, channels)
-    return Integral(value, error)
+    return Integral(value, errors.total())
+
+
+class _Errors:
+    """The errors of the cells that are not divided, summed by integral, per channel (N, C).
+
+    Over the edge of a step the errors of cells have either sign and mostly cancel: three standard errors of their sum
+    count. An edge along the cells misleads all of them alike: so does the sum itself, of two rules.
+    """
+
+    def __init__(self, count: int, channels: int) -> None:
+        self.sums = np.zeros((2, count, channels))
+        self.squares = np.zeros((count, channels))
+
+    def with_cells(self, row: np.ndarray, signed: np.ndarray, size: np.ndarray) -> _Errors:
+        """With those of more cells: their integrals, (M,), the differences of both rules (2, M, C), their size (M, C)."""
+        count, channels = self.squares.shape
+        more = _Errors(count, channels)
+        for k in range(channels):
+            more.squares[:, k] = self.squares[:, k] + np.bincount(row, size[:, k] ** 2, count)
+            for rule in range(2):
+                more.sums[rule, :, k] = self.sums[rule, :, k] + np.bincount(row, signed[rule, :, k], count)
+        return more
+
+    def total(self) -> np.ndarray:
+        return np.asarray(np.abs(self.sums).max(0) + 3.0 * np.sqrt(self.squares))
 
 
 class _Points(NamedTuple):
@@ -121,12 +162,13 @@ class _Points(NamedTuple):
     cell: np.ndarray
     at: np.ndarray
 
-    def within(self, cells: _Cells, divided: np.ndarray) -> _Points:
+    def within(self, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> _Points:
         """The points in divided cells, numbered by these cells' quarters."""
         inside = divided[self.cell]
         cell, at = self.cell[inside], self.at[inside]
-        far = at >= cells.low[cell] + 0.5 * cells.size[cell]
-        return _Points(4 * (np.cumsum(divided) - 1)[cell] + far[:, 0] + 2 * far[:, 1], at)
+        parts = WAYS[way[cell]]
+        place = np.floor((at - cells.low[cell]) / cells.size[cell] * parts).astype(int).clip(0, parts - 1)
+        return _Points(4 * (np.cumsum(divided) - 1)[cell] + place[:, 0] + parts[:, 0] % 4 * place[:, 1], at)
 
 
 def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
@@ -182,8 +224,9 @@ def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: 
     return ((row.astype(np.int64) * 2 + below) * n_a + a) * n_b + b
 
 
-def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> list[Seen]:
-    """The integrand at the nodes of every cell, for each of some rules with equally many nodes, in one kernel."""
+def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:
+    """The integrand at the nodes of every cell, for each of some rules with ORDER^2 nodes, in one kernel; and the way to
+    divide each cell, by the first rule."""
     dr = backend.drjit()
     types = backend.types("float64")
     nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
@@ -210,7 +253,19 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         sums = [dr.block_sum(channel * (area * weight), each) for channel in value]
         summed = sum(value[1:], start=value[0]) * area
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
-        dr.eval(sums, ends)
-        parts.append(Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
+        # nodes are in rows of equal theta; a range along theta needs columns
+        turned = dr.gather(types.float, summed, index - index % each + index % ORDER * ORDER + index % each // ORDER)
+        ranges = [_range(along) for along in (turned, summed)]
+        dr.eval(sums, ends, ranges)
+        parts.append((np.stack([one.numpy() for one in sums], -1), *[one.numpy() for one in (*ends, *ranges)]))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    return [Seen(*[column[number :: len(rules)] for column in columns]) for number in range(len(rules))]
+    seen = [Seen(*[column[number :: len(rules)] for column in columns[:3]]) for number in range(len(rules))]
+    theta, phi = (column[:: len(rules)] for column in columns[3:])
+    return seen, np.select([phi < ONE_WAY * theta, theta < ONE_WAY * phi], [ALONG_THETA, ALONG_PHI], QUADRANTS)
+
+
+def _range(value: Scalar) -> Scalar:
+    """The largest difference within groups of ORDER values, per cell."""
+    dr = backend.drjit()
+    most, least = (dr.block_reduce(op, value, ORDER) for op in (dr.ReduceOp.Max, dr.ReduceOp.Min))
+    return dr.block_reduce(dr.ReduceOp.Max, most - least, ORDER)
