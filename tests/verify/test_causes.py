@@ -21,6 +21,8 @@ from gonio.verify.laws import pdf as pdf_law
 from gonio.verify.laws import reciprocity as reciprocity_law
 from gonio.verify.subject import of
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
 from broken.facets import (
     AlphaSquaredAgain,
     BelowTheHorizon,
@@ -43,6 +45,7 @@ from broken.surfaces import (
     RightDiffuse,
     RightLobes,
 )
+from referee import cases
 
 
 class Weighed(RightFacets):
@@ -382,3 +385,26 @@ class FresnelOneWay(Weighed):
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         return super().eval(wo, wi, mode) * (0.5 + 0.5 * abs(wo.z))
+
+
+SIXTH: list[tuple[str, str, str]] = [
+    ("w1_corners.W1RotatedSample", "pdf", "the pdf of wi rotated by 2 rotation"),
+    ("w1_corners.W1ClampedNumbers", "pdf", "while the second random number is below"),
+    ("w1_corners.W1ForgottenHaze", "pdf", "a lobe that the pdf lacks"),
+    ("w1_empirical.W1PhongPlusTwo", "pdf", "the density of lobe 1 is 1.07"),
+    ("w1_diffuse.W1UniformTheta", "pdf", "1 / sin_i, within"),
+    ("w1_empirical.W1PhongFlippedUp", "pdf", "from below the horizon that are mirrored up"),
+    ("w1_empirical.W1WardSquare", "energy", "it reflects alpha.x^-1 alpha.y at the normal"),
+    ("w1_diffuse.W1FujiiSign", "energy", "is 1 at sigma = 0"),
+    ("w1_empirical.W1BlinnFourTimes", "energy", "the normalization of the part with ks"),
+    ("w1_layers.W1HalfVectorBase", "energy", "the normalization holds at the normal only"),
+    ("w2_plugins_a.W2PluginMaskNull", "calls", "eval_null_transmission is not weight x pdf"),
+]
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize(("name", "law", "words"), SIXTH, ids=[name.partition(".")[2] for name, _, _ in SIXTH])
+def test_causes_of_the_sixth_examiners(name: str, law: str, words: str) -> None:
+    module = cases(f"sixth.{name.partition('.')[0]}")
+    found = cause(next(one.target for one in module if one.name == f"sixth.{name}"), law)  # type: ignore[arg-type]
+    assert words in found, found

@@ -72,6 +72,18 @@ def test_what_one_law_alone_tells(name: str, law: str, words: str) -> None:
     assert verdict.failed and words in " ".join(verdict.why), verdict.why
 
 
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("sixth.r2_panes.R2StainedGlass", "delta"),  # Beer's law on the denser side
+        ("sixth.r1_steps.R1SkewedSampler", "isotropy"),  # isotropic values, sampled along axes
+        ("sixth.r2_nested.R2Varnish", "linearity"),  # light passes the varnish twice
+    ],
+)
+def test_what_one_law_alone_took_for_a_mistake(name: str, law: str) -> None:
+    assert verify(by_name(name).target, quick=True, law=law).passed  # type: ignore[arg-type]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
 def test_every_mistake_is_caught_and_no_sound_material_fails_visibly(case: Case) -> None:

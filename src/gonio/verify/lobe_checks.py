@@ -306,6 +306,9 @@ def fresnel(probe: Probe) -> Misses:
 
     exact, schlick = against(dielectric(cosine, ratio)), against(schlick_curve(cosine, ratio))
     least = 1e-4 if subject.best == "float64" else 5e-3
+    for curve, share in ((exact, dielectric(cosine, ratio)), (schlick, schlick_curve(cosine, ratio))):
+        if curve["reflects"][0].max() < least and _absorbs(carried["transmits"], share, cosine, ratio, least):
+            return
     if any(max(off.max() for off, _ in curve.values()) < least for curve in (exact, schlick)):
         return
     verb = max(exact, key=lambda verb: float(exact[verb][0].max()))
@@ -320,6 +323,24 @@ def fresnel(probe: Probe) -> Misses:
     text = f"{verb} {value} of the light, where Fresnel's equations for eta = {index:.4g} give {right}"
     worst = np.maximum(exact["reflects"][0], exact["transmits"][0])
     yield _miss(worst, text, wo, wo * [-1.0, -1.0, 1.0], cause)
+
+
+def _absorbs(value: np.ndarray, share: np.ndarray, cosine: np.ndarray, ratio: np.ndarray, least: float) -> bool:
+    """Whether transmitted light (N, channels) is 1 - F times a constant times exp(-depth / cos), as of a stain on the
+    denser side of the surface (Beer's law)."""
+    dense = np.where(ratio > 1.0, np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / ratio**2, 0.0)), cosine)
+    rows = (share < 0.99) & (dense > 0.1)
+    if rows.sum() < 4:
+        return False
+    columns = np.stack([np.ones(rows.sum()), 1.0 / dense[rows]], axis=1)
+    for passed in (value[rows] / (1.0 - share[rows, None])).T:
+        if passed.max() < 1e-6:
+            continue
+        lit = passed > 1e-9
+        depth = np.linalg.lstsq(columns[lit], -np.log(passed[lit]), rcond=None)[0]
+        if np.min(depth) < -least or np.abs(np.exp(-columns @ depth) - passed).max() > least:
+            return False
+    return True
 
 
 def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

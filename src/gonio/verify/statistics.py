@@ -62,3 +62,27 @@ def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) ->
         return False
     # with powers of 1.1 and more, the first step is negligible
     return bool(np.median(first[first > 0.0] / (rows[2] - rows[1])[first > 0.0]) > 0.5)
+
+
+LAYERS = 4  # times that light may pass a layer
+
+
+def is_dimmed(rows: np.ndarray, noise: float) -> bool:
+    """Whether values are a + b r + sum c_k (1 - r)^k of a reflectance r, a + b r and all c_k >= 0: light of a layer,
+    and light below that passes the layer several times. A color that is multiplied twice, r^2, has a < 0.
+
+    rows   values at the reflectances STEPS, (7, N)
+    noise  of the values, relative
+    """
+    size = rows.max(0)
+    rows = rows[:, size > 1e-6 * rows.max(initial=0.0)]
+    if not rows.size:
+        return False
+    rows = rows / rows.max(0)
+    r = np.asarray(STEPS)
+    columns = np.stack([np.ones_like(r), r, *((1.0 - r) ** k for k in range(2, LAYERS + 1))], axis=1)
+    solved = np.linalg.lstsq(columns, rows, rcond=None)[0]
+    allowed = 100.0 * noise + 1e-9
+    off = np.abs(columns @ solved - rows).max(0) > allowed
+    negative = np.min([solved[0], solved[0] + solved[1], *solved[2:]], axis=0) < -100.0 * allowed
+    return bool(np.mean(off | negative) < 1e-3)

@@ -2,9 +2,9 @@
 
 A cell is a rectangle in (theta, phi), theta measured from the nearer pole, so no cell crosses the horizon. Cells are
 first divided where the model's samples are dense and around the mirror direction, so that a lobe of a thousandth of a
-radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters, until the error of
-the integral, which follows from these differences, is below the tolerance. They are those of the coarser values, so that
-the reported error is conservative.
+radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters, until the error
+of the integral, which follows from these differences, is below the tolerance. They are those of the coarser values, so
+that the reported error is conservative.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class _Errors:
         self.squares = np.zeros((count, channels))
 
     def with_cells(self, row: np.ndarray, signed: np.ndarray, size: np.ndarray) -> _Errors:
-        """With those of more cells: their integrals, (M,), the differences of both rules (2, M, C), their size (M, C)."""
+        """With more cells: their rows of wo (M,), the differences of both rules (2, M, C), their size (M, C)."""
         count, channels = self.squares.shape
         more = _Errors(count, channels)
         for k in range(channels):
@@ -225,8 +225,8 @@ def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: 
 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:
-    """The integrand at the nodes of every cell, for each of some rules with ORDER^2 nodes, in one kernel; and the way to
-    divide each cell, by the first rule."""
+    """The integrand at the nodes of every cell, for each of some rules with ORDER^2 nodes, in one kernel; and the way
+    to divide each cell, by the first rule."""
     dr = backend.drjit()
     types = backend.types("float64")
     nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
@@ -254,14 +254,16 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         summed = sum(value[1:], start=value[0]) * area
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         # nodes are in rows of equal theta; a range along theta needs columns
-        turned = dr.gather(types.float, summed, index - index % each + index % ORDER * ORDER + index % each // ORDER)
-        ranges = [_range(along) for along in (turned, summed)]
+        columns_first = dr.gather(
+            types.float, summed, index - index % each + index % ORDER * ORDER + index % each // ORDER
+        )
+        ranges = [_range(along) for along in (columns_first, summed)]
         dr.eval(sums, ends, ranges)
         parts.append((np.stack([one.numpy() for one in sums], -1), *[one.numpy() for one in (*ends, *ranges)]))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    seen = [Seen(*[column[number :: len(rules)] for column in columns[:3]]) for number in range(len(rules))]
+    per_rule = [Seen(*[column[number :: len(rules)] for column in columns[:3]]) for number in range(len(rules))]
     theta, phi = (column[:: len(rules)] for column in columns[3:])
-    return seen, np.select([phi < ONE_WAY * theta, theta < ONE_WAY * phi], [ALONG_THETA, ALONG_PHI], QUADRANTS)
+    return per_rule, np.select([phi < ONE_WAY * theta, theta < ONE_WAY * phi], [ALONG_THETA, ALONG_PHI], QUADRANTS)
 
 
 def _range(value: Scalar) -> Scalar:

@@ -9,6 +9,7 @@ Without absorption a part that is normalized reflects at most 1. So the albedos 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -39,9 +40,10 @@ def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
     if here.max() < 1.0 + GAIN:
         return
     part = _parts(white, albedo, float(here.max()))
-    power = _power(white, albedo, here)
-    if power is not None:
-        yield Cause(f"{power.words}{part and ', ' + part}", power.key)
+    power, end = _power(white, albedo, here)
+    one = power or (None if part else end)
+    if one is not None:
+        yield Cause(f"{one.words}{part and '; ' + part}", one.key)
     elif part:
         yield Cause(part, "gain of a part")
     view = _views(here)
@@ -58,15 +60,15 @@ def _parts(white: Subject, albedo: Albedo, here: float) -> str:
     }
     if not 2 <= len(colors) <= MOST:
         return ""
-    alone: dict[str, float] = {}
+    by_part: dict[str, float] = {}
     for path in colors:
         black: dict[str, Any] = {other: _low(parameter) for other, parameter in colors.items() if other != path}
         value = _of(white, black, albedo)
         if value is None:
             return ""
-        alone[path] = float(value.max())
-    wrong = [path for path, value in alone.items() if value > 1.0 + GAIN]
-    text = ", ".join(f"{value:.4g} with {path} alone" for path, value in alone.items())
+        by_part[path] = float(value.max())
+    wrong = [path for path, value in by_part.items() if value > 1.0 + GAIN]
+    text = ", ".join(f"{value:.4g} with {path} alone" for path, value in by_part.items())
     if not wrong:
         return (
             f"the parts reflect {text}, and {here:.4g} together: one of them is not reduced by what the other reflects?"
@@ -92,8 +94,8 @@ def _of(subject: Subject, values: dict[str, Any], albedo: Albedo) -> np.ndarray 
 
 
 def _numbers(white: Subject) -> Iterator[tuple[str, str, Callable[[float], Any], float, float, float]]:
-    """Numeric parameters but colors and angles, widths one at a time: name, path, the value of a number, the number now,
-    and its range."""
+    """Numeric parameters but colors and angles, widths one at a time: name, path, the value of a number, the number
+    now, and its range."""
     for leaf in tree.leaves(white.model):
         parameter, value = leaf.parameter, leaf.value
         if not parameter.numeric or parameter.white is not None or parameter.kind in ("angle", "spectrum"):
@@ -101,14 +103,18 @@ def _numbers(white: Subject) -> Iterator[tuple[str, str, Callable[[float], Any],
         low, high = float(getattr(parameter, "low", -np.inf)), float(getattr(parameter, "high", np.inf))
         if parameter.kind == "alpha":
             pair = tuple(float(one) for one in value) if isinstance(value, tuple | list) else (float(value),) * 2
-            yield f"{leaf.path}.x", leaf.path, lambda x, pair=pair: (x, pair[1]), pair[0], low, high
-            yield f"{leaf.path}.y", leaf.path, lambda y, pair=pair: (pair[0], y), pair[1], low, high
+            yield f"{leaf.path}.x", leaf.path, functools.partial(_pair, other=pair[1], first=True), pair[0], low, high
+            yield f"{leaf.path}.y", leaf.path, functools.partial(_pair, other=pair[0], first=False), pair[1], low, high
         elif isinstance(value, int | float) and not isinstance(value, bool) and float(value) > 0.0:
-            yield leaf.path, leaf.path, lambda x: x, float(value), low, high
+            yield leaf.path, leaf.path, float, float(value), low, high
 
 
-def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> Cause | None:
-    """The powers of parameters to which the albedo at the normal is proportional, or the end of a range without gain."""
+def _pair(value: float, other: float, first: bool) -> tuple[float, float]:
+    return (value, other) if first else (other, value)
+
+
+def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | None, Cause | None]:
+    """The powers of parameters to which the albedo at the normal is proportional, or a range's end without gain."""
     powers: dict[str, float] = {}
     ends: list[Cause] = []
     scale = 1.0
@@ -124,11 +130,11 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> Cause | None:
             continue
         x, normal = np.log([x for x, _ in known]), np.log([max(float(one[0].mean()), 1e-9) for _, one in known])
         slope, start = np.polyfit(x, normal, 1)
-        whole = float(np.round(slope))
-        fits = np.abs(normal - (slope * x + start)).max() < RESIDUAL and abs(slope - whole) < POWER
-        if fits and whole != 0.0:
-            powers[name] = whole
-            scale *= now**whole
+        power = float(np.round(slope))
+        fits = np.abs(normal - (slope * x + start)).max() < RESIDUAL and abs(slope - power) < POWER
+        if fits and power != 0.0:
+            powers[name] = power
+            scale *= now**power
             continue
         largest = np.array([float(one.max()) for _, one in known])
         gains = largest > 1.0 + GAIN
@@ -144,15 +150,16 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> Cause | None:
             none = float(np.exp(least)) if np.isfinite(least) else low
             words = f"the largest albedo without absorption is {largest.min():.4g} at {name} = {none:.3g} and "
             words += f"{largest.max():.4g} at {float(np.exp(x[np.argmax(largest)])):.3g}"
-            guess = f"a normalization that does not follow {name}"
+            guess = f"the normalization{' or the masking' if name != path else ''} by {name}"
             ends.append(Cause(f"{words}: {guess}?", f"gain by {name}"))
     if powers:
         formula = " ".join(name if power == 1.0 else f"{name}^{power:g}" for name, power in powers.items())
         constant = float(here[0].mean()) / scale
         times = "" if abs(constant - 1.0) < 2.0 * RESIDUAL else f"{written(constant, RESIDUAL)} "
         words = f"without absorption it reflects {times}{formula} at the normal"
-        return Cause(f"{words}: these powers, missing in the normalization or there too often?", f"gain {formula}")
-    return ends[0] if ends else None
+        guess = "these powers, missing in the normalization or there too often"
+        return Cause(f"{words}: {guess}?", f"gain {formula}"), None
+    return None, ends[0] if ends else None
 
 
 # --------------------------------------------------------------------------- views
@@ -161,7 +168,7 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> Cause | None:
 def _views(here: np.ndarray) -> Cause | None:
     """1 at the normal and a power of the cosine elsewhere."""
     a = here.mean(1)
-    if a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
+    if abs(a[0] - 1.0) > 0.05 or a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
         return None
     mu = np.cos(np.radians(VIEWS))
     slope, start = np.polyfit(np.log(mu), np.log(np.maximum(a, 1e-9)), 1)

@@ -25,6 +25,7 @@ from .ratio import Cause
 PLATEAU = 0.3  # share of the expectation in blocks of one ratio
 LEAST = 0.02  # share of all samples that lie elsewhere
 OTHER = 0.15  # of that share: differences of the other sign
+NATURAL = 0.06  # by which the integral of the pdf may differ from the share of the samples
 NOISE = 4.0  # standard errors
 STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
 BINS = 12
@@ -124,6 +125,12 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     ):
         return None
     lacking = more > less
+    # the rest of a mixture: either the weights are those of the samples, or one of the two has no other part
+    if (
+        abs(c - 1.0) > 2.0 * STEP
+        and abs(float(e.sum()) / held.drawn - (1.0 if lacking else total / held.drawn)) > NATURAL
+    ):
+        return None
     rows = ~same & ((off > 0.0) if lacking else (off < 0.0))
     place, ring = _place(held, np.where(rows, np.abs(off), 0.0))
     share = severity.percent((more if lacking else less) / (total if lacking else c * float(e.sum())))

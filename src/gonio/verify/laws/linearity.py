@@ -136,10 +136,12 @@ COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
 
 
 def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given: bool) -> bool:
-    """Whether light is reflected once, twice, and so on by this albedo: see `statistics.is_power_series`. At other than
-    the given values of the other colors the first power may be absent: what meets a black part once is lost."""
+    """Whether light is reflected once, twice, and so on by this albedo, or passes a layer of this reflectance several
+    times: see `statistics.is_power_series` and `is_dimmed`. At other than the given values of the other colors the
+    first power may be absent: what meets a black part once is lost."""
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
-    return statistics.is_power_series(rows, 1e-9 if subject.best == "float64" else 1e-4, first_power=given)
+    noise = 1e-9 if subject.best == "float64" else 1e-4
+    return statistics.is_power_series(rows, noise, first_power=given) or statistics.is_dimmed(rows, noise)
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:

@@ -145,21 +145,32 @@ def _swept(subject: Subject, wo: np.ndarray, dimension: int, seed: int) -> tuple
     return s.wi.reshape(TRIALS, SWEEP, 3), ((s.pdf > 0.0) & ~s.delta).reshape(TRIALS, SWEEP)
 
 
+def _parts(wi: np.ndarray) -> list[slice]:
+    """The parts of a sweep between values at which most directions jump: the choice of another lobe."""
+    jumps = (np.abs(np.diff(wi, axis=1)).max(2) > JUMP).mean(0) > 0.7
+    ends = [0, *(np.flatnonzero(jumps) + 1), wi.shape[1]]
+    return [slice(first, last) for first, last in itertools.pairwise(ends)]
+
+
 def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
-    """The ends of [0, 1) at which a number does not move the direction that it moves elsewhere, in words."""
+    """The ends of [0, 1), or of a lobe's part of it, at which a number does not move the direction that it moves
+    elsewhere, in words."""
     for dimension, name in enumerate(("first", "second", "third")):
         wi, fine = _swept(subject, wo, dimension, seed)
-        moves = np.abs(np.diff(wi, axis=1)).max(2) > STILL
-        both = fine[:, 1:] & fine[:, :-1]
-        if both.mean() < 0.5 or (moves & both).sum() < 0.2 * both.sum():
-            continue
-        still = np.all(~moves | ~both, axis=0)  # for all values of the other two
-        low = int(np.argmin(still)) if still[0] else 0
-        high = int(np.argmin(still[::-1])) if still[-1] else 0
-        if (low > 1 and both[:, :low].any()) or (high > 1 and both[:, -high:].any()):
-            ends = [f"below {low / SWEEP:.2g}"] if low > 1 else []
-            ends += [f"above {1.0 - high / SWEEP:.3g}"] if high > 1 else []
-            return f"samples do not move while the {name} random number is {' and '.join(ends)}"
+        for part in _parts(wi):
+            inside, usable = wi[:, part], fine[:, part]
+            moves = np.abs(np.diff(inside, axis=1)).max(2) > STILL
+            both = usable[:, 1:] & usable[:, :-1]
+            if not both.size or both.mean() < 0.5 or (moves & both).sum() < 0.5 * both.sum():
+                continue
+            still = np.all(~moves | ~both, axis=0)  # for all values of the other two
+            low = int(np.argmin(still)) if still[0] else 0
+            high = int(np.argmin(still[::-1])) if still[-1] else 0
+            below, above = low > 1 and both[:, :low].any(), high > 1 and both[:, -high:].any()
+            if below or above:
+                ends = [f"below {(part.start + low) / SWEEP:.2g}"] if below else []
+                ends += [f"above {(part.stop - high) / SWEEP:.3g}"] if above else []
+                return f"samples do not move while the {name} random number is {' and '.join(ends)}"
     return ""
 
 
@@ -192,13 +203,10 @@ def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool
     m = wi + wo
     m = m / np.maximum(np.linalg.norm(m, axis=-1, keepdims=True), 1e-9)
     cosines = [wi[..., 2], np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1), np.abs(m[..., 2]), np.sum(wi * wo, axis=-1)]
-    jumps = (np.abs(np.diff(wi, axis=1)).max(2) > JUMP).mean(0) > 0.7  # a choice is made at the same value always
-    ends = [0, *(np.flatnonzero(jumps) + 1), SWEEP]
-    for first, last in itertools.pairwise(ends):
-        length = (last - first) / SWEEP
-        part = slice(first, last)
+    for part in _parts(wi):
+        length = (part.stop - part.start) / SWEEP
         usable = fine[:, part].mean(1) > 0.5
-        if not 0.1 < length < 0.9 or usable.sum() < TRIALS // 2 or not jumps.any():
+        if not 0.1 < length < 0.9 or usable.sum() < TRIALS // 2:
             continue
         angles = [np.arccos(np.clip(cosine[usable, part], -1.0, 1.0)) for cosine in cosines]
         polar = [a for a in angles if np.mean(np.std(a, axis=0)) < 0.01 and np.ptp(a.mean(0)) > MOVED]
