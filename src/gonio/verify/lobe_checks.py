@@ -257,28 +257,32 @@ def way_back(probe: Probe) -> Misses:
         off = _relative(there, back) * exists
         row = int(np.argmax(off))
         one_way, other_way = distinct(there[row].mean(), back[row].mean())
-        cause = _of_way_back(probe, o, i, off)
+        cause = _of_way_back(probe, o, there, back, exists & (o[:, 2] * i[:, 2] < 0.0))
         yield _miss(off, f"carries {one_way} of the power one way and {other_way} the other", o, i, cause)
 
 
-def _of_way_back(probe: Probe, o: np.ndarray, i: np.ndarray, off: np.ndarray) -> str:
-    """The cause where what is reflected from the denser side follows Schlick's curve of the angle there, and what is
-    carried through differs by angle alone."""
-    inside = np.flatnonzero((o[:, 2] * i[:, 2] < 0.0) & (off > 1e-4))
-    if inside.size < 4:
+def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarray, through: np.ndarray) -> str:
+    """The cause where light carried one way and the other has one ratio for all views of a side, or where reflection
+    from the denser side follows Schlick's curve of the angle there."""
+    off = (_relative(there, back) > 1e-4) & through
+    if off.sum() < 4:
         return ""
     wo, power = probe.wo, probe.power
+    for side, where in ((1.0, "outside"), (-1.0, "inside")):
+        rows = off & (o[:, 2] * side > 0.0) & (back.min(1) > 0.0)
+        ratio = there[rows] / back[rows]
+        if rows.sum() >= 4 and np.ptp(ratio, axis=0).max() < 1e-3 * ratio.max():
+            color = ", ".join(f"{c:.3g}" for c in np.median(ratio, axis=0))
+            return f"light from {where} carries ({color}) times what the way back does: a tint of one direction only?"
     reflected = np.sum(power.carried * (power.valid & ~power.through(wo))[..., None], axis=1).mean(1)
-    for side in (1.0, -1.0):
+    eta = np.sum(power.eta * power.through(wo), axis=1)
+    for side, where in ((1.0, "outside"), (-1.0, "inside")):
         rows = (wo[:, 2] * side > 0.0) & (reflected > 0.0) & (reflected < 0.999)
         x = (1.0 - np.abs(wo[rows, 2])) ** 5
-        if rows.sum() < 4 or np.ptp(x) < 0.01:
+        if rows.sum() < 4 or np.ptp(x) < 2e-4 or not np.all(eta[rows] < 1.0):  # the denser side is meant
             continue
-        # r0 + (1 - r0) x, solved for r0
-        r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))
-        bent = np.abs(np.sum(power.eta[rows] * power.through(wo)[rows], axis=1)) < 1.0  # the other side is thinner
-        if np.abs(r0 + (1.0 - r0) * x - reflected[rows]).max() < 1e-4 and bent.mean() > 0.5:
-            where = "outside" if side > 0.0 else "inside"
+        r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))  # of r0 + (1 - r0) x
+        if np.abs(r0 + (1.0 - r0) * x - reflected[rows]).max() < 1e-5:
             return (
                 f"from {where} it reflects by Schlick's curve of the angle there: that of the transmitted angle is due?"
             )

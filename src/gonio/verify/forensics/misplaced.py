@@ -136,10 +136,10 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     share = severity.percent((more if lacking else less) / (total if lacking else c * float(e.sum())))
     scale = "" if abs(c - 1.0) < 2.0 * STEP else f" times {c:.3g}"
     if lacking:
-        if ring:
-            guess = "samples crowd there, as from a random number or an angle that is clamped"
-        elif place.startswith("within") and "horizon" in place:
+        if place.startswith("within") and "horizon" in place:
             guess = "directions from below the horizon that are mirrored up or clamped, or a lobe that the pdf lacks"
+        elif ring:
+            guess = "an angle that is clamped, or drawn evenly where its cosine is due, or a lobe that the pdf lacks"
         else:
             guess = "a lobe that the pdf lacks"
         return Cause(f"samples follow the pdf{scale}, but for {share} of them, {place}: {guess}?", "pdf lacks a lobe")
