@@ -53,9 +53,9 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
     return guarded
 
 
-def takes_fields(options: type, keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function with `**options` takes the fields of a dataclass that are not among its own parameters: its signature
-    is expanded to them and their defaults, for `help`, notebooks and `checked`.
+def takes_fields(options: type | tuple[type, ...], keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function with `**options` takes the fields of a dataclass, or of several, that are not among its own
+    parameters: its signature is expanded to them and their defaults, for `help`, notebooks and `checked`.
 
     keywords  a TypedDict that repeats their types for type checkers, since Python cannot derive them from a class
     """
@@ -63,12 +63,16 @@ def takes_fields(options: type, keywords: type) -> Callable[[Callable[P, R]], Ca
     def decorate(call: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(call)
         own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-        types = {name: getattr(one, "__forward_arg__", one) for name, one in keywords.__annotations__.items()}
+        annotations = inspect.get_annotations(keywords)
+        for base in getattr(keywords, "__orig_bases__", ()):
+            annotations = {**getattr(base, "__annotations__", {}), **annotations}
+        types = {name: getattr(one, "__forward_arg__", one) for name, one in annotations.items()}
         fields = [
             inspect.Parameter(
                 field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=types[field.name]
             )
-            for field in dataclasses.fields(options)
+            for one in (options if isinstance(options, tuple) else (options,))
+            for field in dataclasses.fields(one)
             if field.name not in signature.parameters
         ]
         call.__signature__ = signature.replace(parameters=[*own, *fields])  # type: ignore[attr-defined]

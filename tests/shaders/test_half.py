@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from gonio.shaders import Bundle, Placement, bundle
 from gonio.shaders.emission import Choice, shader
+from gonio.shaders.own_values import OwnValues
 from gonio.shaders.textures import pixels
 from gonio.shaders.vectors import pairs
 from variants import GLASS, GOLD
@@ -60,7 +61,7 @@ def test_header_and_manifest_state_the_same(tmp_path: Path) -> None:
 
 
 def test_layers_that_are_off_are_left_out() -> None:
-    assert set(half(Varnished(), lean=True).manifest["half"]["parameters"]) == {"albedo", "power"}
+    assert set(half(Varnished(), own=OwnValues(lean=True)).manifest["half"]["parameters"]) == {"albedo", "power"}
 
 
 def test_numbers_that_overflow_are_refused() -> None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from .languages import Language
 from .manifest import Json, manifest, numbers_of
 from .module import Module, of_several
 from .names import Names
+from .own_values import OwnKeywords, OwnValues
 from .placement import Placement
 from .program import Program
 from .python_file import python_file
@@ -60,28 +62,28 @@ def bundle(
     lang: str = "glsl",
     functions: Sequence[str] = ("eval", "pdf", "sample", "terms"),
     *,
-    lean: bool = False,
     on: Collection[str] = (),
-    constants: bool = False,
-    fold: bool = False,
     arrays: bool = True,
     placement: Placement | None = None,
+    **own: Unpack[OwnKeywords],
 ) -> Bundle:
     """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
 
     arrays     whether numbered derived constants are arrays: the page passes them to its pixels one by one
     on         paths of weights that stay fields of a lean shader although they are switched off
     placement  prefix of the names, group and first number of the bindings, form of the files of tables
+    own        fields of `OwnValues`
     """
+    values = OwnValues(**own)
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
     models = [model] if isinstance(model, str) or not isinstance(model, Sequence) else list(model)
     if not models:
         raise InputError("no material given", "emit", "name at least one, such as conductor")
     if language.standalone:
-        return _file(models, language, functions, lean, place, fold)
-    sources = [_recorded(one, functions, lean, on, arrays=arrays, fold=fold) for one in models]
-    module = Module(language, place, constants)
+        return _file(models, language, functions, place, values)
+    sources = [_recorded(one, functions, values, on, arrays=arrays) for one in models]
+    module = Module(language, place, values.constants)
     manifests = [module.add(made, numbers) for made, numbers in sources]
     text = texts.joined(module.head, module.blocks, language, place.prefix)
     described = manifests[0] if len(manifests) == 1 else of_several(manifests, language)
@@ -92,9 +94,8 @@ def _file(
     models: Sequence[MaterialLike],
     language: Language,
     functions: Sequence[str],
-    lean: bool,
     place: Placement,
-    fold: bool,
+    own: OwnValues,
 ) -> Bundle:
     """A file that runs by itself, which holds its tables."""
     if place.prefix or place.first_binding or place.tables or place.half:
@@ -103,7 +104,7 @@ def _file(
     if len(models) != 1:
         what = f"{len(models)} materials given, and a file in {language.name} holds one"
         raise InputError(what, "emit: lang", "write a file for each")
-    made, numbers = _recorded(models[0], functions, lean, (), single=False, fold=fold)
+    made, numbers = _recorded(models[0], functions, own, (), single=False)
     names = Names(made, language)
     text = python_file(made, names, numbers)
     described = manifest(made, names, numbers, {id(table): 0 for table in made.tables})
@@ -113,18 +114,17 @@ def _file(
 def _recorded(
     model: MaterialLike,
     functions: Sequence[str],
-    lean: bool,
+    own: OwnValues,
     on: Collection[str],
     single: bool = True,
     arrays: bool = True,
-    fold: bool = False,
 ) -> tuple[Program, dict[str, Json]]:
     """The parts of a material's shader, and the values of its numeric parameters by path."""
     model = material(model)
     functions = programs.check(model, functions, "emit")
     numbers = dict(numbers_of(model))  # raises for arrays of materials
     try:
-        without = [path for path in switched_off(model) if path not in on] if lean else ()
-        return Program(model, functions, without, single, arrays, numbers if fold else None), numbers
+        without = [path for path in switched_off(model) if path not in on] if own.lean else ()
+        return Program(model, functions, without, single, arrays, numbers if own.fold else None), numbers
     except graph.RecordingError as error:
         raise InputError(f"it cannot be written as shader code: {error.what}", error.where, error.hint) from error

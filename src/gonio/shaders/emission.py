@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Unpack
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Unpack
 
 from ..arguments import takes_fields
 from ..catalog.material import MaterialLike, material
@@ -14,6 +14,7 @@ from . import curves, tiers
 from .bundle import Bundle, bundle
 from .half import bounded
 from .languages import Language
+from .own_values import OwnKeywords, OwnValues
 from .placement import Placement, PlacementKeywords
 
 
@@ -22,9 +23,7 @@ class Choice:
     """What of a material is written; the fields are arguments of `emit`."""
 
     functions: str | Sequence[str]
-    lean: bool = False
-    constants: bool = False
-    fold: bool = False
+    own: OwnValues = field(default_factory=OwnValues)
     fit: str = ""
     ibl: bool = False
     budget: int = 0
@@ -40,26 +39,27 @@ class Choice:
             raise InputError(
                 what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
             )
-        if (self.lean or self.constants or self.fold) and (self.fit or self.ibl):
-            given = "--lean" if self.lean else "--constants" if self.constants else "--fold"
+        if self.own != OwnValues() and (self.fit or self.ibl):
+            given = "--lean" if self.own.lean else "--constants" if self.own.constants else "--fold"
             what = f"{given} with {'--fit' if self.fit else '--ibl'}"
             raise InputError(what, "emit", "it goes with whole materials")
 
 
+class EmitKeywords(OwnKeywords, PlacementKeywords, total=False):
+    """The types of further keywords of `emit`."""
+
+
 @public
-@takes_fields(Placement, PlacementKeywords)
+@takes_fields((OwnValues, Placement), EmitKeywords)
 def emit(
     model: MaterialLike | Sequence[MaterialLike],
     lang: str = "glsl",
     functions: str | Sequence[str] = ("eval", "pdf", "sample"),
     *,
-    lean: bool = False,
-    constants: bool = False,
-    fold: bool = False,
     fit: str = "",
     ibl: bool = False,
     budget: int = 0,
-    **placement: Unpack[PlacementKeywords],
+    **more: Unpack[EmitKeywords],
 ) -> str:
     """A material as shader code: eval, pdf, sample and the functions that they need.
 
@@ -87,8 +87,10 @@ def emit(
     Raises InputError for a stochastic material (RandomWalk), which has no shader code, and where `fit`, `ibl` and
     `budget` exclude each other.
     """
-    given = Choice(functions, lean, constants, fold, fit, ibl, budget)
-    return shader(model, lang, given, Placement(**placement))[0].text
+    names = {one.name for one in fields(OwnValues)}
+    own: dict[str, Any] = {name: value for name, value in more.items() if name in names}
+    place: dict[str, Any] = {name: value for name, value in more.items() if name not in names}
+    return shader(model, lang, Choice(functions, OwnValues(**own), fit, ibl, budget), Placement(**place))[0].text
 
 
 def shader(
@@ -111,8 +113,7 @@ def shader(
         several = [cheapest]
         lines = [str(tier) for tier in chosen]
     members = [material(one) for one in several]
-    lean, constants, fold = choice.lean, choice.constants, choice.fold
-    made = bundle(members, lang, choice.functions, lean=lean, constants=constants, fold=fold, placement=placement)
+    made = bundle(members, lang, choice.functions, placement=placement, **asdict(choice.own))
     if placement.half:
         made = bounded(made, members)
     return made, lines

@@ -113,6 +113,7 @@ def emit(
     from ...shaders import Placement
     from ...shaders.emission import Choice
     from ...shaders.emission import shader as written_for
+    from ...shaders.own_values import OwnValues
 
     folders = [Path(one) for one in output or () if one.endswith(SLASHES)]
     single = [Path(one) for one in output or () if not one.endswith(SLASHES)]
@@ -124,7 +125,9 @@ def emit(
         _write_pairs(made.texts(model), check, content.functions, single, folders)
         return
     at = Placement(**vars(place))
-    shader, errors = written_for(made.texts(model), lang, Choice(**vars(content)), at)
+    own = OwnValues(content.lean, content.constants, content.fold)
+    choice = Choice(content.functions, own, content.fit, content.ibl, content.budget)
+    shader, errors = written_for(made.texts(model), lang, choice, at)
     for line in errors:
         print(line, file=sys.stderr)
     _write_shader(shader, single, folders, as_json)
