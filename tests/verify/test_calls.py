@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import gonio as go
+import numpy as np
 import pytest
 from gonio import ops
 from gonio.ops import backend
 from gonio.verify import verify
+from gonio.verify.laws import calls
 
 PLUGIN = """
 import drjit as dr
@@ -132,3 +134,10 @@ def test_a_surface_may_declare_another_color_on_its_back() -> None:
     assert "`back_differs`" in " ".join(verify(undeclared(), quick=True, law=["calls"])["calls"].why)
     assert not go.two_sided(go.Lambert()).back_differs
     assert go.mix(go.Lambert(), RedAboveBlueBelow(), 0.5).back_differs
+
+
+def test_a_denormal_number_that_is_0_in_another_kernel_is_no_difference() -> None:
+    wo = wi = np.array([[0.0, 0.0, 1.0]])
+    for value, differs in ((1e-38, False), (1e-20, True)):
+        first, second = {"eval": np.array([[0.0, 0.0, value]])}, {"eval": np.zeros((1, 3))}
+        assert bool(calls._unlike("one row at a time", first, second, wo, wi, 1e-4).wrong) == differs

@@ -21,6 +21,7 @@ from .base import Law, pair_in_words, pairs
 SAME = {"float64": 1e-10, "float32": 1e-4}
 LARGE = 1 << 20
 SMALL = 1e-6  # of the largest value: smaller values are negligible
+DARK = 1e-30  # a value that is 0 in a kernel in which denormal numbers are
 
 
 class Calls(Law):
@@ -203,7 +204,7 @@ def _unlike(
         largest = float(np.max(np.abs(a[keep]), initial=0.0))
         size = np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * largest)
         difference = np.where(keep[:, None], np.abs(a - b), 0.0)
-        off = difference / np.where(size > 0.0, size, 1.0)
+        off = difference / np.maximum(size, DARK)
         off = np.where(np.isnan(off), np.inf, off).max(1)
         # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in few rows
         wrong = off > same
