@@ -51,3 +51,23 @@ def test_a_step_near_the_rim_of_cells_is_in_the_stated_error(edge: float) -> Non
     exact = 1.0 - 0.2 * edge**2
     assert abs(found.value[0, 0] - exact) < 2.0 * found.error[0, 0] + 1e-5
     assert found.error[0, 0] < 1e-3
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_the_stated_error_covers_steps_along_cells_and_across_them(tolerance: float) -> None:
+    """Rings and sectors are divided along one coordinate only, a cap about a tilted axis along both."""
+    axis = directions.at(np.array([35.0]), 200.0)[0]
+
+    def ring(o, i):  # type: ignore[no-untyped-def]
+        return [ops.where(i.z > 0.37, 1.0, 0.0)]
+
+    def sectors(o, i):  # type: ignore[no-untyped-def]
+        return [ops.where((i.z > 0.0) & (i.x * 0.6 + i.y * 0.8 > 0.0), i.z, 0.0)]
+
+    def cap(o, i):  # type: ignore[no-untyped-def]
+        return [ops.where(i.x * axis[0] + i.y * axis[1] + i.z * axis[2] > 0.9, 1.0, 0.0)]
+
+    for integrand, exact in ((ring, 2.0 * np.pi * 0.63), (sectors, 0.5 * np.pi), (cap, 2.0 * np.pi * 0.1)):
+        found = cubature.integrate(go.Lambert().sample, integrand, WO[1:3], tolerance)
+        assert np.all(np.abs(found.value[:, 0] - exact) < found.error[:, 0] + 1e-9), integrand.__name__
+        assert found.error.max() < 20.0 * tolerance
