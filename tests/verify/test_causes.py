@@ -399,6 +399,16 @@ SIXTH: list[tuple[str, str, str]] = [
     ("w1_empirical.W1BlinnFourTimes", "energy", "the normalization of the part with ks"),
     ("w1_layers.W1HalfVectorBase", "energy", "the normalization holds at the normal only"),
     ("w2_plugins_a.W2PluginMaskNull", "calls", "eval_null_transmission is not weight x pdf"),
+    ("w3_forums.W3WeekendBall", "pdf", "depend on wi's angle to the normal alone"),
+    ("w3_engines.W3SwappedPdf", "pdf", "the pdf with wo and wi exchanged"),
+    ("w2_smooth_glass.W2GlassFactorSide", "delta", "from inside has the factor 1 / eta^2 inverted"),
+    ("w2_smooth_glass.W2GlassFirstPower", "delta", "1 / eta in place of 1 / eta^2"),
+    ("w2_smooth_glass.W2GlassWeekend", "delta", "Schlick's curve of the angle there"),
+    ("w2_panes.W2PaneOneWay", "delta", "a tint of one direction only"),
+    ("w2_panes.W2MirrorOneAxis", "delta", "keeps y of wo"),
+    ("w1_corners.W1FlooredPdf", "weight", "clamped to at least 0.1"),
+    ("w1_corners.W1SoftTerminator", "reciprocity", "g(wo) / g(wi)"),
+    ("w1_diffuse.W1OrenNegative", "positivity", "with azimuths that differ by more than 90"),
 ]
 
 

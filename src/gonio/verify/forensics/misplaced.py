@@ -22,13 +22,14 @@ from .crowding import BEFORE, EFFECT, Blocks, effect
 from .factors import half_vector
 from .ratio import Cause
 
+SMALL = 0.02  # smallest difference that one variable explains
 PLATEAU = 0.3  # share of the expectation in blocks of one ratio
 LEAST = 0.02  # share of all samples that lie elsewhere
 OTHER = 0.15  # of that share: differences of the other sign
 NATURAL = 0.06  # by which the integral of the pdf may differ from the share of the samples
 NOISE = 4.0  # standard errors
 STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
-BINS = 12
+BINS = 48
 NEAR_HORIZON, NEAR_NORMAL = 0.3, 0.95  # cosines
 FEW = 0.06  # share of the area in which a crowd is a ring or a point
 
@@ -39,9 +40,13 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
     if held.observed.sum() < 1000 or expected.sum() <= 0.0:
         return None
     before = effect(expected, held.observed)
-    if before < BEFORE:
+    if before < SMALL:
         return None
-    return _other_frame(subject, held, before) or _parts(subject, held) or _one_variable(held, before)
+    if before > BEFORE:
+        cause = _other_frame(subject, held, before) or _parts(subject, held)
+        if cause is not None:
+            return cause
+    return _one_variable(cells, held, before)
 
 
 # --------------------------------------------------------------------------- the pdf in another frame
@@ -205,20 +210,17 @@ VARIABLES: dict[str, tuple[str, Variable]] = {
 }
 
 
-def _one_variable(held: Blocks, before: float) -> Cause | None:
-    """The angle on which the ratio of samples to pdf depends alone."""
+def _one_variable(cells: SampleCells, held: Blocks, before: float) -> Cause | None:
+    """The angle on which the ratio of samples to pdf depends alone: a ratio per step of it removes the difference."""
     wo = np.broadcast_to(held.wo, held.wi.shape)
-    e, o = held.joined(held.expected), held.observed.astype(float)
+    e, o = held.expected, cells.observed.ravel().astype(float)
     best: tuple[float, str, str, np.ndarray] | None = None
     for name, (guess, variable) in VARIABLES.items():
-        values = variable(wo, held.wi)
-        mean = held.joined(values * held.expected) / np.maximum(e, 1e-30)
-        order = np.argsort(mean)
-        part = np.minimum((np.cumsum(e[order]) / max(e.sum(), 1e-30) * BINS).astype(int), BINS - 1)
+        order = np.argsort(variable(wo, held.wi))
         number = np.empty(len(e), int)
-        number[order] = part
+        number[order] = np.minimum((np.cumsum(e[order]) / max(e.sum(), 1e-30) * BINS).astype(int), BINS - 1)
         ratio = np.bincount(number, o, BINS) / np.maximum(np.bincount(number, e, BINS), 1e-30)
-        left = effect(e * ratio[number], o)
+        left = effect(held.joined(e * ratio[number]), held.observed)
         if left < 2.0 * EFFECT and left < 0.3 * before and (best is None or left < best[0]):
             best = left, name, guess, ratio
     if best is None:
