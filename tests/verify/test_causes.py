@@ -400,6 +400,7 @@ SIXTH: list[tuple[str, str, str]] = [
     ("w1_layers.W1HalfVectorBase", "energy", "the normalization holds at the normal only"),
     ("w2_plugins_a.W2PluginMaskNull", "calls", "eval_null_transmission is not weight x pdf"),
     ("w3_forums.W3WeekendBall", "pdf", "depend on wi's angle to the normal alone"),
+    ("w3_narrow.W3RotatedPdf", "pdf", "rotation, and wo too"),
     ("w3_engines.W3SwappedPdf", "pdf", "the pdf with wo and wi exchanged"),
     ("w2_smooth_glass.W2GlassFactorSide", "delta", "from inside has the factor 1 / eta^2 inverted"),
     ("w2_smooth_glass.W2GlassFirstPower", "delta", "1 / eta in place of 1 / eta^2"),

@@ -54,6 +54,11 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
     """Rotations about the normal and mirror images: as text, the mistake that they suggest, and their matrix."""
+    guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
+    for path, angle in _angles(subject):
+        for factor in (1.0, -1.0, 2.0, -2.0):
+            words = f"{'-' if factor < 0.0 else ''}{'2 ' if abs(factor) > 1.5 else ''}{path}"
+            yield f"of wi rotated by {words}", guess, _rotation(factor * angle)
     yield (
         "of wi rotated by 180 degrees about the normal",
         "a direction that points the other way",
@@ -68,11 +73,6 @@ def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
     for sign in (1.0, -1.0):
         text = f"of wi rotated by {90.0 * sign:g} degrees about the normal"
         yield text, "x and y exchanged", _rotation(np.radians(90.0 * sign))
-    guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
-    for path, angle in _angles(subject):
-        for factor in (1.0, -1.0, 2.0, -2.0):
-            words = f"{'-' if factor < 0.0 else ''}{'2 ' if abs(factor) > 1.5 else ''}{path}"
-            yield f"of wi rotated by {words}", guess, _rotation(factor * angle)
 
 
 def _angles(subject: Subject) -> Iterator[tuple[str, float]]:
@@ -95,11 +95,12 @@ def _other_frame(subject: Subject, held: Blocks, before: float) -> Cause | None:
         words = "samples are distributed as the pdf with wo and wi exchanged: swapped arguments?"
         return Cause(words, "samples of swapped directions")
     for text, guess, matrix in _frames(subject):
-        density = np.nan_to_num(subject.pdf(wo, held.wi @ matrix.T), posinf=0.0, neginf=0.0)
-        expected = held.joined(density * held.area) * held.drawn
-        left = effect(expected, held.observed)
-        if left < 3.0 * EFFECT and left < 0.3 * before:
-            return Cause(f"samples are distributed as the pdf {text}: {guess}?", "samples in another frame")
+        for which, view in (("", wo), (", and wo too", wo @ matrix.T)):
+            density = np.nan_to_num(subject.pdf(view, held.wi @ matrix.T), posinf=0.0, neginf=0.0)
+            left = effect(held.joined(density * held.area) * held.drawn, held.observed)
+            if left < 3.0 * EFFECT and left < 0.3 * before:
+                words = f"samples are distributed as the pdf {text}{which}"
+                return Cause(f"{words}: {guess}?", "samples in another frame")
     return None
 
 
