@@ -129,7 +129,7 @@ class Energy(Law):
             yield mix
         yield from self._of_albedo(curves)
         view = directions.single(directions.at(np.array(gains.VIEWS), 37.0))
-        coarse = dataclasses.replace(effort, accuracy=1e-3, full=False)
+        coarse = dataclasses.replace(effort, accuracy=3e-3, full=False)
 
         def albedo(one: Subject) -> np.ndarray:
             # a guide of its own would take seconds
