@@ -68,6 +68,8 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
         if middle <= 0.0 or np.mean(np.abs(clamped / middle - 1.0) < 1e-4) < 0.99:
             continue
         rest = values[~bad].max(1)  # within the same bound
+        if np.ptp(rest) < 1e-3 * middle:
+            continue  # the value is the same everywhere
         for word, side, bound in (
             ("at most", right > clamped, rest <= middle * 1.001),
             ("at least", right < clamped, rest >= middle * 0.999),

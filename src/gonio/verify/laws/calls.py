@@ -69,6 +69,9 @@ class Calls(Law):
                 yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
             words = SUSPECTS.get(answer.what, f"{answer.what}, not the formula: {answer.wrong}")
+            if answer.what == "declared facts":
+                guess = next((guess for start, guess in FACTS.items() if answer.wrong.startswith(start)), "")
+                words = f"{answer.wrong}: {guess}?" if guess else answer.wrong
             yield Cause(words, f"calls {answer.what}")
 
 
@@ -82,6 +85,12 @@ SUSPECTS = {
     "half the rows disabled": _OTHER_ROWS,
     "textured parameters": "the value of one ray is used for others: derived once for all of them?",
     "a new object": "a call changes the results of later ones: state stored in the object?",
+}
+# by the beginning of what differs from the declared facts, the mistake of the formula, or of the declaration
+FACTS = {
+    "light is transmitted": "a side that eval or sample does not test, or keeps by an absolute value; else declare it",
+    "it reflects light from below": "a side that is not tested, or an absolute value; else declare it",
+    "eta of a reflected sample": "total reflection with the eta of refraction, or a refracted sample that is kept",
 }
 
 
