@@ -363,6 +363,19 @@ class DarkForTheViewer(Weighed):
         return super().eval(wo, wi, mode) + base
 
 
+class DeclaredAnisotropic(RightDiffuse):
+    """Values and samples are the same in all directions about the normal."""
+
+    @property
+    def isotropic(self) -> bool:
+        return False
+
+
+def test_anisotropy_that_neither_values_nor_samples_have_is_no_fact() -> None:
+    verdict = verify(DeclaredAnisotropic(), quick=True, law="isotropy")["isotropy"]
+    assert verdict.failed and "declared anisotropic, but a rotation changes it by" in " ".join(verdict.why), verdict.why
+
+
 def test_a_color_whose_channels_mix_is_named() -> None:
     rng = np.random.default_rng(4)
     wo, wi = (np.abs(w) / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, 64, 3)))

@@ -52,6 +52,20 @@ class DimmerFromBehind(go.Mirror):
         return s._replace(weight=s.weight * ops.where(wo.x > 0.0, 1.0, 0.5))
 
 
+class DimmerAtGrazing(go.Dielectric):
+    """Smooth glass that loses light by the cosine outside, both ways alike, which no stain does."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        s = super().sample(wo, u, mode)
+        outside = ops.minimum(ops.abs(wo.z), ops.abs(s.wi.z))
+        return s._replace(weight=s.weight * ops.where(wo.z * s.wi.z < 0.0, 0.7 + 0.3 * outside, 1.0))
+
+
+def test_light_that_is_lost_on_the_way_is_lost_by_beers_law() -> None:
+    verdict = verify(DimmerAtGrazing(alpha=0.0), quick=True, law="delta")["delta"]
+    assert verdict.failed and "where Fresnel's equations" in " ".join(verdict.why), verdict.why
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("mistake", "why", "cause"),
