@@ -91,7 +91,9 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if leader is not None:
             verdict.cause = f"follows from {leader.upper()}'s"
         elif cause is not None:
-            verdict.cause = cause.words
+            # rounding that no picture shows does not explain what pictures show
+            aside = law.name == "precision" and verdict.grade in (None, Grade.INVISIBLE) and visible
+            verdict.cause = f"apart from the others: {cause.words}" if aside else cause.words
             named[cause.key] = law.name
 
 
