@@ -71,3 +71,18 @@ def test_the_stated_error_covers_steps_along_cells_and_across_them(tolerance: fl
         found = cubature.integrate(go.Lambert().sample, integrand, WO[1:3], tolerance)
         assert np.all(np.abs(found.value[:, 0] - exact) < found.error[:, 0] + 1e-9), integrand.__name__
         assert found.error.max() < 20.0 * tolerance
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_a_streak_is_resolved_to_its_dim_ends(share: float) -> None:
+    """Along a streak that is a thousand times as long as wide, most of it lies between samples."""
+    streak = go.Conductor(alpha=(0.0003, 0.2), rotation=5.352, fresnel="one")
+    model = streak if share == 1.0 else go.mix(go.Lambert(0.6), streak, share)
+    wo = directions.at(np.array([68.0, 88.0]), 37.0)
+    one = subject.of(model)
+    result = cubature.integrate(one.sample, one.power(), wo, 3e-4)
+    for row, value in zip(wo, result.value[:, 0], strict=True):
+        u = np.random.default_rng(2).random((1 << 17, 3))
+        s = model.sample(np.tile(row, (len(u), 1)), u)
+        weight = np.where(s.pdf > 0.0, s.weight[:, 0], 0.0)
+        assert value == pytest.approx(weight.mean(), abs=4.0 * weight.std() / np.sqrt(len(u)) + 1e-3)

@@ -92,3 +92,14 @@ def test_every_mistake_is_caught_and_no_sound_material_fails_visibly(case: Case)
         assert not [v for v in report.failures if v.grade is not Grade.INVISIBLE], str(report)
     else:
         assert report.passed == (case.name in MISSES), f"{case.fault}\n{report}"
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "seed"),
+    [
+        ("sixth.r2_scatter.R2WireGrid", "delta", 10),  # a lobe so dim that it may be missed
+        ("sixth.r2_plugins.R2Splitter", "calls", 12),  # two lobes that are close together at grazing views
+    ],
+)
+def test_a_sound_material_passes_at_the_seed_at_which_it_once_failed(name: str, law: str, seed: int) -> None:
+    assert verify(by_name(name).target, quick=True, law=law, seed=seed).passed  # type: ignore[arg-type]

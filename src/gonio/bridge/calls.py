@@ -277,7 +277,9 @@ class _Trial:
     def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
         """A delta lobe carries weight x pdf, whether it is requested alone or chosen among others."""
         delta = _is_delta(bs)
-        same = np.abs(_rows(bs.wo) - _rows(self.drawn.wo)).max(1) < 1e-3
+        wo, drawn = _rows(bs.wo), _rows(self.drawn.wo)
+        # at grazing views what is mirrored and what passes straight on are close together, on either side
+        same = (np.abs(wo - drawn).max(1) < 1e-3) & (np.sign(wo[:, 2]) == np.sign(drawn[:, 2]))
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
             return ""

@@ -389,8 +389,9 @@ def tint(probe: Probe) -> Misses:
             lobes.of(probe.subject.replace(**{name: v}), probe.wo, probe.seed) for v in (0.125, 0.875, 0.3125)
         )
         for rows, _, o, i in probe.lobes(middle):
-            a, b, c = (lobes.along(lobes.rows_of(part, rows), i)[0] for part in (low, high, middle))
-            off = _relative(c, 0.75 * a + 0.25 * b)
+            (a, dim), (b, _), (c, _) = (lobes.along(lobes.rows_of(part, rows), i) for part in (low, high, middle))
+            # a lobe that carries next to nothing may be missed at the lower albedo
+            off = _relative(c, 0.75 * a + 0.25 * b) * (dim | (c.max(1) > FORWARD))
             if off.max(initial=0.0) > BOUNCED and _bounces(probe, name, rows, i):
                 continue
             yield _miss(off, f"the light of the lobe is not linear in {name}", o, i)

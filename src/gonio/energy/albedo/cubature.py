@@ -20,14 +20,15 @@ from .cells import Nodes, Seen, product, rimmed, step_aside
 ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells per side of the surface, in theta and phi
+FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2e-4 is that narrow
 SEEDED = 17  # halvings around samples
-SAMPLES = 1024  # per wo
-CROWD = 32  # samples in a cell for which it is divided before the integrand is evaluated
-AROUND = 3 * (CROWD + 4)  # points that mark the mirror direction, wo and -wo
-UNSEEN = 0.01  # below this fraction of the integral implied by the samples, a cell has missed its lobe
-ALONE, SEVERAL = 4, 3  # rounds in which one sample in a cell counts; samples in a cell that count in all
+SAMPLES = 4096  # per wo: the ends of a streak, as of brushed metal, are as dim as its samples are few
+CROWD = 128  # samples in a cell for which it is divided before the integrand is evaluated
+UNSEEN = 0.25  # below this fraction of a sample's value, the values at a cell's nodes have missed its lobe
 BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
+OFF = 1e-3  # of 1, the length of a sampled direction that is not used
+UP = np.array([0.0, 0.0, 1.0])
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
@@ -95,8 +96,9 @@ def integrate(
     integrand  (wo, wi) -> a vector with one entry per channel, of float64 Dr.Jit vectors; it runs inside a kernel
     tolerance  absolute, per integral; if cells run out, the reported error is larger
     """
-    cells, points = _seeded(sample, wo, seed)
+    cells, points = _seeded(sample, integrand, wo, seed)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
+    way[points.missed_by(cells, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
@@ -112,12 +114,9 @@ def integrate(
         difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
         divide = (difference.max(1) > allowed) & ~small[cells.row]
-        # the tail of a narrow lobe in a cell wider than the lobe: it contains samples, but every node is 0
-        level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
-        inside = np.bincount(points.cell, minlength=len(divide))
-        # single samples may lie where the integrand is dark at every scale, as those of a broader lobe do
-        inside = inside if depth < ALONE else np.where(inside >= SEVERAL, inside, 0)
-        divide |= fine.sum(1).max(1) < UNSEEN * inside / SAMPLES * level[cells.row]
+        missed = points.missed_by(cells, 4.0 * inner.most.reshape(-1, 4).max(1))
+        difference += missed[:, None]
+        divide |= missed > allowed
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide
@@ -126,7 +125,9 @@ def integrate(
         if not divide.any():
             break
         points = points.within(cells, divide, way)
-        cells, way = fine_cells.take(np.repeat(divide, 4)), ways[np.repeat(divide, 4)]
+        next_ = np.repeat(divide, 4)
+        cells, way = fine_cells.take(next_), ways[next_]
+        way[points.missed_by(cells, inner.most[next_]) > 0.0] = QUADRANTS
         coarse = fine[divide].reshape(-1, channels)
     return Integral(value, errors.total())
 
@@ -157,10 +158,24 @@ class _Errors:
 
 
 class _Points(NamedTuple):
-    """Samples inside cells: the number of the cell, theta and phi."""
+    """Samples inside cells: the number of the cell, theta and phi, the integrand, and its share of an estimate of the
+    integral."""
 
     cell: np.ndarray
     at: np.ndarray
+    value: np.ndarray
+    light: np.ndarray
+
+    def missed_by(self, cells: _Cells, most: np.ndarray) -> np.ndarray:
+        """What the samples in a cell make likely, where one of them is bright and every node dark, (M,), else 0: the
+        lobe is narrower than the cell.
+
+        most  the largest value at a cell's nodes, times its area on the sphere
+        """
+        bright = np.zeros(len(most))
+        np.maximum.at(bright, self.cell, self.value * np.sin(self.at[:, 0]))
+        bright *= cells.size.prod(1)
+        return np.where(most < UNSEEN * bright, np.minimum(bright, np.bincount(self.cell, self.light, len(most))), 0.0)
 
     def within(self, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> _Points:
         """The points in divided cells, numbered by these cells' quarters."""
@@ -168,60 +183,67 @@ class _Points(NamedTuple):
         cell, at = self.cell[inside], self.at[inside]
         parts = WAYS[way[cell]]
         place = np.floor((at - cells.low[cell]) / cells.size[cell] * parts).astype(int).clip(0, parts - 1)
-        return _Points(4 * (np.cumsum(divided) - 1)[cell] + place[:, 0] + parts[:, 0] % 4 * place[:, 1], at)
+        quarter = 4 * (np.cumsum(divided) - 1)[cell] + place[:, 0] + parts[:, 0] % 4 * place[:, 1]
+        return _Points(quarter, at, self.value[inside], self.light[inside])
 
 
-def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
-    """The initial cells, divided around the model's samples, the mirror direction and wo, and the samples inside
-    them."""
+def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
+    """The initial cells, divided around the samples that carry light, the mirror direction and wo, and these samples
+    inside them."""
     n_theta, n_phi = FIRST
-    step = np.array([0.5 * np.pi / n_theta, 2.0 * np.pi / n_phi])
-    corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * step
+    corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * FIRST_SIZE
     row, side, cell = np.meshgrid(np.arange(len(wo)), [1.0, -1.0], np.arange(len(corner)), indexing="ij")
-    cells = _Cells(row.ravel(), side.ravel(), corner[cell.ravel()], np.broadcast_to(step, (row.size, 2)).copy())
-    per = SAMPLES
+    cells = _Cells(row.ravel(), side.ravel(), corner[cell.ravel()], np.broadcast_to(FIRST_SIZE, (row.size, 2)).copy())
     rng = np.random.default_rng([seed, 77])
-    many = np.repeat(wo, per, axis=0)
+    many = np.repeat(wo, SAMPLES, axis=0)
     drawn = sample(many, rng.random((len(many), 3)).astype(np.float32).clip(max=ALMOST_ONE).astype(float))
-    good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
+    good = (drawn.pdf > 0.0) & ~drawn.delta & (np.abs(np.linalg.norm(drawn.wi, axis=1) - 1.0) < OFF)
+    value = _summed(integrand, many, np.where(good[:, None], drawn.wi, UP))
+    good &= value > 0.0
+    value, light = value[good], value[good] / (drawn.pdf[good] * SAMPLES)
     mirror = wo * np.array([-1.0, -1.0, 1.0])
-    likely = np.concatenate([drawn.wi[good], *([mirror, wo, -wo] * (CROWD + 4))])
-    owner = np.concatenate([np.repeat(np.arange(len(wo)), per)[good], *([np.arange(len(wo))] * AROUND)])
-    theta = np.arctan2(np.hypot(likely[:, 0], likely[:, 1]), np.abs(likely[:, 2]))
-    phi = np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)
+    likely = np.concatenate([drawn.wi[good], mirror, wo, -wo])
+    owner = np.concatenate([np.repeat(np.arange(len(wo)), SAMPLES)[good], *([np.arange(len(wo))] * 3)])
+    angles = np.stack(
+        [np.arctan2(np.hypot(likely[:, 0], likely[:, 1]), np.abs(likely[:, 2])),
+         np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)], -1
+    )  # fmt: skip
     below = (likely[:, 2] < 0.0).astype(int)
-    angles = np.stack([theta, phi], -1)
-    own = len(angles) - AROUND * len(wo)  # the others are marker directions
-    homes, first = np.full(own, -1), 0
-    # one integer identifies a point's cell at each level: row, side, and the cell's two coordinates
+    crowd = np.where(np.arange(len(likely)) < len(value), 1, CROWD)  # a marker alone divides its cell
+    homes, first = np.zeros(len(likely), int), 0
+    left = np.arange(len(likely))  # points in cells that are not accepted yet
     accepted: list[_Cells] = []
     for level in range(SEEDED):
-        scale = 2**level
-        point = _key(owner, below, theta / step[0] * scale, phi / step[1] * scale, n_theta * scale, n_phi * scale)
-        index = np.round(cells.low / cells.size)
-        mine = _key(cells.row, (cells.side < 0).astype(int), index[:, 0], index[:, 1], n_theta * scale, n_phi * scale)
-        inside, count = np.unique(point, return_counts=True)
-        place = np.searchsorted(inside, mine).clip(max=len(inside) - 1)
-        crowded = (inside[place] == mine) & (count[place] >= CROWD)
+        # one integer identifies a point's cell: row, side, and the cell's two coordinates
+        most = np.array(FIRST) * 2**level
+        point = _key(owner[left], below[left], angles[left] / FIRST_SIZE * 2**level, most)
+        mine = _key(cells.row, (cells.side < 0).astype(int), np.round(cells.low / cells.size), most)
         order = np.argsort(mine)
-        cell = order[np.searchsorted(mine[order], point[:own]).clip(max=len(mine) - 1)]
-        here = (mine[cell] == point[:own]) & ~crowded[cell]
-        homes[here] = first + (np.cumsum(~crowded) - 1)[cell[here]]
+        cell = order[np.searchsorted(mine[order], point)]
+        crowded = np.bincount(cell, crowd[left], len(mine)) >= CROWD
+        crowded &= level < SEEDED - 1
+        homes[left] = first + (np.cumsum(~crowded) - 1)[cell]
         accepted.append(cells.take(~crowded))
         first += len(accepted[-1].row)
+        left = left[crowded[cell]]
         cells = cells.take(crowded).quarters()
-        if not len(cells.row):
+        if not len(left):
             break
-    accepted.append(cells)
-    there = homes >= 0
-    points = _Points(homes[there], angles[:own][there])
+    points = _Points(homes[: len(value)], angles[: len(value)], value, light)
     return _Cells(*[np.concatenate(parts) for parts in zip(*accepted, strict=True)]), points
 
 
-def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: int, n_b: int) -> np.ndarray:
-    a = np.minimum(a.astype(np.int64), n_a - 1)
-    b = np.minimum(b.astype(np.int64), n_b - 1)
-    return ((row.astype(np.int64) * 2 + below) * n_a + a) * n_b + b
+def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """The sum of the channels at rows of directions, (N,); 0 where it is not a number."""
+    types = backend.types("float64")
+    values = list(integrand(backend.vector_of(wo, 3, types), backend.vector_of(wi, 3, types)))
+    return np.nan_to_num(np.sum([backend.to_numpy(value, len(wi)) for value in values], axis=0), posinf=0.0)
+
+
+def _key(row: np.ndarray, below: np.ndarray, at: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """The number of a cell by its row of wo, its side, and its place `at`, (M, 2) below `most`, among equal cells."""
+    a, b = np.minimum(at.astype(np.int64), most - 1).T
+    return np.asarray(((row.astype(np.int64) * 2 + below) * most[0] + a) * most[1] + b)
 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:

@@ -299,20 +299,8 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
         return _randomly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(_seeds(subject), subject.power(), wo, effort.accuracy, seed)
+    integral = cubature.integrate(subject.sampler.sample, subject.power(), wo, effort.accuracy, seed)
     return integral.value + ideal, integral.error + effort.accuracy
-
-
-def _seeds(subject: Subject) -> cubature.Sampler:
-    """The subject's samples that carry light: cells around the others, as in a black sector, need not be divided."""
-
-    def sample(wo: np.ndarray, u: np.ndarray) -> object:
-        s = subject.sampler.sample(wo, u)
-        unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-3
-        dark = subject.eval(wo, np.where(unit[:, None], s.wi, [0.0, 0.0, 1.0])).max(1) <= 0.0
-        return s._replace(pdf=np.where(dark & ~s.delta, 0.0, s.pdf))
-
-    return sample
 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
