@@ -307,6 +307,7 @@ def test_a_power_by_two_stars_is_one_message(here: Path, command: str, capsys: p
     assert "`**` on a value" in told and "ops.pow" in told and "mine.py:21" in told
 
 
+@pytest.mark.slow
 def test_an_error_in_a_loop_names_the_users_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", "sub/loop.py:Looked", "--spp", "1", "--size", "8x8", "-o", "a.exr") == 2
     told = capsys.readouterr().err

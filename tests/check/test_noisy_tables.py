@@ -43,6 +43,7 @@ def test_a_mistake_is_named_through_the_noise(seed: int, changes: dict[str, Any]
     assert finding.figures["converged"] > 3.0 and not any("no form fits" in fact for fact in finding.facts)
 
 
+@pytest.mark.slow
 def test_a_mistake_that_hardly_differs_from_the_right_form_is_only_probable() -> None:
     finding = _judged(k="roughness / 2")
     assert finding.cause == "probably k = roughness / 2", finding.lines()

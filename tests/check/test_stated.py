@@ -101,6 +101,7 @@ def test_parameters_that_make_a_simpler_model_show_nothing(
 # --------------------------------------------------------------------------- parameters that nobody names
 
 
+@pytest.mark.slow
 def test_parameters_that_a_file_does_not_name_are_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = _written("phong(kd=0.25,ks=0.6,p=16)", "")
     finding, points = _mark(tmp_path / "s", "phong.csv", text)

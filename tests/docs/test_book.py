@@ -109,6 +109,7 @@ def test_a_material_of_a_file_has_a_live_page(tmp_path: Path) -> None:
     assert parameter["value"].endswith("examples/three-forms/rough-copper.gonio")
 
 
+@pytest.mark.slow
 def test_a_random_model_is_shown_by_its_mean(tmp_path: Path) -> None:
     """Its table has the value of many other walks, and the albedo that Kulla-Conty restores to a white metal."""
     white = go.material("conductor(alpha=0.6,fresnel=one)")

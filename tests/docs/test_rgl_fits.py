@@ -34,6 +34,7 @@ def paint(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_errors_of_a_file_are_those_of_its_noise_and_of_the_best_start(program: ModuleType, paint: Path) -> None:
     rows = list(program.errors.rows_of(program.errors.files_in(paint.parent), MODELS, [], 500, 2))
     wrong, right = rows

@@ -48,7 +48,7 @@ def test_the_manifests_error_is_within_a_factor_3_of_the_truth():
     assert actual / 3 < baked.manifest["error"]["E"]["max"] < actual * 3
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_stretched_layout_interpolates_within_2e_3():
     for masking in ("smith-correlated", "smith-separable", "schlick-direct", "schlick-ibl"):
         baked = baking.bake("ggx", ["E"], size=64, masking=masking, layout="stretched")
@@ -130,6 +130,7 @@ def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
         assert found == pytest.approx(float((e @ (2 * w * x)).mean()), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_sampled_tables_of_two_widths_agree_with_the_quadrature():
     baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, sampling=Sampling("visible", 4096))
     assert baked.manifest["error"]["E"]["max"] < 5e-3
@@ -158,6 +159,7 @@ def test_the_error_between_nodes_is_what_a_reader_of_the_table_meets():
     assert met / 2 < baked.manifest["error"]["E"]["interpolation"] < met * 2
 
 
+@pytest.mark.slow
 def test_glass_is_baked_from_both_sides_in_two_parts():
     baked = baking.bake("ggx", ["glass"], size=6)
     root, mu, roughness = (baked.arrays[n] for n in ("sqrt_f0", "mu", "roughness"))

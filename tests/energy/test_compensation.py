@@ -207,6 +207,7 @@ def test_the_walk_returns_what_it_was_given(alpha):
         np.testing.assert_allclose(mean, 1.0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "base",
     [go.Conductor(alpha=0.8, fresnel="one"), go.Conductor.preset("Au", alpha=0.8), go.Dielectric(1.5, 0.5)],

@@ -51,7 +51,7 @@ def test_glass_mirrors_and_black() -> None:
     assert black.mean == np.inf and black.largest == 1.0 and black.as_dict()["mean"] is None
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_tables_are_compared_where_they_are_known(tmp_path: Path) -> None:
     angles = [0, 10, 20, 30, 40, 50, 60]
     go.measure(go.Lambert(0.5), tmp_path / "a.gonio", theta_i=angles, theta_r=angles)

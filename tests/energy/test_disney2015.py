@@ -24,6 +24,7 @@ def test_metal_is_ggx_with_schlicks_curve_of_the_base_colour() -> None:
     np.testing.assert_allclose(got, expected.eval(WO, WI, precision="float64"), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_glass_takes_the_root_of_the_base_colour_at_each_crossing() -> None:
     model = Disney2015(COLOUR, spec_trans=1.0, roughness=0.5, eta=1.4)
     glass = go.KullaConty(go.Dielectric(1.4, alpha=0.25))

@@ -33,6 +33,7 @@ def test_the_slopes_of_d_are_its_derivatives() -> None:
     np.testing.assert_allclose(ltc_anisotropic._density(gauged, wi), value, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_equal_widths_have_the_tables_of_isotropic_materials() -> None:
     gold = go.Conductor.preset("Au")
     full, flat = ltc_anisotropic.bake(gold, 3), ltc.bake(gold, 3)

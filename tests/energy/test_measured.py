@@ -52,7 +52,7 @@ def test_lambert_misses_nothing_and_a_dark_base_stays_dark():
     np.testing.assert_allclose(go.KullaConty(dark).eval(WO, WI), dark.eval(WO, WI), rtol=1e-6)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("color", "power"), [("sheet", 1), ("bounce", 2)])
 def test_what_is_given_back_has_the_colour_of_the_bounces(color, power):
     share = np.array([0.2, 0.5, 0.9])
@@ -88,6 +88,7 @@ def test_it_is_reciprocal_where_its_base_is():
         np.testing.assert_allclose(forth, back, rtol=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["phong", "own", "coated"])
 def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):

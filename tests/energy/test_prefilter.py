@@ -160,7 +160,7 @@ def sky(tmp_path):
     return path
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_baked_levels_are_written_read_back_and_drawn(sky, tmp_path, capsys):
     folder = tmp_path / "levels"
     words = ["bake", str(sky), "--lut", "prefiltered", "--levels", "3", "--ndf", "beckmann", "-o", str(folder)]

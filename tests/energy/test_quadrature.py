@@ -79,6 +79,7 @@ def test_e_agrees_with_finer_nodes_over_the_whole_table(ndf, masking):
     assert np.abs(coarse - fine).max() < 2e-5
 
 
+@pytest.mark.slow
 @given(mu=st.floats(0.01, 1.0), alpha=st.floats(0.003, 1.0), ndf=st.sampled_from(["ggx", "beckmann", "student-t"]))
 @settings(max_examples=30, deadline=None)
 def test_e_lies_between_0_and_1_and_correlated_loses_least(mu, alpha, ndf):

@@ -144,6 +144,7 @@ def test_a_flat_sample_is_measured_too(tmp_path: Path) -> None:
     assert got.scene.ball is None
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_finite_differences(found: run.Capture) -> None:
     assert found.fitted is not None
     solved = found.fitted.problem
@@ -215,6 +216,7 @@ def test_the_first_photographs_are_planned_from_a_guess(tmp_path: Path) -> None:
         go.capture(tmp_path, "lambert+ggx")
 
 
+@pytest.mark.slow
 def test_one_light_is_told_to_be_too_few(taken: Path) -> None:
     got = go.capture([str(taken / "p1.npz")], "lambert+ggx")
     assert got.warnings[0].startswith("one light alone, difference angles of 2")

@@ -197,6 +197,7 @@ def test_a_measured_table_is_what_convert_writes(suffix: str, tmp_path: Path) ->
     assert np.array_equal(values(a), values(b))
 
 
+@pytest.mark.slow
 def test_a_model_s_cells_hold_its_values_at_their_middles(tmp_path: Path) -> None:
     gold = go.Conductor.preset("Au", alpha=0.2)
     found = go.measure(gold, tmp_path / "gold.binary")
@@ -208,6 +209,7 @@ def test_a_model_s_cells_hold_its_values_at_their_middles(tmp_path: Path) -> Non
     assert np.allclose(table.values.reshape(-1, 3)[some], exact, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_what_a_table_of_one_value_for_both_orders_loses_is_said(tmp_path: Path) -> None:
     def notes(material: str, name: str) -> str:
         return " ".join(go.measure(material, tmp_path / name).notes)
@@ -240,6 +242,7 @@ def test_a_detector_sees_the_mean_over_its_cone() -> None:
 # ---------------------------------------------------------------------- where the detector cannot stand
 
 
+@pytest.mark.slow
 def test_cells_behind_the_lamp_are_invalid_or_left_out(tmp_path: Path) -> None:
     go.measure("lambert", tmp_path / "a.binary", blocked=10.0)
     table = read(tmp_path / "a.binary")
@@ -273,7 +276,7 @@ def test_a_blocked_direction_moves_to_the_rim_and_stays_above() -> None:
 # ---------------------------------------------------------------------- files
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("suffix", [".gonio", ".bsdf", ".brdf"])
 def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None:
     found = go.measure(

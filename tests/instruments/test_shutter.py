@@ -16,6 +16,7 @@ def ratios(errors: np.ndarray, noise: float, rng: np.random.Generator) -> list[R
     ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("noise", [1e-4, 0.005, 0.1], ids=["sharp", "as large as the errors", "useless"])
 @pytest.mark.parametrize("shares", [(0.0, 0.0, 1.0), (0.2, 0.3, 0.5)])
 def test_the_error_of_all_light_is_as_large_as_stated(noise: float, shares: tuple[float, ...]) -> None:
@@ -29,6 +30,7 @@ def test_the_error_of_all_light_is_as_large_as_stated(noise: float, shares: tupl
     assert np.std(deviations) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_without_a_stated_error_three_settings_determine_it_to_a_half() -> None:
     """Student's t: the scatter of three settings says what their mean is off by, in 95 %."""
     rng = np.random.default_rng(4)

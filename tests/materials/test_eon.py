@@ -28,7 +28,7 @@ def single(wo: np.ndarray, wi: np.ndarray, r: float) -> np.ndarray:
     return (1 + r * s / t) / (1 + (0.5 - 2 / (3 * np.pi)) * r) / np.pi
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [0.3, 1.0])
 def test_eon_is_single_scattering_and_what_that_loses(r: float) -> None:
     rho, count = 0.7, 12

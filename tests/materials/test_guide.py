@@ -113,7 +113,7 @@ def test_lobes_off_the_mirror_direction_are_found() -> None:
     assert _relative_variance(Through(), _at(50.0))[1] < 0.02
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_parameters_that_vary_over_the_surface_have_slices_of_their_own() -> None:
     rays = 3 * 4096
     alpha = np.tile([0.08, 0.3, 0.6], rays // 3)

@@ -55,7 +55,7 @@ def network(folder: Path) -> Network:
     return found
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("method", "size"), [("log", 2048), ("log", 4096), ("lowrank", 4096)])
 def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, size: int, folder: Path) -> None:
     path = folder / f"{method}-{size}.gonio"
@@ -93,6 +93,7 @@ def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_visible_normals_are_rebuilt(folder: Path) -> None:
     row = go.compress(folder / "a.bsdf", folder / "a.gonio", codec="rgl")[0]
     assert row.size < 0.6 * (folder / "a.bsdf").stat().st_size and row.error < 1e-4
@@ -103,11 +104,13 @@ def test_visible_normals_are_rebuilt(folder: Path) -> None:
     assert compare.convert(row.path, folder / "again.bsdf").error < 1e-4
 
 
+@pytest.mark.slow
 def test_an_adaptive_table_stays_one_in_few_bytes(folder: Path) -> None:
     row = go.compress(folder / "a.bsdf", folder / "few.gonio", bytes=16384)[0]
     assert row.kind == "adaptive-log" and row.size <= 16384 and row.sphere < 0.02
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["cc_ibiza_sunset", "chm_mint", "irid_flake_paint1"])
 def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: Path, shared: Path) -> None:
     file = shared / "data" / "rgl" / f"{name}_rgb.bsdf"
@@ -118,6 +121,7 @@ def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: 
 # ---------------------------------------------------------------------- networks
 
 
+@pytest.mark.slow
 def test_a_network_is_near_what_it_has_seen(network: Network) -> None:
     assert network.shape == {"weight": 675}
     assert compare.difference(read(SAMPLE), network) < 0.1
@@ -147,6 +151,7 @@ def test_a_shader_carries_the_weights(language: str, network: Network, folder: P
     assert f"{float(np.float32(network.weights['bias0'][0])):.5g}"[:6] in made.text
 
 
+@pytest.mark.slow
 def test_a_published_network_says_what_its_table_does(shared: Path) -> None:
     from gonio.measure.formats.npz import arrays
     from gonio.measure.tables.half_difference import centres

@@ -80,7 +80,7 @@ def test_a_sum_of_lobes_is_found_again() -> None:
     )
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", ["log", "log1p", "cuberoot", "linear"])
 def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
     found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", loss=metric)
@@ -148,6 +148,7 @@ def test_saturated_values_are_left_out_and_told() -> None:
     assert found.as_dict()["left_out"] == cells.out
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["vch_silk_blue", "chm_mint"])
 def test_a_fit_to_a_real_file_does_not_collapse(shared: Path, name: str) -> None:
     found = fit(shared / "data/rgl" / f"{name}_rgb.bsdf", "lambert+ggx")
@@ -239,13 +240,14 @@ def test_degrees_of_freedom_are_those_of_a_mean_of_runs() -> None:
     )
 
 
+@pytest.mark.slow
 def test_few_runs_widen_an_interval() -> None:
     found = fit(table(METAL, shape=(6, 6, 8)), "conductor")
     assert found.degrees is not None and found.degrees.min() < 8.0
     assert np.all(found.half_widths > 1.98 * found.errors)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_several_files_are_rows_and_a_bad_one_costs_only_its_own(tmp_path: Path) -> None:
     merl = format_of(tmp_path / "x.gonio")
     for name, material in (("a", PLASTIC), ("b", METAL)):
@@ -314,6 +316,7 @@ def test_a_tint_of_0_does_not_hide_that_channels_mix() -> None:
     assert solver.columns_of(go.Lambert(), free_of(go.Lambert(), {})) == [[0, 1, 2]]
 
 
+@pytest.mark.slow
 def test_parameters_of_which_only_a_combination_acts_are_named_with_those_that_follow_them() -> None:
     """metallic, specular, its tint and the color have a family of equal values, in which sheen follows a little."""
     disney = go.model("disney")(

@@ -49,6 +49,7 @@ def test_a_table_is_recorded_as_it_is_computed(suffix: str, files: dict[str, str
         np.testing.assert_allclose(np.asarray(values).T, computed, rtol=1e-7, atol=1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])
 def test_a_shader_carries_the_tables(language: str, files: dict[str, str]) -> None:
     from gonio.shaders.bundle import bundle

@@ -99,6 +99,7 @@ def test_merl_is_exact_at_the_middle_of_cells() -> None:
     np.testing.assert_allclose(table.rgb(wo[pick], wi[pick]), expected, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_whole_turn_of_phi_d_tells_a_direction_from_its_opposite(tmp_path: Path) -> None:
     shape = (90, 90, 360)
     planes = np.ones((3, *shape))

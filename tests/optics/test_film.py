@@ -91,7 +91,7 @@ def under_daylight(theta: float, metal: indices.Metal, film_eta: float, thicknes
     return np.asarray(np.clip(seen, 0.0, 1.0))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("form", "bar"), [("local", 0.008), ("belcour-barla", 0.03)])
 def test_colours_are_near_those_of_the_spectrum(form: str, bar: float) -> None:
     """Of greyish metals: gold and copper want more than three bands, see docs/thin-film.md."""

@@ -333,6 +333,7 @@ def test_pictures_are_those_of_the_native_plugins(name: str, integrator: str) ->
     assert native.min() > 0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("plugin, key", [
     ({"type": "gonio_conductor", "alpha": 0.3, **GOLD}, "floor.bsdf.alpha"),
     ({"type": "gonio_oren_nayar", "albedo": {"type": "rgb", "value": [0.3, 0.5, 0.7]}}, "floor.bsdf.albedo"),

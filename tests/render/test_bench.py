@@ -30,6 +30,7 @@ def test_the_table_has_rays_a_material_and_integrators_beside_mitsubas(
     assert "llvm" in found["machine"] and "threads" in found["machine"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(engine.cuda_available(), reason="there is a GPU")
 def test_without_a_gpu_its_tests_say_so_loudly_and_fail() -> None:
     root = Path(__file__).parents[2]

@@ -162,6 +162,7 @@ def test_nested_media_disperse(tmp_path: Path) -> None:
     assert seen.mean() == pytest.approx(float(np.prod(through)) * np.exp(-0.2), rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_a_material_derives_follows_the_index_outside(tmp_path: Path) -> None:
     """Energy compensation derives from the index: rough glass in water is the same as glass of the ratio in nothing."""
     rough = {"type": "kulla-conty", "base": {"type": "gonio-dielectric", "eta": 1.8, "alpha": 0.5, "priority": 2}}
@@ -174,6 +175,7 @@ def test_what_a_material_derives_follows_the_index_outside(tmp_path: Path) -> No
     assert nested.mean() == pytest.approx(1.44 * plain.mean(), rel=0.06)
 
 
+@pytest.mark.slow
 def test_the_order_of_priorities_decides_and_not_that_of_the_scene(tmp_path: Path) -> None:
     glass, water = slab(-2, 0.5, eta=1.5, priority=2), slab(-0.5, 2, eta=1.33, priority=1)
     pictures = [rendered(tmp_path, shapes, spp=1024) for shapes in ([glass, water], [water, glass])]

@@ -181,7 +181,7 @@ def test_a_mirror_is_a_perfect_conductor() -> None:
     assert apart(got[0], near).max() < BAR
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 def test_a_pane_has_the_matrices_of_all_its_bounces() -> None:
     wi, got = sampled(mi.load_dict({"type": "gonio_thin_dielectric", "eta": 1.5}), WO, mi.TransportMode.Radiance)
     cos = np.abs(WO[:, 2].astype(np.float64))
@@ -207,6 +207,7 @@ def test_a_pane_has_the_matrices_of_all_its_bounces() -> None:
     assert apart(got[0][usual], exact[usual]).max() < BAR
 
 
+@pytest.mark.slow
 def test_a_film_polarizes_as_its_layers_do() -> None:
     if not mi.is_spectral:
         pytest.skip("of the waves at single wavelengths: a film in mono is a sum of many")

@@ -18,6 +18,7 @@ from gonio.render.request import Request
 PROCESSES = 6
 
 
+@pytest.mark.slow
 def test_touching_surfaces_do_not_make_a_picture_depend_on_its_passes() -> None:
     # The foot of the ball touches the floor: one camera ray of these 16 pixels hits both at the same distance.
     render = prepare(Request(EXAMPLES / "shader-ball", size=(200, 150), spp=96)).render

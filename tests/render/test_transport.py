@@ -121,6 +121,7 @@ def test_particles_see_bent_normals_and_rough_glass_as_paths_do() -> None:
     assert sigmas(pictures(drawn, "path", 64, depth=7), pictures(drawn, "light", 256, depth=7)) < 6
 
 
+@pytest.mark.slow
 def test_particles_enter_rough_glass_beside_bent_normals_as_paths_do() -> None:
     """Once and not out again: a factor of the index that is wrong both ways shows on no closed ball."""
     rough = {"type": "roughdielectric", "alpha": 0.5, "distribution": "ggx"}
@@ -128,6 +129,7 @@ def test_particles_enter_rough_glass_beside_bent_normals_as_paths_do() -> None:
     agree(pictures(drawn, "path", 256, 6), pictures(drawn, "light", 1024, 6))
 
 
+@pytest.mark.slow
 def test_particles_behind_a_thin_lens_are_not_seen() -> None:
     film = {"type": "hdrfilm", "width": 20, "height": 20, "rfilter": {"type": "box"}}
     eye = T().look_at([0, 1.5, 4], [0, 0, 0], [0, 1, 0])
@@ -218,6 +220,7 @@ def test_caustics_by_wavelength_are_those_of_particles() -> None:
     assert path[focus].mean() != pytest.approx(light[focus].mean(), rel=0.05), "paths would do"
 
 
+@pytest.mark.slow
 def test_caustics_by_wavelength_cut_into_passes_change_no_bit() -> None:
     with engine.using("llvm_ad_spectral"):
         drawn = scene({"lamp": LAMP}, GLASS, size=16)

@@ -160,6 +160,7 @@ def test_pictures_of_unpolarized_light_are_those_of_the_plain_variant(polarized:
     np.testing.assert_allclose(pictures[1], pictures[0], rtol=1e-3, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_metals_in_spectral_variants_are_mitsubas_measurements_over_the_whole_range() -> None:
     """And how far the three numbers of the preset are from them, for which `Variant.measured` has the figures."""
     mi.set_variant("llvm_ad_spectral")
@@ -186,7 +187,7 @@ def _reflectance(eta: np.ndarray, k: np.ndarray) -> np.ndarray:
     return ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["preset", "numbers"])
 def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values(by: str) -> None:
     """Mitsuba would turn numbers into a reflectance, of 1 at most."""
@@ -202,12 +203,14 @@ def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values(by: s
     assert weight == pytest.approx([*titanium, titanium[0]], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_negative_fitted_figures_are_one_clear_error_in_spectral_variants() -> None:
     mi.set_variant("llvm_ad_spectral")
     with pytest.raises(RuntimeError, match="a negative color has no spectrum"):
         mi.load_dict({"type": "gonio_shifted_gamma", "preset": "brass"})
 
 
+@pytest.mark.slow
 def test_a_colour_in_mono_is_its_luminance() -> None:
     mi.set_variant("llvm_ad_mono")
     bsdf = mi.load_dict({"type": "gonio_lambert", "albedo": rgb(0.2, 0.9, 0.4)})
@@ -215,6 +218,7 @@ def test_a_colour_in_mono_is_its_luminance() -> None:
     assert reflectance == pytest.approx(float(mi.luminance(mi.Color3f(0.2, 0.9, 0.4))[0]), rel=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SCALAR)
 def test_scalar_variants_are_one_clear_error(name: str) -> None:
     mi.set_variant(name)

@@ -243,6 +243,7 @@ def test_adoption_of_no_file_says_so(capsys: pytest.CaptureFixture[str]) -> None
 # ---------------------------------------------------------------------- several, of which one cannot be read
 
 
+@pytest.mark.slow
 def test_others_are_judged_where_one_shader_cannot_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

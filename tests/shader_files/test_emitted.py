@@ -57,6 +57,7 @@ SLOW = [*(("nested", one) for one in ("wgsl", "glsl", "hlsl")), ("compensated", 
 QUICK = [(name, language) for name in NESTED for language in ("wgsl", "glsl", "hlsl") if (name, language) not in SLOW]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("name", "language"), [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW)])
 def test_folder_read_again_has_the_values_of_its_material(name: str, language: str, tmp_path: Path) -> None:
     needs_compiler(language)
@@ -92,6 +93,7 @@ def test_parameters_have_the_kinds_ranges_and_values_of_the_material(tmp_path: P
     np.testing.assert_allclose(other.eval(wo, wi, precision="float64"), expected, rtol=3e-6)
 
 
+@pytest.mark.slow
 def test_value_on_which_tables_depend_is_no_parameter(tmp_path: Path) -> None:
     made = bundle(go.material("coat(base=oren-nayar)"), "wgsl")
     fixed = [one["path"] for one in made.manifest["parameters"] if one["fixed"] and one["field"]]

@@ -69,6 +69,7 @@ def checkout(folder: Path, latest: bool) -> Path:
     return folder
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("latest", [False, True])
 def test_light_compute_of_a_checkout_is_the_material(tmp_path: Path, latest: bool) -> None:
     written = shaders.adopt_package(checkout(tmp_path / "godot", latest), tmp_path / "out")

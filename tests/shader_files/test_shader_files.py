@@ -287,6 +287,7 @@ def energy_of(file: str) -> Verdict:
     return go.verify(go.Shader(file), law="energy", quick=True).cards[0].verdicts[0]
 
 
+@pytest.mark.slow
 def test_loss_is_judged_where_the_adapter_means_none(tmp_path: Path) -> None:
     range_ = "function = 'brdf'\n[parameters.share]\ndefault = 0.5\nlow = 0.5\nhigh = 0.5\n"
     for name, claim, status in (("silent", "", "pass"), ("lossy", "lossless_tolerance = 0.1\n", "fail")):
@@ -296,6 +297,7 @@ def test_loss_is_judged_where_the_adapter_means_none(tmp_path: Path) -> None:
     assert any("loses 0.5000 at 0 degrees, more than the claimed 0.1" in one for one in energy_of(file).why)
 
 
+@pytest.mark.slow
 def test_claim_of_a_shader_that_is_black_at_its_given_values_fails(tmp_path: Path) -> None:
     file = written(tmp_path, "black.glsl", "vec3 brdf(vec3 L, vec3 V, float weight) { return vec3(weight); }")
     adapter = "function = 'brdf'\nlossless_tolerance = 0.1\n[parameters.weight]\ndefault = 0\nlow = 0\nhigh = 0\n"
@@ -337,6 +339,7 @@ vec3 brdf(vec3 L, vec3 V) { return vec3((1.0 - metal * (1.0 - metal)) / 3.141592
 """
 
 
+@pytest.mark.slow
 def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
     file = written(tmp_path, "mixed.glsl", MIXED)
     adapter = "function = 'brdf'\nlossless_tolerance = 0.02\n[parameters.metal]\ndefault = 0.5\nlow = 0.0\nhigh = 1.0\n"

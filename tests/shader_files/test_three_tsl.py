@@ -128,6 +128,7 @@ def test_javascript_runs_only_if_asked_for(package: Path, tmp_path: Path) -> Non
 WRITES = "import { writeFileSync } from 'node:fs';\nwriteFileSync(new URL('../made', import.meta.url), '');\n"
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

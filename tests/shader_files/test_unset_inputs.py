@@ -122,6 +122,7 @@ REFUSED = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("what", REFUSED)
 def test_an_input_without_a_value_is_refused_by_name_and_line(tmp_path: Path, what: str) -> None:
     suffix, text = REFUSED[what]

@@ -37,7 +37,7 @@ def test_the_arguments_are_those_that_the_tables_need(baked: Baked, head: str, t
     assert _glslang(made["hlsl"].text, tmp_path) == ""
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_folder_of_tables_holds_the_code(tmp_path: Path) -> None:
     with pytest.raises(SystemExit) as done:
         cli.main(["bake", "lambert", "--lut", "ltc", "--resolution", "4", "-o", str(tmp_path)])

@@ -47,6 +47,7 @@ class Striped(go.BSDF):
         return self.albedo * (value * maximum(wi.z, 0.0))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("language", DECLARED)
 def test_numbered_constants_are_an_array(language: str) -> None:
     text = go.emit(go.KullaConty(GOLD), language)
@@ -63,6 +64,7 @@ def test_the_page_may_have_them_one_by_one() -> None:
     assert {"name": "missing_c", "type": "float[11]"} in fields
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("arrays", [True, False])
 def test_both_forms_have_the_values_of_the_material(language: str, arrays: bool) -> None:

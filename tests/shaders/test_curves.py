@@ -42,6 +42,7 @@ def test_the_split_sum_is_fitted_within_its_bound() -> None:
     assert np.max(np.abs(value.T - table["dfg"].reshape(-1, 2))) < 1.5 * curve.error
 
 
+@pytest.mark.slow
 def test_a_material_without_roughness_has_curves_of_the_cosine() -> None:
     made, lines = curves.fitted(go.OrenNayar(sigma=0.5), "3", "glsl")
     assert "float albedo(float cos_theta) {" in made.text and "// average_albedo = 0.4" in made.text
@@ -63,7 +64,7 @@ def test_fits_and_split_sums_compile(tmp_path: Path) -> None:
     assert [_glslang(text, tmp_path) for text in texts] == ["", ""]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_budget_chooses_the_most_exact_form() -> None:
     made, found = tiers.split_sum(GOLD, "glsl", budget=30)
     assert found[0].name == "a fit of order 2/0" and found[0].cost <= 30 and not made.tables
@@ -81,6 +82,7 @@ def test_a_budget_chooses_cheaper_terms_of_a_material() -> None:
         tiers.cheapest(GOLD, 20)
 
 
+@pytest.mark.slow
 def test_the_error_of_cheaper_glass_is_that_of_transmission_too() -> None:
     model, found = tiers.cheapest(go.Dielectric(1.5, 0.3), 300)
     assert model.masking == "smith-separable" and found[0].cost < 0.5 * found[1].cost

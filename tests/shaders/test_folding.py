@@ -31,6 +31,7 @@ def total(made: go.shaders.Bundle, function: str) -> int:
 COMPILED = [pytest.param(one, marks=pytest.mark.slow) for one in ("glsl", "hlsl")]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("language", ["wgsl", *COMPILED])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_folded_code_has_the_values_of_its_material_by_fewer_operations(

@@ -48,6 +48,7 @@ def test_the_stated_error_is_that_of_rounded_parameters() -> None:
     assert stated["tables"] is None and set(stated["parameters"]) == {"eta", "k", "alpha", "albedo"}
 
 
+@pytest.mark.slow
 def test_header_and_manifest_state_the_same(tmp_path: Path) -> None:
     made = half([go.KullaConty(GOLD), go.Lambert()])
     head = re.sub(r"\s*\n// ", " ", made.text.partition("\n\n")[0])

@@ -75,6 +75,7 @@ def test_a_table_gives_its_values_in_glsl(page: Any, kind: str, tmp_path: Path) 
     _check(page, "glsl", go.Measured(str(path)))
 
 
+@pytest.mark.slow
 def test_a_published_file_gives_its_values_in_glsl(page: Any, shared: Path) -> None:
     _check(page, "glsl", go.Measured(f"{shared}/data/rgl/cc_ibiza_sunset_rgb.bsdf"))
 

@@ -62,6 +62,7 @@ def test_a_package_adds_a_language_by_one_file(packages: Path, tmp_path: Path) -
     assert compiled.returncode == 0, compiled.stdout
 
 
+@pytest.mark.slow
 def test_its_name_is_known_where_another_is_misspelt(packages: Path) -> None:
     done = outside.gonio(packages, "emit", "lambert", "--lang", "vulkan-glls")
     assert done.returncode == 2 and "did you mean 'vulkan-glsl'?" in done.stderr

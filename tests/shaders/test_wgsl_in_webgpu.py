@@ -124,6 +124,7 @@ def page() -> Iterator[Any]:
         yield opened
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FILES)
 def test_file_has_the_values_of_webgpu(page: Any, name: str, tmp_path: Path) -> None:
     file = tmp_path / "shader.wgsl"

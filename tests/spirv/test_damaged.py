@@ -91,6 +91,7 @@ def test_meanings_that_a_function_is_not_given(tmp_path: Path) -> None:
         _shader(tmp_path, _module())
 
 
+@pytest.mark.slow
 def test_a_variable_that_is_stored_into_its_parts_stays_bounded() -> None:
     def change(code: Words) -> None:
         pointer, part, integer = 60, 65, 66

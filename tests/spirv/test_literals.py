@@ -76,6 +76,7 @@ def test_shader_includes_text_from_javascript(tmp_path: Path) -> None:
         compile_text("#include <two> twice\n", "x.glsl", folders=[tmp_path])
 
 
+@pytest.mark.slow
 def test_include_repeats_a_text_per_index_and_renames(tmp_path: Path) -> None:
     """As Babylon.js does: {X} stands for the index."""
     try:

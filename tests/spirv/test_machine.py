@@ -209,6 +209,7 @@ def test_signs_are_read_and_written_as_bits(tmp_path: Path, formula: str) -> Non
     np.testing.assert_allclose(values, 2.0 + SIGNS[formula](wi[:, 0], wo[:, 1]), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_powers_of_negative_numbers_are_nan_in_the_emitted_text_too(tmp_path: Path) -> None:
     (tmp_path / "a.glsl").write_text("float brdf(vec3 L, vec3 V) { return 0.1 + pow(L.x, 2.0) + pow(L.x, -0.5); }")
     material = go.Shader(str(tmp_path / "a.glsl"))
@@ -221,6 +222,7 @@ def test_powers_of_negative_numbers_are_nan_in_the_emitted_text_too(tmp_path: Pa
         np.testing.assert_allclose(values[:, 0], expected, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_nested_loops_of_known_length_are_counted_apart() -> None:
     text = "float f(float x) { float s = 0.0; for (int i = 0; i < %d; ++i) for (int j = 0; j < %d; ++j) %s return s; }"
     np.testing.assert_allclose(value(text % (70, 70, "s += x;")), 4900 * X, rtol=1e-12)

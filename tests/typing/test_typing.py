@@ -44,6 +44,7 @@ def test_every_public_name_is_used_by_that_program():
     assert [name for name in go.__all__ if not re.search(rf"\b(go\.{name}|import {name})\b", text)] == []
 
 
+@pytest.mark.slow
 def test_each_mistake_is_reported_by_its_rule():
     lines = (HERE / "mistakes.py").read_text().splitlines()
     expected = {

@@ -158,6 +158,7 @@ class EncodedUnderVarnish(RightDiffuse):
         return both * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("mistake", "law", "words"),
     [
@@ -212,7 +213,7 @@ class NarrowPdf(RightFacets):
         return s._replace(pdf=where(s.pdf > 0.0, self.pdf(wo, s.wi), 0.0))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
@@ -420,13 +421,16 @@ SIXTH: list[tuple[str, str, str]] = [
     ("w2_smooth_glass.W2GlassWeekend", "delta", "Schlick's curve of the angle there"),
     ("w2_panes.W2PaneOneWay", "delta", "a tint of one direction only"),
     ("w2_panes.W2MirrorOneAxis", "delta", "keeps y of wo"),
+    ("w1_microfacet.W1VisibleFullDisk", "pdf", "normals that wo does not see are drawn"),
+    ("w2_plugins_a.W2PluginFrosted", "pdf", "samples have the density of visible normals"),
+    ("w3_engines.W3HalfFloat", "pdf", "rounded to 11 bits"),
     ("w1_corners.W1FlooredPdf", "weight", "clamped to at least 0.1"),
     ("w1_corners.W1SoftTerminator", "reciprocity", "g(wo) / g(wi)"),
     ("w1_diffuse.W1OrenNegative", "positivity", "with azimuths that differ by more than 90"),
 ]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "law", "words"), SIXTH, ids=[name.partition(".")[2] for name, _, _ in SIXTH])
 def test_causes_of_the_sixth_examiners(name: str, law: str, words: str) -> None:
     module = cases(f"sixth.{name.partition('.')[0]}")

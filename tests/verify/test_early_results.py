@@ -29,6 +29,7 @@ def test_laws_of_one_card_are_told_in_order_before_the_report(bright: str) -> No
     assert [one.status for one in report.cards[0].verdicts] == ["pass", "fail", "pass"]
 
 
+@pytest.mark.slow
 def test_several_cards_are_told_one_by_one(bright: str) -> None:
     told: list[str] = []
     trial(Task([Item("lambert"), Item(bright)], "quick", 1, ["energy"]), tell=told.append)

@@ -134,6 +134,7 @@ class Random(go.Lambert):
         return s._replace(weight=weight, pdf=pdf)
 
 
+@pytest.mark.slow
 def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
     found = verify(Random(0.5), quick=True)
     assert found.passed, str(found)

@@ -75,6 +75,7 @@ def test_a_sound_material_has_no_bias(sound: type) -> None:
     assert bias.grade is Grade.INVISIBLE and bias.average < 3e-4
 
 
+@pytest.mark.slow
 def test_brighter_eval_than_weight() -> None:
     bias = sampling(Brighter())
     assert bias.average == pytest.approx(0.05 / 1.05, rel=0.02) and bias.kind == "lost"
@@ -89,6 +90,7 @@ def test_the_fault_is_told_apart_by_weights_and_pdf() -> None:
     assert sampling(HalfVectorPdf(), "pdf").average > 0.5 and sampling(HalfVectorPdf(), "weights").average < 1e-3
 
 
+@pytest.mark.slow
 def test_half_a_hemisphere_loses_half_where_only_samples_are_followed() -> None:
     bias = sampling(HalfTheHemisphere())
     assert bias.average == pytest.approx(0.5, abs=0.01) and bias.kind == "lost"
@@ -105,6 +107,7 @@ def test_the_lobes_probability() -> None:
     assert np.allclose(found.value, 0.8, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_weights_without_bound_are_noise() -> None:
     # E[eval / pdf of the lobe picked] is int eval: nothing is lost, but the narrow lobe's weights go as cos^-19
     bias = sampling(NoLobeProbability(), "weights")
@@ -118,6 +121,7 @@ def test_reciprocity_has_its_closed_form() -> None:
     assert bias.worst == pytest.approx(1.0 - 1.5 * np.cos(np.radians(89.5)), rel=0.01) and bias.kind == "bias"
 
 
+@pytest.mark.slow
 def test_gain_and_loss_of_the_furnace() -> None:
     verdict = verify(OnePercentMore(), quick=True, law=["energy"])["energy"]
     assert verdict.bias is not None and verdict.bias.kind == "gained"
@@ -128,6 +132,7 @@ def test_gain_and_loss_of_the_furnace() -> None:
     assert grazing is not None and grazing.worst > 1.0 and "89.5 degrees" in grazing.where
 
 
+@pytest.mark.slow
 def test_mass_of_the_pdf_where_no_sample_falls_is_noise() -> None:
     bias = sampling(PdfBelow(), "pdf")
     assert bias.grade is Grade.INVISIBLE
@@ -171,11 +176,13 @@ def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     assert "FAIL visible" in text and "in a picture" in text and "follows from WEIGHT's" in text
 
 
+@pytest.mark.slow
 def test_a_declared_breach_is_graded_too() -> None:
     verdict = verify(go.Phong(), law=["reciprocity"])["reciprocity"]
     assert verdict.status == "breaks as declared" and verdict.grade is not None
 
 
+@pytest.mark.slow
 def test_what_is_held_is_judged_alone() -> None:
     verdict = verify(go.mix(go.Lambert(), NoCosine(), 0.5), quick=True, law=["reciprocity"])["reciprocity"]
     assert verdict.failed and verdict.grade is Grade.INNER and "around a sound one it holds" in verdict.cause

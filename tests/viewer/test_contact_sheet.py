@@ -165,6 +165,7 @@ def test_paths_and_values_that_do_not_fit_are_refused(text: str, words: str) -> 
     assert words in caught.value.what
 
 
+@pytest.mark.slow
 def test_a_material_is_studied_on_a_ball(tmp_path: Path) -> None:
     """By text or as an object, with values of its own, of materials inside, tied ones, and of the scene around it."""
     vary = {"p": [4, 16], ("kd", "ks"): [(0.2, 0.8), (0.5, 0.5)]}

@@ -65,6 +65,7 @@ def test_a_slider_switches_a_layer_on(chrome: Any, tmp_path: Path) -> None:
     tab.close()
 
 
+@pytest.mark.slow
 def test_a_server_writes_the_layers_that_are_on() -> None:
     wish = {"type": "choice", "material": "m0", "choices": {}}
     with running(stage.of_models([go.model("disney2015")()])) as one, speak(one) as client:

@@ -92,6 +92,7 @@ def test_image_slices_stand_side_by_side() -> None:
     assert metal[90, 2].min() > metal[90, 90].max()  # the highlight is at the left
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", [kind for kind in plots.KINDS if kind != "image"])
 def test_materials_are_laid_over_each_other(kind: str, tmp_path: Path) -> None:
     gold = go.Conductor.preset("Au", alpha=0.3)

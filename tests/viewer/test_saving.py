@@ -117,7 +117,7 @@ def test_old_classes_go(file: Path) -> None:
     assert sum(cls() is not None for cls in made) <= 1
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", list(BROKEN))
 def test_an_error_names_file_line_and_remedy(file: Path, name: str) -> None:
     before, after, where, what, hint = BROKEN[name]
@@ -171,6 +171,7 @@ def until(client: Any, kind: str) -> dict[str, Any]:
             client.send(json.dumps({"type": "ack", "frame": header["frame"]}))
 
 
+@pytest.mark.slow
 def test_the_reference_is_of_the_file_that_was_saved_last(file: Path) -> None:
     with running(shown(file)) as one, speak(one) as client:
         client.send(request(1, 0))

@@ -127,6 +127,7 @@ def test_the_newest_scene_wins(one: server.Server) -> None:
             next_frame(client, timeout=0.3)  # nothing of the older ones follows
 
 
+@pytest.mark.slow
 def test_a_variant_comes_when_it_is_asked_for(one: server.Server) -> None:
     with running(stage.of_models([go.Conductor(alpha=0.2)])) as other, speak(other) as client:
         client.send(json.dumps({"type": "choice", "id": 3, "material": "m0", "choices": {"ndf": "beckmann"}}))
@@ -217,6 +218,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", list(BAD))
 def test_a_bad_message_gets_one_error_and_the_session_lives(one: server.Server, name: str) -> None:
     with speak(one) as client:

@@ -493,6 +493,7 @@ def test_what_is_not_shown_is_told_at_once(chrome: Any, tmp_path: Path) -> None:
     tab.close()
 
 
+@pytest.mark.slow
 def test_a_figure_in_a_closed_part_of_a_document_has_its_picture_before_it_is_opened(
     chrome: Any, homework_file: Path
 ) -> None:

@@ -78,6 +78,7 @@ def step(w: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.nextafter(w32, w32 + rng.choice(np.float32([-1, 1]), w.shape), dtype=np.float32).astype(float)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("slot", range(len(MODELS)))
 def test_evaluator_agrees_with_python(opened: Opened, slot: int) -> None:
     rng = np.random.default_rng(1)

@@ -121,6 +121,7 @@ def test_under_even_light_the_split_sum_is_exact(lit: Page) -> None:
         assert abs(difference[ball][:, :3].mean()) < 0.01 * full[ball][:, :3].mean()
 
 
+@pytest.mark.slow
 def test_what_has_no_lobe_about_the_mirrored_direction_is_sampled(lit: Page) -> None:
     """A diffuse ball looks up where its normal points, not where it mirrors: the split sum would be wrong there."""
     lit.set("s.solo = 2")

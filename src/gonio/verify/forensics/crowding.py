@@ -29,6 +29,7 @@ BLOCK = 10  # rows and columns of cells per block: differences stand out from no
 FULL = 25.0  # least expectation of a block
 EFFECT = 0.02  # root mean square of the relative difference of samples and expectation, below which they agree
 KNOWN = 0.004  # tolerance of a known number; 2^17 samples determine a scale to a third of a percent
+DRAWN, LOST = 1 << 14, 0.02  # samples, and the accuracy of the share of them that fail
 BEFORE = 0.08  # smallest difference whose cause is determined
 
 
@@ -99,7 +100,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
     """The factor between samples and pdf; None if none fits. Arguments as of `mixture.named`."""
     light = estimators.of_subject(subject)
     total = float(held.observed.sum())
-    for formula, guess, field in _factors(subject):
+    for formula, guess, field, of_wo in _factors(subject):
         weighed = held.expected * field(np.broadcast_to(held.wo, held.wi.shape), held.wi)
         expected = held.joined(np.nan_to_num(weighed, posinf=0.0, neginf=0.0))
         inside = float(expected.sum())
@@ -115,6 +116,9 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
                 continue
         if left > EFFECT or left > 0.1 * before:
             continue
+        if of_wo:
+            words = f"samples over pdf are {formula} times a number of wo, within {max(left, 1e-3):.0e}"
+            return Cause(f"{words}: {guess}?", f"samples {guess}")
         text = written(scale, KNOWN)
         text = text if text in NUMBERS else f"{scale:.3g}"
         plain = abs(scale - 1.0) < 0.01
@@ -123,8 +127,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         known = NUMBERS.get(text, 1.0 if plain else scale)
         if not _normalizes(subject, light, field, known):
             if formula == "1":
-                agree = f"samples over pdf are {scale:.3g} for all wi, and another number for other wo"
-                return Cause(f"{agree}: the probability of choosing a lobe?", "samples a number of wo")
+                return _number_of_wo(subject, held, scale)
             continue
         result = formula if plain else text if formula == "1" else f"{text} times {formula}"
         if text.startswith("1 / ") and formula.startswith("1 / "):
@@ -132,6 +135,19 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         agree = f"samples over pdf are {result}, within {max(left, 1e-3):.0e} in the cells and in int pdf for all wo"
         return Cause(f"{agree}: {guess}?", f"samples {result}")
     return _sides(held)
+
+
+def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
+    """What samples may do that have the pdf's distribution, but not its amount, which differs from wo to wo."""
+    agree = f"samples over pdf are {scale:.3g} for all wi, and another number for other wo"
+    u = directions.numbers(np.random.default_rng(46), DRAWN)
+    s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
+    failed, lacking = float(np.mean(~(s.pdf > 0.0))), 1.0 - float(held.expected.sum()) / held.drawn
+    if failed > max(lacking, 0.0) + LOST and not s.delta.any():
+        share = f"{failed:.0%} of the samples fail, where the pdf lacks {max(lacking, 0.0):.0%}"
+        guess = "normals that wo does not see are drawn, or directions below the horizon"
+        return Cause(f"{agree}: {share}: {guess}?", "samples that fail")
+    return Cause(f"{agree}: the probability of choosing a lobe?", "samples a number of wo")
 
 
 def _normalizes(subject: Subject, light: estimators.Estimates, field: Field, scale: float) -> bool:
@@ -199,6 +215,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
         yield Factor(f"those of {text}", guess, functools.partial(over_pdf, value=other.pdf))
     if not subject.transmits:
         yield from factors.distributions(subject)
+    yield from factors.normals(subject)
 
 
 def unsampled(subject: Subject) -> str:

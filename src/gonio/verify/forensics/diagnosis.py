@@ -86,7 +86,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if verdict.grade is Grade.NAN:
             infinite = True
             nan = nan or (verdict.bias is not None and verdict.bias.average > 0.0)
-        if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE):
+        if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE, Grade.INTERFACE):
             visible.add(law.name)
         if leader is not None:
             verdict.cause = f"follows from {leader.upper()}'s"

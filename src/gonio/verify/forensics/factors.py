@@ -21,11 +21,12 @@ Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of (wo, wi)
 
 
 class Factor(NamedTuple):
-    """A factor: its formula, the mistake that it suggests, and its values."""
+    """A factor: its formula, the mistake that it suggests, its values; `of_wo`: known but for a number for each wo."""
 
     formula: str
     guess: str
     field: Field
+    of_wo: bool = False
 
 
 class Cosine(NamedTuple):
@@ -140,6 +141,22 @@ def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence
                     return np.where(through, _across(o, eta) ** float(power), 1.0)
 
                 yield Factor(f"{product('', {'eta': power})} in transmission{place}", guess, field)
+
+
+def normals(subject: Subject) -> Iterator[Factor]:
+    """The density of visible normals over that of all normals, but for the masking of wo, and the reverse."""
+    visible, all_ = "visible normals", "all normals"
+    for eta in [*index_below(subject)] or [1.0]:
+        for power, drawn, stated in ((1.0, visible, all_), (-1.0, all_, visible)):
+
+            def field(o: np.ndarray, i: np.ndarray, eta: float = eta, power: float = power) -> np.ndarray:
+                m = half_vector(o, i, np.where(o[:, 2] * i[:, 2] < 0.0, _across(o, eta), 1.0))
+                above, below = values_of(("(o.m)", "cos_m"), o, i, m).T
+                return np.asarray((above / below) ** power)
+
+            formula = product("", {"(o.m)": int(power), "cos_m": -int(power)})
+            guess = f"samples have the density of {drawn}, and the pdf is that of {stated}"
+            yield Factor(formula, guess, field, of_wo=True)
 
 
 def refractions(subject: Subject) -> Iterator[Factor]:

@@ -14,7 +14,7 @@ from ...ops import Mode, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
-from ..forensics import channels, gains, losses
+from ..forensics import channels, gains, losses, rounded
 from ..forensics.causes import place_of
 from ..forensics.masking import mismatch
 from ..forensics.ratio import SPREAD, Cause, factor_key, written
@@ -124,6 +124,9 @@ class Energy(Law):
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
         there = where_found(subject, finding)
+        steps = rounded.named(there) if there.has_density and not there.stochastic else None
+        if steps is not None:
+            yield steps
         mix = channels.mixed(there, *pairs(there, 4096, seed)) if there.has_density else None
         if mix is not None and not _gains_in_gray(there, curves, effort, seed):
             yield mix

@@ -13,7 +13,7 @@ from .. import directions, estimators, histogram, severity
 from ..cells import place
 from ..effort import Effort
 from ..figures import SampleCells
-from ..forensics import crowding, misplaced, mixture
+from ..forensics import crowding, misplaced, mixture, rounded
 from ..forensics.causes import nothing_below
 from ..forensics.ratio import Cause
 from ..subject import Subject
@@ -111,6 +111,9 @@ class Pdf(Law):
             yield unsampled
         if there.stochastic or not isinstance(finding.evidence, SampleCells):
             return
+        steps = rounded.named(there)
+        if steps is not None:
+            yield steps
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are equal
         views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
         oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
