@@ -152,6 +152,7 @@ def test_a_broken_package_costs_a_warning(package: Path) -> None:
     assert done.returncode == 0 and "sheen_package:sheen is ignored: ModuleNotFoundError" in done.stderr
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("line", "offered"),
     [

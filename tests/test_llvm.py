@@ -223,6 +223,7 @@ def test_dr_jit_without_any_llvm_is_one_error_whose_hint_is_true() -> None:
     assert _python("import gonio.mitsuba, drjit").returncode == 0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("begun", [
     "x = dr.llvm.Float(1, 2, 3) + 1; dr.eval(x)",
     "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); bsdf = mi.load_dict({'type': 'null'})",

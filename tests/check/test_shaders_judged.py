@@ -29,6 +29,7 @@ def test_a_shader_is_judged_by_itself_or_by_its_adapter(tmp_path: Path, capsys: 
     assert "name the model once" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_function_of_a_shader_may_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.glsl"
     other = BRDF.replace("BRDF(", "paint(").replace("FACTOR", "3.14159265").replace("uniform float albedo;", "")

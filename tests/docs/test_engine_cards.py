@@ -22,6 +22,7 @@ PACKAGES = {engine.page: package for package, engine in engines().items()}
 ROW = re.compile(r"^(.*), roughness ([\d.]+), n\.v ([\d.]+): ([\d.]+)$", re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_pages_are_made_of_the_stored_figures() -> None:
     done = subprocess.run([sys.executable, DOCS / "make_engine_cards.py", "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -64,6 +64,7 @@ def test_the_index_has_a_row_for_each_folder() -> None:
     assert all(folder == link and (EXAMPLES / picture).exists() for folder, picture, link in rows)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_its_commands_are_ones(folder: Path) -> None:
     """Verbs, options, scenes and the paths of `--vary` are there."""

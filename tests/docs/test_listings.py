@@ -78,7 +78,7 @@ def _scripts() -> set[str]:
     return {option for file in files for option in re.findall(r'"(--[a-z-]+)"', file.read_text(encoding="utf-8"))}
 
 
-@pytest.mark.sample(40)
+@pytest.mark.sample(25)
 @pytest.mark.parametrize("page", HAND, ids=pages.name)
 def test_every_command_has_its_verb_and_its_options(page: Path) -> None:
     group = _group()

@@ -44,6 +44,7 @@ def test_errors_of_a_file_are_those_of_its_noise_and_of_the_best_start(program: 
     assert list(program.errors.rows_of([paint], MODELS, again, 500, 2)) == again
 
 
+@pytest.mark.slow
 def test_a_page_has_a_sheet_of_each_file_and_says_what_is_negative(
     program: ModuleType, paint: Path, tmp_path: Path
 ) -> None:

@@ -302,6 +302,7 @@ def test_a_folder_that_cannot_be_written_is_one_clear_error():
         tables.bake("ggx", "/proc/tables", resolution=4)
 
 
+@pytest.mark.slow
 def test_a_public_solutions_pictures_agree_with_the_exact_table(shared):
     reference = shared / "reference" / "kulla-conty"
     centres = (np.arange(128) + 0.5) / 128
@@ -315,6 +316,7 @@ def test_a_public_solutions_pictures_agree_with_the_exact_table(shared):
     assert np.abs(average - ours)[centres[::-1] >= 0.3].max() < 0.007
 
 
+@pytest.mark.slow
 def test_the_homeworks_pictures_follow_half_of_alpha_and_not_its_text(shared):
     """The table of docs/energy.md, in grey levels of 255; values are rounded down, as theirs are."""
     reference, centres = shared / "reference" / "kulla-conty", (np.arange(128) + 0.5) / 128

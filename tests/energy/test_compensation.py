@@ -270,6 +270,7 @@ def test_fdez_aguera_adds_a_diffuse_lobe_of_its_own_formula():
     np.testing.assert_allclose(added[0], float(expected), rtol=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("base", "bar"),
     [(go.Conductor(alpha=0.8, fresnel="one"), 1.5), (go.Dielectric(1.5, 0.5), 1.5), (go.OrenNayar(1.0, 0.5), 3.0)],

@@ -36,7 +36,7 @@ def test_lambert_is_a_cosine_itself() -> None:
     assert baked.manifest["error"]["ltc_inverse"]["max"] < 1e-5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_gold_keeps_its_albedo_and_its_lobe() -> None:
     gold = go.Conductor.preset("Au")
     baked = ltc.bake(gold, 6)

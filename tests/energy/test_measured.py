@@ -39,7 +39,7 @@ WHITE = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", WHITE)
 def test_the_furnace_is_closed_for_any_base_that_only_reflects(name):
     base = WHITE[name]
@@ -72,6 +72,7 @@ def test_the_brightest_channel_of_a_material_without_shares_is_its_white():
     assert np.all(np.diff(found, axis=1) < -0.1)  # the others stay darker
 
 
+@pytest.mark.slow
 def test_where_a_base_gains_nothing_is_added():
     bright = go.Phong(1.0, 0.0)  # returns pi
     np.testing.assert_array_equal(go.KullaConty(bright).eval(WO, WI), bright.eval(WO, WI))

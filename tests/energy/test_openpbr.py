@@ -92,6 +92,7 @@ def test_metal_alone_is_the_metal_of_f82_with_what_it_scatters_twice() -> None:
     )
 
 
+@pytest.mark.slow
 def test_glass_alone_is_the_dielectric_with_what_it_scatters_twice() -> None:
     model = go.OpenPBR(transmission_weight=1.0, specular_roughness=0.6)
     expected = go.KullaConty(go.Dielectric(1.5, alpha=0.36))
@@ -144,6 +145,7 @@ def test_a_film_colours_what_is_reflected_and_its_opposite_what_goes_through() -
     assert np.ptp(mirrored) > 0.01 * mirrored.mean()
 
 
+@pytest.mark.slow
 def test_a_coat_of_depth_tints_more_where_light_grazes() -> None:
     base = {"coat_weight": 1.0, "coat_ior": 1.5, "coat_roughness": 0.3, "specular_weight": 0.0}
     tinted = go.OpenPBR(**base, coat_color=(0.5, 0.7, 0.9), coat_darkening=0.0)

@@ -124,7 +124,7 @@ def test_two_widths_agree_with_one_where_equal_and_with_sampling_where_not():
     assert abs(found.value - drawn.value).max() < 5 * drawn.error.max()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ndf", "masking"), [("ggx", "smith-correlated"), ("ggx", "smith-separable"), ("beckmann", "smith-correlated")]
 )

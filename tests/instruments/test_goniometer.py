@@ -33,7 +33,7 @@ def values(table: Measurement) -> np.ndarray:
 # ---------------------------------------------------------------------- light is counted
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "surface", ["gaussian:alpha=1,squares=64", "vgroove:sigma=.6", "spheres:coverage=.1", "heights.exr"]
 )
@@ -49,6 +49,7 @@ def test_mirrors_return_all_light_from_any_side(surface: str, tmp_path: Path, mo
         assert lost < 2e-3 and 0.0 < later < 1.0
 
 
+@pytest.mark.slow
 def test_a_turned_start_of_the_period_changes_nothing() -> None:
     heights = np.random.default_rng(4).standard_normal((24, 24))
     found = []
@@ -74,6 +75,7 @@ class _Map:
         return of_heights(self.heights)
 
 
+@pytest.mark.slow
 def test_a_facet_s_albedo_counts_at_every_bounce() -> None:
     kept = {}
     for albedo in (1.0, 0.5):
@@ -290,6 +292,7 @@ def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None
     assert kept or any("no place for standard errors" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_gonio_files_keep_errors_and_info_tells_of_them(tmp_path: Path) -> None:
     path = tmp_path / "a.gonio"
     found = go.measure("lambert", path, table="samples", noise=0.1)

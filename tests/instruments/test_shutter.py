@@ -16,7 +16,7 @@ def ratios(errors: np.ndarray, noise: float, rng: np.random.Generator) -> list[R
     ]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("noise", [1e-4, 0.005, 0.1], ids=["sharp", "as large as the errors", "useless"])
 @pytest.mark.parametrize("shares", [(0.0, 0.0, 1.0), (0.2, 0.3, 0.5)])
 def test_the_error_of_all_light_is_as_large_as_stated(noise: float, shares: tuple[float, ...]) -> None:

@@ -81,7 +81,7 @@ SMOOTH = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("material", SMOOTH, ids=lambda m: m.name)
 def test_a_guide_is_no_noisier_than_sampling_by_hand(material: go.BSDF) -> None:
     for degrees in (20.0, 65.0):

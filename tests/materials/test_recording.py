@@ -88,7 +88,7 @@ def test_recorded_graph_equals_the_model(name: str, method: str) -> None:
     _check(name, method)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("method", ["eval", "sample"])
 @pytest.mark.parametrize("name", each([name for name, m in {**SMALL, **COMPENSATED}.items() if m.transmits], QUICK))
 def test_recorded_graph_of_importance_equals_the_model(name: str, method: str) -> None:

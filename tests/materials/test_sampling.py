@@ -48,7 +48,7 @@ def _few_views(name: str) -> list[str]:
     return views if name in ROUND else [view for view in views if view in ("60", "inside")]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name, view", [(name, view) for name in QUICK for view in _few_views(name)])
 def test_samples_follow_the_density(name: str, view: str) -> None:
     p, integral, failed = _judge(QUICK[name], VIEWS[view])

@@ -127,6 +127,7 @@ def test_a_network_is_near_what_it_has_seen(network: Network) -> None:
     assert compare.difference(read(SAMPLE), network) < 0.1
 
 
+@pytest.mark.slow
 def test_a_network_is_recorded_as_it_is_computed(network: Network, folder: Path) -> None:
     model = go.Measured(str(folder / "network.gonio"))
     rng = np.random.default_rng(3)

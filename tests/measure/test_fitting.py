@@ -206,6 +206,7 @@ def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
     np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
+@pytest.mark.slow
 def test_parameters_that_are_held_stay() -> None:
     found = fit(table(METAL), "conductor(alpha=.25)", param={"k": METAL.k})
     assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")
@@ -259,6 +260,7 @@ def test_several_files_are_rows_and_a_bad_one_costs_only_its_own(tmp_path: Path)
     assert len(json.loads((tmp_path / "all.json").read_text())) == 3
 
 
+@pytest.mark.slow
 def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GONIO_CACHE", str(tmp_path / "cache"))
     for name in ("a", "b"):

@@ -55,7 +55,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return found
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", formats())
 def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, files: dict[str, Path]) -> None:
     sample, table = read(SAMPLE), read(files[name])
@@ -66,6 +66,7 @@ def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, fi
     assert said < {"astm": 0.2, "cornell": 0.2}.get(name, 0.05)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", formats())
 def test_a_second_writing_changes_nothing(name: str, files: dict[str, Path]) -> None:
     one = formats()[name]
@@ -164,6 +165,7 @@ def damaged(name: str, data: bytes) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", [*formats(), "networks"])
 def test_a_damaged_file_is_one_error(name: str, files: dict[str, Path], tmp_path: Path) -> None:
     one = Format.family.get(name)

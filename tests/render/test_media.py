@@ -70,6 +70,7 @@ def test_a_plate_absorbs_by_beer_and_lambert(tmp_path: Path, spectral: bool) -> 
     np.testing.assert_allclose(seen, expected, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_colours_above_one_absorb_by_wavelength_too(tmp_path: Path) -> None:
     rgb, spectral = (
         rendered(tmp_path, [slab(-0.5, 0.5, eta=1.3, absorption=[0.2, 0.3, 0.5])], spectral=s, spp=1024)
@@ -184,6 +185,7 @@ def test_the_order_of_priorities_decides_and_not_that_of_the_scene(tmp_path: Pat
     np.testing.assert_allclose(swapped, pictures[0], rtol=0.02)  # the same three surfaces, one of them elsewhere
 
 
+@pytest.mark.slow
 def test_the_same_glass_twice_in_one_place_is_once(tmp_path: Path) -> None:
     tinted = {"eta": 1.5, "absorption": [0.1, 0.2, 0.4]}
     one = rendered(tmp_path, [slab(-2, 2, **tinted)], spp=1024)

@@ -113,7 +113,7 @@ def test_a_closed_lamp_sends_the_same_whether_its_inner_side_shines(shape: str) 
     assert found[0] == pytest.approx(found[1], rel=2e-3)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_leaves_a_ball_inward_does_not_leave_it_outward(kind: str) -> None:
     """A particle begins a step off its surface, which leads out of one that is smaller, at the other side."""

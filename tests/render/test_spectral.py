@@ -182,7 +182,7 @@ def test_the_bows_of_water_are_where_descartes_has_them() -> None:
 # ---------------------------------------------------------------------- lamps
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "light",
     [
@@ -201,7 +201,7 @@ def test_a_lamp_looks_alike_in_rgb_and_by_its_spectrum(tmp_path: Path, light: di
     assert brightest == pytest.approx(light.get("scale", 1.0), rel=0.01), "beside the ball"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", ["a sky of no light", "a lamp of no power", "a lamp of 0 by its spectrum"])
 def test_what_is_dark_beside_a_lamp_takes_nothing_from_it(tmp_path: Path, dark: str) -> None:
     mi.Bitmap(np.zeros((4, 8, 3), np.float32)).write(str(tmp_path / "dark.exr"))
@@ -282,6 +282,7 @@ def test_a_render_leaves_the_variant_of_a_program_as_it_was() -> None:
         mi.set_variant("llvm_ad_rgb")
 
 
+@pytest.mark.slow
 def test_a_material_is_shown_on_a_ball_by_wavelengths_too() -> None:
     glass = go.Dielectric(eta="sf11", alpha=0.05)
     pictures = [np.asarray(go.render(glass, spp=64, size=(24, 24), spectral=s), float) for s in (False, True)]

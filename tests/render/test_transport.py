@@ -151,7 +151,7 @@ def test_particles_are_seen_between_the_clips_of_the_camera(clip: dict[str, floa
     agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["light", "caustics"])
 def test_particles_pass_instances(name: str) -> None:
     block = {"type": "cube", "to_world": T().translate([-0.5, -0.2, 0.8]).scale(0.3), "bsdf": GREY}
@@ -439,6 +439,7 @@ def test_long_chains_keep_their_weights_finite() -> None:
 # ---------------------------------------------------------------------- the map
 
 
+@pytest.mark.slow
 def test_a_map_gives_the_particles_within_its_radius() -> None:
     """Against a sum over all of them; so many that their keys take more than 16 bits. What has come from below counts
     on surfaces that face the same way as that of the place, what has come from above on all."""

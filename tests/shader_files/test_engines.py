@@ -85,6 +85,7 @@ vec3 combineColor(vec3 albedo, vec3 sheen, float coat) {
 }
 
 
+@pytest.mark.slow
 def test_playcanvas_adds_its_lobes(tmp_path: Path) -> None:
     try:
         compiler()

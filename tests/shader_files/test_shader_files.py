@@ -307,6 +307,7 @@ def test_claim_of_a_shader_that_is_black_at_its_given_values_fails(tmp_path: Pat
     assert any("white furnace loses 1.0000" in one for one in verdict.why)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "status"), [("right", "pass"), ("squared", "fail")])
 def test_albedo_that_a_shader_states_is_judged(tmp_path: Path, name: str, status: str) -> None:
     file = written(tmp_path, "stated.glsl", LOSSY)
@@ -350,6 +351,7 @@ def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
     assert "the loss depends on metal: 0.0000 at metal = 0 and 0.2500 at metal = 0.5" in energy_of(file).cause
 
 
+@pytest.mark.slow
 def test_energy_of_values_that_are_not_finite_has_the_grade_of_nan(tmp_path: Path) -> None:
     verdict = energy_of(written(tmp_path, "root.glsl", "vec3 brdf(vec3 L, vec3 V) { return vec3(sqrt(L.z - 0.2)); }"))
     assert verdict.status == "fail" and verdict.grade is Grade.NAN

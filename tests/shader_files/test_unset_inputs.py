@@ -82,6 +82,7 @@ ASSIGNED = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("what", ASSIGNED)
 def test_globals_have_the_values_that_main_assigns(tmp_path: Path, what: str) -> None:
     text = "uniform float roughness; float rough;\n" + GLSL % "vec3(rough)" + ASSIGNED[what]

@@ -159,6 +159,7 @@ def test_gradients_are_those_of_differences(language: str) -> None:
         assert float(slope) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("language", ["numpy", "torch", "jax"])
 def test_every_file_is_python(language: str) -> None:
     """Compiled, not run: no library is needed."""

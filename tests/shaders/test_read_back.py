@@ -32,6 +32,7 @@ def test_text_read_back_has_the_values_of_its_material(name: str, language: str)
     assert difference(variants.SHAPES[name], language) <= TOLERANCE
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name",
     [

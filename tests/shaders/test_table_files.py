@@ -114,6 +114,7 @@ def of(made: Bundle, folder: Path, form: str) -> dict[str, NDArray[Any]]:
     return read
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["exr", "ktx2"])
 def test_tables_of_a_bundle_are_in_the_files_that_its_manifest_names(form: str, tmp_path: Path) -> None:
     materials = [go.KullaConty(GOLD), go.KullaConty(GLASS)]  # with tables of two and of three axes

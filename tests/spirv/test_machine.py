@@ -75,7 +75,7 @@ CASES = {
 }
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("text", CASES)
 def test_shader_equals_its_closed_form(text: str) -> None:
     np.testing.assert_allclose(value(text), CASES[text](X), rtol=1e-6)
@@ -196,6 +196,7 @@ SIGNS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("formula", SIGNS)
 def test_signs_are_read_and_written_as_bits(tmp_path: Path, formula: str) -> None:
     text = (

@@ -32,6 +32,7 @@ def _refused(folder: Path, text: str, suffix: str = "glsl") -> InputError:
     return refused.value
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("text", "what", "where"),
     [

@@ -46,6 +46,7 @@ def test_a_tree_of_twelve_levels_is_read_soon(tmp_path: Path) -> None:
     assert graph.evaluate(wo=up, wi=up)[0] == pytest.approx(1.5**11)
 
 
+@pytest.mark.slow
 def test_a_loop_of_4000_rounds_is_read() -> None:
     text = "fn f(x: f32) -> f32 { var s = 0.0; for (var i = 0; i < 4000; i++) { s += x * f32(i); } return s; }"
     assert _run(text, 1.0) == pytest.approx(4000 * 3999 / 2)

@@ -107,6 +107,7 @@ def test_a_plugin_is_asked_on_tilted_and_textured_surfaces(tmp_path: Path, right
     assert verdict.failed and words in " ".join(verdict.why), verdict.why
 
 
+@pytest.mark.slow
 def test_a_sample_of_weight_0_with_the_stated_density_has_not_failed(tmp_path: Path) -> None:
     text = PLUGIN.replace("& active & asked\n", "& active & asked & (wo.z > 0.5)\n")
     text = text.replace("return bs, dr.select(bs.pdf > 0,", "return bs, dr.select((bs.pdf > 0) & (bs.wo.z > 0.5),")

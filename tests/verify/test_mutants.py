@@ -72,6 +72,7 @@ def test_what_one_law_alone_tells(name: str, law: str, words: str) -> None:
     assert verdict.failed and words in " ".join(verdict.why), verdict.why
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "law"),
     [
@@ -94,6 +95,7 @@ def test_every_mistake_is_caught_and_no_sound_material_fails_visibly(case: Case)
         assert report.passed == (case.name in MISSES), f"{case.fault}\n{report}"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "law", "seed"),
     [

@@ -27,6 +27,7 @@ CASES = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("formula", CASES)
 def test_operation_function_and_line_of_a_shader(tmp_path: Path, formula: str) -> None:
     (tmp_path / "mine.glsl").write_text(TEXT.format(formula=formula))
@@ -35,6 +36,7 @@ def test_operation_function_and_line_of_a_shader(tmp_path: Path, formula: str) -
     assert words == f"{CASES[formula]} in `inner` (mine.glsl:3){suffix}"
 
 
+@pytest.mark.slow
 def test_finite_values_have_none(tmp_path: Path) -> None:
     (tmp_path / "mine.glsl").write_text(TEXT.format(formula="x * x"))
     assert origin.of(go.Shader(tmp_path / "mine.glsl"), WO, WI) == ""

@@ -145,13 +145,13 @@ def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
 def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
     from gonio.verify import page
 
-    found = verify(go.Conductor(alpha=0.3), quick=True, law=["reciprocity", "energy", "pdf", "precision", "shader"])
+    found = verify(go.Lambert(0.3), quick=True, law=["reciprocity", "energy", "pdf", "precision", "shader"])
     page.write(found, tmp_path / "down")
     data = json.loads((tmp_path / "down/report.json").read_text())
     assert data["schema"] == "gonio-verify/1" and data["seed"] == 1
     assert [v["law"] for v in data["cards"][0]["verdicts"]] == ["reciprocity", "energy", "pdf", "precision", "shader"]
     for v in data["cards"][0]["verdicts"][:4]:
-        assert v["reason"] and v["meaning"] and v["command"].startswith("gonio verify conductor --param alpha=0.3")
+        assert v["reason"] and v["meaning"] and v["command"].startswith("gonio verify lambert --param albedo=0.3")
     html = (tmp_path / "down/report.html").read_text()
     assert html.count("<img") == 4 and "http" not in html.replace("http://www.w3.org", "")
     assert sorted(p.name for p in (tmp_path / "down").iterdir()) == ["report.html", "report.json"]

@@ -351,6 +351,7 @@ def test_the_export_opens_from_disk_and_asks_for_nothing(tmp_path: Path) -> None
     assert len(picture) > 20_000  # a page that shows nothing is a few kilobytes
 
 
+@pytest.mark.slow
 def test_the_homework_by_its_text_has_its_terms_and_says_why_it_has_a_rim() -> None:
     what = stage.homework_text()
     base = what.materials["m1"].bsdf

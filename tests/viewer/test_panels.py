@@ -108,6 +108,7 @@ def test_an_installed_package_brings_a_panel_into_an_exported_page(package: Path
     assert messages == []
 
 
+@pytest.mark.slow
 def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: type[go.Panel]) -> None:
     what = stage.of_models([go.Lambert(albedo=0.25)], [{"albedo"}])
     one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)

@@ -149,7 +149,7 @@ def test_what_cannot_be_plotted_is_one_clear_error(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [{"eta": 1.5}, {"eta": 0.7}, {"eta": 2.7, "k": 3.0}, {"metal": "Au"}, {}])
 def test_fresnel_is_drawn_with_the_angles_that_have_names(index: dict[str, Any], tmp_path: Path) -> None:
     path = go.plot("fresnel", output=tmp_path / "a.svg", **index).path

@@ -139,6 +139,7 @@ def test_a_variant_comes_when_it_is_asked_for(one: server.Server) -> None:
         assert answer["type"] == "error" and "nonsense" in answer["what"]
 
 
+@pytest.mark.slow
 def test_every_variant_that_is_asked_for_comes(monkeypatch: pytest.MonkeyPatch) -> None:
     with running(stage.of_models([go.Conductor(alpha=0.2), go.Conductor(alpha=0.4)])) as other, speak(other) as client:
         wanted = [(material, ndf) for material in ("m0", "m1") for ndf in ("beckmann", "ggx")]

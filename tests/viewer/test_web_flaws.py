@@ -106,6 +106,7 @@ def test_values_that_are_no_numbers_are_a_pattern_and_count_as_such(opened: Any,
     assert figures["rmse"] < 0.05 and figures["broken"] > 0 and figures["flip"] > 0.1
 
 
+@pytest.mark.slow
 def test_black_by_a_fault_is_told_from_black_by_nature(opened: Any) -> None:
     """No lamp reached long shaders, and five black balls stood there without a word."""
     page = opened(go.Lambert(), UNLIT)

@@ -98,6 +98,7 @@ def test_evaluator_agrees_with_python(opened: Opened, slot: int) -> None:
     assert np.all(np.abs(density - pdf) <= np.maximum(TIGHT * np.maximum(pdf, 1e-3), MOVES * change))
 
 
+@pytest.mark.slow
 def test_one_direction_stands_for_all(opened: Opened) -> None:
     wi = directions(np.random.default_rng(2), 1500, False)  # more than one row of the target
     wo = wi[7]
@@ -106,6 +107,7 @@ def test_one_direction_stands_for_all(opened: Opened) -> None:
     assert one["value"] == many["value"]
 
 
+@pytest.mark.slow
 def test_samples_carry_eval_over_pdf(opened: Opened) -> None:
     rng = np.random.default_rng(3)
     wo, u = directions(rng, 2000, False), rng.random((2000, 3)).astype(np.float32).astype(float)
@@ -420,7 +422,7 @@ def test_probe_reads_the_pixel(fresh: Opened) -> None:
     assert np.allclose(ratio[:3], 2, rtol=1e-5)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(960, 540), (390, 844)])
 def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int, int]) -> None:
     fresh.tab.set_viewport_size({"width": size[0], "height": size[1]})
