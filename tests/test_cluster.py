@@ -258,6 +258,7 @@ def scheduler() -> Iterator[LocalCluster]:
         yield local
 
 
+@pytest.mark.slow
 def test_a_scheduler_without_workers_is_waited_for_and_told(scheduler: LocalCluster, scene: Path) -> None:
     with (
         Cluster(scheduler.scheduler_address, wait=0.5),

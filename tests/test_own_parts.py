@@ -254,7 +254,7 @@ def test_other_processes_know_it_by_its_file(here: Path) -> None:
 # --------------------------------------------------------------------------- verbs
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "command",
     [

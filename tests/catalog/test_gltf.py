@@ -129,7 +129,7 @@ def scene(folder: Path, material: dict[str, Any], depth: int = 6) -> Path:
     return folder / "scene.json"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_scene_takes_a_file_with_the_pictures_inside(tmp_path: Path) -> None:
     """Alpha 1 on the left: a metal of roughness .25 and the picture's colour, decoded, times its factor."""
     (tmp_path / "tiles.glb").write_bytes(glb(*pictured()))

@@ -121,6 +121,7 @@ def test_wrong_values_without_parameters_name_the_defaults(tmp_path: Path) -> No
     assert not lambert.passed and "sigma=0.3" in lambert.remark, lambert.lines()
 
 
+@pytest.mark.slow
 def test_a_known_mistake_at_the_defaults_prevails_over_other_parameters(tmp_path: Path) -> None:
     f = Phong(change="kd over pi")(of.WO, of.WI)
     np.savetxt(tmp_path / "phong.csv", np.column_stack([of.WO, of.WI, f]), fmt="%.6g", delimiter=",")

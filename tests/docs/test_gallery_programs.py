@@ -35,7 +35,7 @@ def program(folder: str, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", PROGRAMS)
 def test_a_program_writes_its_picture_here(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = program(folder, monkeypatch)

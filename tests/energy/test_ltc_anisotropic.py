@@ -44,7 +44,7 @@ def test_equal_widths_have_the_tables_of_isotropic_materials() -> None:
     np.testing.assert_allclose(full.arrays["ltc_norm"][2, 0], flat.arrays["ltc_norm"][2], atol=1e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_brushed_gold_keeps_its_albedo_and_its_lobe(brushed: Baked) -> None:
     assert brushed.arrays["ltc_inverse"].shape == (4, 9, 4, 8)
     mu, phi = brushed.arrays["mu"], brushed.arrays["phi"]

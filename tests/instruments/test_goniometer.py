@@ -278,7 +278,7 @@ def test_a_blocked_direction_moves_to_the_rim_and_stays_above() -> None:
 # ---------------------------------------------------------------------- files
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".gonio", ".bsdf", ".brdf"])
 def test_a_surface_is_written_in_any_format(suffix: str, tmp_path: Path) -> None:
     found = go.measure(

@@ -144,7 +144,7 @@ def test_a_network_keeps_the_laws(network: Network, folder: Path) -> None:
     assert found.passed, str(found)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])
 def test_a_shader_carries_the_weights(language: str, network: Network, folder: Path) -> None:
     made = bundle(go.Measured(str(folder / "network.gonio")), language, functions=("eval",))

@@ -148,7 +148,7 @@ def test_saturated_values_are_left_out_and_told() -> None:
     assert found.as_dict()["left_out"] == cells.out
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["vch_silk_blue", "chm_mint"])
 def test_a_fit_to_a_real_file_does_not_collapse(shared: Path, name: str) -> None:
     found = fit(shared / "data/rgl" / f"{name}_rgb.bsdf", "lambert+ggx")

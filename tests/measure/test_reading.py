@@ -55,7 +55,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return found
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", formats())
 def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, files: dict[str, Path]) -> None:
     sample, table = read(SAMPLE), read(files[name])

@@ -72,7 +72,16 @@ def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
     _check(page, "glsl", name, 64)
 
 
-@pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "metal-bounded-turned",
+        "glass-turned",
+        "mix-with-mirror",
+        "phong",
+        pytest.param("kulla-conty", marks=pytest.mark.slow),
+    ],
+)
 def test_wgsl_gives_the_values_of_python(page: Any, name: str) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):
         pytest.skip("NOT TRIED in WebGPU: this browser has no adapter")

@@ -39,7 +39,7 @@ LONG = {"BelowTheHorizon", "AreaOfOneWidth"}  # both hemispheres; a guide per pa
 CONTROLS = [pytest.param(cls, marks=pytest.mark.slow) if cls.__name__ in LONG else cls for cls in BROKEN]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda cls: cls.__name__)
 def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> None:
     report = verify(control(), quick=True, law=[control.caught_by])

@@ -91,6 +91,7 @@ def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) 
     assert verdict.grade == "broken" and "2" in verdict.cause
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("right", "wrong", "words"),
     [

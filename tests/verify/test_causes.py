@@ -411,7 +411,7 @@ SIXTH: list[tuple[str, str, str]] = [
     ("w1_empirical.W1WardSquare", "energy", "it reflects alpha.x^-1 alpha.y at the normal"),
     ("w1_diffuse.W1FujiiSign", "energy", "is 1 at sigma = 0"),
     ("w1_empirical.W1BlinnFourTimes", "energy", "the normalization of the part with ks"),
-    ("w1_layers.W1HalfVectorBase", "energy", "the normalization holds at the normal only"),
+    ("w1_layers.W1HalfVectorBase", "energy", "a normalization that holds at the normal only"),
     ("w2_plugins_a.W2PluginMaskNull", "calls", "eval_null_transmission is not weight x pdf"),
     ("w3_forums.W3WeekendBall", "pdf", "depend on wi's angle to the normal alone"),
     ("w3_narrow.W3RotatedPdf", "pdf", "rotation, and wo too"),

@@ -60,6 +60,7 @@ def test_a_mistake_is_caught_and_a_sound_material_passes(name: str) -> None:
     assert report.passed == case.sound, f"{case.fault}\n{report}"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "law", "words"),
     [

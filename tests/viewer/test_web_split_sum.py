@@ -133,6 +133,7 @@ def test_what_has_no_lobe_about_the_mirrored_direction_is_sampled(lit: Page) -> 
     assert abs(of_term(lit, "split-error", 8)[..., :3]).max() == 0.0
 
 
+@pytest.mark.slow
 def test_the_terms_ask_for_an_environment(lit: Page) -> None:
     for term in ("split", "split-error"):
         assert lit.tab.locator(f".terms [data-value={term}]").is_enabled()

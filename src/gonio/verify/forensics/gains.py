@@ -4,6 +4,7 @@ Without absorption a part that is normalized reflects at most 1. So the albedos 
 
     parts       with one color 1 and the others 0: which part gains alone, or whether only their sum does
     parameters  proportional to a power of one: a normalization lacks it; or no gain at one end of its range
+    lobes       of a smooth interface: transmission that is not what reflection leaves
     views       1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
 """
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from ...errors import GonioError
 from ...material import BSDF, tree
+from .. import directions, lobes
 from ..subject import Fault, Subject
 from .ratio import Cause, written
 
@@ -28,6 +30,7 @@ VALUES = 5  # of a parameter
 SPAN = 4.0  # by which a parameter is divided and multiplied
 POWER = 0.15  # by which an exponent may differ from an integer
 RESIDUAL = 0.05  # of a logarithm: Fresnel's terms and losses at the horizon vary as well
+LEAST_AT_NORMAL = 0.8  # albedo at the normal of a material that gains at grazing views only
 NARROW = 0.3  # largest width at which little light is lost at the horizon
 MOST = 6  # parameters, or colors
 
@@ -67,6 +70,9 @@ def _parts(white: Subject, albedo: Albedo, here: float) -> str:
         if value is None:
             return ""
         by_part[path] = float(value.max())
+    # other colors scale the sum, or shift it: they are no parts of it
+    if min(by_part.values()) < GAIN or here > sum(by_part.values()) + GAIN:
+        return ""
     wrong = [path for path, value in by_part.items() if value > 1.0 + GAIN]
     text = ", ".join(f"{value:.4g} with {path} alone" for path, value in by_part.items())
     if not wrong:
@@ -150,7 +156,7 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
             none = float(np.exp(least)) if np.isfinite(least) else low
             words = f"the largest albedo without absorption is {largest.min():.4g} at {name} = {none:.3g} and "
             words += f"{largest.max():.4g} at {float(np.exp(x[np.argmax(largest)])):.3g}"
-            guess = f"the normalization{' or the masking' if name != path else ''} by {name}"
+            guess = f"a term with {name} that is too large there: a normalization, a masking or a compensation"
             ends.append(Cause(f"{words}: {guess}?", f"gain by {name}"))
     if powers:
         formula = " ".join(name if power == 1.0 else f"{name}^{power:g}" for name, power in powers.items())
@@ -168,13 +174,43 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
 def _views(here: np.ndarray) -> Cause | None:
     """1 at the normal and a power of the cosine elsewhere."""
     a = here.mean(1)
-    if abs(a[0] - 1.0) > 0.05 or a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
+    if a[0] < LEAST_AT_NORMAL or a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
         return None
     mu = np.cos(np.radians(VIEWS))
     slope, start = np.polyfit(np.log(mu), np.log(np.maximum(a, 1e-9)), 1)
-    guess = "the normalization holds at the normal only, or a factor is missing at grazing views"
+    guess = "the masking, a normalization that holds at the normal only, or a factor that is missing at grazing views"
     row = int(np.argmax(a))
     words = f"without absorption it reflects {a[0]:.4g} at the normal and {a[row]:.4g} at {VIEWS[row]:g} degrees"
     if abs(slope) > 0.05 and np.abs(np.log(a) - (slope * np.log(mu) + start)).max() < 3.0 * RESIDUAL:
         words += f", like cos_o^{slope:.2g}"
     return Cause(f"{words}: {guess}?", "gain at grazing views")
+
+
+# --------------------------------------------------------------------------- delta lobes
+
+EXACT = 1e-3  # of the light of delta lobes
+
+
+def of_lobes(subject: Subject, seed: int) -> Iterator[Cause]:
+    """What the transmission of delta lobes is, where it is not what their reflection leaves."""
+    wo = directions.single(directions.at(np.array(VIEWS[1:]), 37.0))
+    known = lobes.of(subject, wo, seed, "importance")
+    through = known.through(wo)
+    if not through.any():
+        return
+    light = known.carried * known.valid[..., None]
+    R, T = (np.sum(light * side[..., None], axis=1) for side in (known.valid & ~through, through))
+    if (R + T).max() < 1.0 + GAIN:
+        return
+
+    def near(a: np.ndarray) -> bool:
+        return bool(np.abs(T - a).max() < EXACT)
+
+    row = int(np.argmax((R + T).max(1)))
+    words = f"delta lobes reflect {R[row].max():.4g} and transmit {T[row].max():.4g} at {VIEWS[1 + row]:g} degrees"
+    if np.ptp(R, axis=1).max() > EXACT and near(1.0 - R.mean(1, keepdims=True)):
+        yield Cause(f"{words}: transmission is 1 - the mean of the reflectance over the channels?", "T of mean R")
+    elif near(1.0 - R / np.maximum(2.0 - R, 1e-6)):
+        yield Cause(f"{words}: reflection is that of both faces of a pane, and transmission that of one?", "T of one")
+    elif T.min() > EXACT:
+        yield Cause(f"{words}: transmission is not what reflection leaves?", "T not reduced by R")

@@ -26,6 +26,7 @@ SMALL = 0.02  # smallest difference that one variable explains
 PLATEAU = 0.3  # share of the expectation in blocks of one ratio
 LEAST = 0.02  # share of all samples that lie elsewhere
 OTHER = 0.15  # of that share: differences of the other sign
+APART = 3.0  # ratio of samples to pdf, over that of most blocks, where a lobe is missing in one of them
 NATURAL = 0.06  # by which the integral of the pdf may differ from the share of the samples
 NOISE = 4.0  # standard errors
 STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
@@ -131,6 +132,10 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     ):
         return None
     lacking = more > less
+    # a lobe of its own lies where the other is dim; a wrong factor changes the ratio gradually
+    apart = (o > APART * c * e) if lacking else (o * APART < c * e)
+    if np.abs(off[~same & apart]).sum() < 0.5 * max(more, less):
+        return None
     # the rest of a mixture: either the weights are those of the samples, or one of the two has no other part
     if (
         abs(c - 1.0) > 2.0 * STEP
@@ -139,6 +144,8 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
         return None
     rows = ~same & ((off > 0.0) if lacking else (off < 0.0))
     place, ring = _place(held, np.where(rows, np.abs(off), 0.0))
+    if not place:
+        return None
     share = severity.percent((more if lacking else less) / (total if lacking else c * float(e.sum())))
     scale = "" if abs(c - 1.0) < 2.0 * STEP else f" times {c:.3g}"
     if lacking:
@@ -154,7 +161,8 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
 
 
 def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
-    """Where most of a weight per block is, in words, and whether it fills a small part of the sphere."""
+    """Where most of a weight per block is, in words, "" if it is everywhere; and whether it fills a small part of the
+    sphere."""
     area = held.joined(held.area)
     share = weight / max(float(weight.sum()), 1e-30)
     order = np.argsort(-share / np.maximum(area, 1e-12))
@@ -176,7 +184,7 @@ def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
         theta = np.degrees(np.arccos(np.clip(direction[2] / length, -1.0, 1.0)))
         phi = np.degrees(np.arctan2(direction[1], direction[0])) % 360.0
         return f"near wi {theta:.3g}, {phi:.3g} degrees", small
-    return "in other directions", small
+    return "", small
 
 
 # --------------------------------------------------------------------------- one variable

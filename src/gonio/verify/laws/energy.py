@@ -121,8 +121,12 @@ class Energy(Law):
 
             yield from losses.causes(white, loss, claim)
         curves = finding.evidence
-        if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
+        if not isinstance(curves, AlbedoCurves):
             return
+        yield from _never_sampled(curves)
+        if finding.figure <= finding.tolerance:
+            return
+        yield from gains.of_lobes(where_found(subject, finding), seed)
         there = where_found(subject, finding)
         steps = rounded.named(there) if there.has_density and not there.stochastic else None
         if steps is not None:
@@ -260,6 +264,15 @@ def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarr
             f"{STATED}, {stated.source}, is {stated.value[row, channel]:.4f} at {theta:.4g} degrees, and the integral "
             f"of eval is {value[row, channel]:.4f}"
         )
+
+
+def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
+    """The side from which every sample fails, or carries nothing, while `eval` is positive."""
+    for sign, side in ((1.0, "above"), (-1.0, "below")):
+        mine = curves.wo[:, 2] * sign > 0.0
+        if mine.any() and not curves.sampling[mine].any() and curves.quadrature[mine].max(1).min() > GAIN:
+            words = f"for wo {side} the surface no sample carries light, and eval is positive"
+            yield Cause(f"{words}: a test of the side that one of them lacks?", f"never sampled from {side}")
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:

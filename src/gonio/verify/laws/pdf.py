@@ -124,14 +124,33 @@ class Pdf(Law):
                 cause = explain(there, tested.cells, held, seed) if held is not None else None
                 if cause is not None:
                     yield cause
-        clamped = _clamped(there, oblique[:1], seed)
-        if clamped:
-            yield Cause(f"{clamped}: a random number that is clamped, which the pdf does not count?", "u clamped")
-        if _reused(there, oblique[:1], seed):
-            yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
+        yield from _from_below(oblique_tests)
+        above = oblique[oblique[:, 2] > 0.0]
+        for view in above[:, None]:
+            clamped = _clamped(there, view, seed)
+            if clamped:
+                yield Cause(f"{clamped}: a random number that is clamped, which the pdf does not count?", "u clamped")
+        for view in above[:, None]:
+            if _reused(there, view, seed):
+                yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
         for note in finding.notes:
             if note.startswith("the pdf claims"):
                 yield Cause(note, "pdf where no sample occurs")
+
+
+ALL, LACKING = 0.995, 0.03  # shares of the samples: that do not fail, and that the pdf lacks
+
+
+def _from_below(tests: list[_Tested]) -> Iterator[Cause]:
+    """Samples never fail, and the pdf lacks the more of them the more oblique the view."""
+    above = [tested for tested in tests if tested.wo[2] > 0.0]
+    lacking = [1.0 - tested.total for tested in above]
+    drawn = [tested.cells.observed.sum() / tested.cells.drawn for tested in above]
+    if len(above) > 1 and min(drawn) > ALL and lacking[-1] > max(LACKING, lacking[0] + 0.5 * LACKING):
+        shares = ", ".join(f"{share:.2g} at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
+        words = f"no sample fails, and the pdf lacks {shares} degrees of wo"
+        guess = "directions from below the horizon that are mirrored up or clamped, where they should fail"
+        yield Cause(f"{words}: {guess}?", "samples from below")
 
 
 SWEEP = 512  # values of one number
