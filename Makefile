@@ -51,7 +51,7 @@ browser: .venv/installed
 	|| echo "NO BROWSER could be found or installed: tests in WebGL and WebGPU will be skipped, nothing is tried there" >&2
 
 # three processes on two cores, each with files of its own: a browser, a server or a child is often waited for
-PARALLEL := -n 3 --dist loadfile --max-worker-restart 2
+PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 2
 
 # formulas, tables, shader text, files and scenes, one case of each test, no long one: what one runs while editing
 UNIT := tests/bridge tests/catalog tests/energy tests/materials tests/measure tests/ops tests/optics tests/shaders \

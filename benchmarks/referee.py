@@ -19,7 +19,7 @@ from typing import NamedTuple
 from gonio.verify import Report, verify
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
-FOLDERS = ("first", "second", "third", "fourth", "fifth", "sixth")
+FOLDERS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh")
 
 
 class Case(NamedTuple):

@@ -33,6 +33,7 @@ if os.environ.get("GONIO_TEST_DEVICE") == "cuda":  # `make test-gpu`: what would
     _choose = engine.variant_for
     engine.variant_for = lambda device="cpu", spectral=False: _choose("cuda" if device == "cpu" else device, spectral)
 
+LONGEST = ("viewer", "verify", "shaders", "measure", "energy", "instruments", "render")
 BROWSERS = {"chrome", "chromium", "page", "live", "homework_page"}  # fixtures that start one
 
 
@@ -49,6 +50,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     browser  every test that starts one
     slow     cases beyond `sample(n)` or `--cases n`
     """
+    # workers take a file at a time: the folders with the longest ones first, lest one of these is the last
+    items.sort(key=lambda item: LONGEST.index(name) if (name := item.path.parent.name) in LONGEST else len(LONGEST))
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         parameters = getattr(item, "callspec", None)  # which may be called as a fixture is: `page`

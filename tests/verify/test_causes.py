@@ -401,7 +401,7 @@ class FresnelOneWay(Weighed):
         return super().eval(wo, wi, mode) * (0.5 + 0.5 * abs(wo.z))
 
 
-SIXTH: list[tuple[str, str, str]] = [
+LAST: list[tuple[str, str, str]] = [
     ("w1_corners.W1RotatedSample", "pdf", "the pdf of wi rotated by 2 rotation"),
     ("w1_corners.W1ClampedNumbers", "pdf", "while the second random number is below"),
     ("w1_corners.W1ForgottenHaze", "pdf", "a lobe that the pdf lacks"),
@@ -425,14 +425,19 @@ SIXTH: list[tuple[str, str, str]] = [
     ("w2_plugins_a.W2PluginFrosted", "pdf", "samples have the density of visible normals"),
     ("w3_engines.W3HalfFloat", "pdf", "rounded to 11 bits"),
     ("w1_corners.W1FlooredPdf", "weight", "clamped to at least 0.1"),
+    ("w4_metals.W4Iron", "pdf", "no sample fails, and the pdf lacks"),
+    ("w5_sheets.W5FreeFilm", "energy", "1 - the mean of the reflectance"),
+    ("w5_sheets.W5Pane", "energy", "that of both faces of a pane"),
+    ("w5_plugins.W5MiTile", "energy", "for wo below the surface no sample carries light"),
     ("w1_corners.W1SoftTerminator", "reciprocity", "g(wo) / g(wi)"),
     ("w1_diffuse.W1OrenNegative", "positivity", "with azimuths that differ by more than 90"),
 ]
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(("name", "law", "words"), SIXTH, ids=[name.partition(".")[2] for name, _, _ in SIXTH])
-def test_causes_of_the_sixth_examiners(name: str, law: str, words: str) -> None:
-    module = cases(f"sixth.{name.partition('.')[0]}")
-    found = cause(next(one.target for one in module if one.name == f"sixth.{name}"), law)  # type: ignore[arg-type]
+@pytest.mark.parametrize(("name", "law", "words"), LAST, ids=[name.partition(".")[2] for name, _, _ in LAST])
+def test_causes_of_the_last_examiners(name: str, law: str, words: str) -> None:
+    folder = "sixth" if name < "w4" else "seventh"
+    module = cases(f"{folder}.{name.partition('.')[0]}")
+    found = cause(next(one.target for one in module if one.name == f"{folder}.{name}"), law)  # type: ignore[arg-type]
     assert words in found, found

@@ -26,7 +26,8 @@ SMALL = 0.02  # smallest difference that one variable explains
 PLATEAU = 0.3  # share of the expectation in blocks of one ratio
 LEAST = 0.02  # share of all samples that lie elsewhere
 OTHER = 0.15  # of that share: differences of the other sign
-APART = 3.0  # ratio of samples to pdf, over that of most blocks, where a lobe is missing in one of them
+APART = 2.0  # ratio of samples to pdf, over that of most blocks, where a lobe is missing in one of them
+BESIDE = 0.4  # least share of the difference in such blocks
 NATURAL = 0.06  # by which the integral of the pdf may differ from the share of the samples
 NOISE = 4.0  # standard errors
 STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
@@ -134,7 +135,7 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     lacking = more > less
     # a lobe of its own lies where the other is dim; a wrong factor changes the ratio gradually
     apart = (o > APART * c * e) if lacking else (o * APART < c * e)
-    if np.abs(off[~same & apart]).sum() < 0.5 * max(more, less):
+    if np.abs(off[~same & apart]).sum() < BESIDE * max(more, less):
         return None
     # the rest of a mixture: either the weights are those of the samples, or one of the two has no other part
     if (

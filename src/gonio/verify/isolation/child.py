@@ -182,6 +182,7 @@ class _Pool:
         self.waiting: list[int] = []  # numbers of the cards that no process judges yet
         self.laws: list[str] = []
         self.unread: list[Unread] = []
+        self.looked = 0.0  # when time and memory were checked
         self.begun: set[tuple[int, str]] = set()
         self.told: set[tuple[int, str]] = set()
         self.warned: set[str] = set()
@@ -222,6 +223,9 @@ class _Pool:
                 if worker in self.workers:
                     name, *what = answer or ("lost", worker.why())
                     getattr(self, f"_{name}")(worker, *what)
+        if time.monotonic() < self.looked + LOOK:
+            return  # thousands of calls are announced
+        self.looked = time.monotonic()
         for worker in self.workers:
             over = worker.over(self.limit, self.memory)
             if over:
