@@ -23,8 +23,8 @@ FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2e-4 is that narrow
 SEEDED = 17  # halvings around samples
-SAMPLES = 4096  # per wo: the ends of a streak, as of brushed metal, are as dim as its samples are few
-CROWD = 128  # samples in a cell for which it is divided before the integrand is evaluated
+SAMPLES, MORE = 1024, 4096  # per wo; for lobes narrower than cells: the ends of a streak are as dim as samples are few
+CROWD = 1 / 32  # share of the samples in a cell for which it is divided before the integrand is evaluated
 UNSEEN = 0.25  # below this fraction of a sample's value, the values at a cell's nodes have missed its lobe
 BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
 OFF = 1e-3  # of 1, the length of a sampled direction that is not used
@@ -96,8 +96,11 @@ def integrate(
     integrand  (wo, wi) -> a vector with one entry per channel, of float64 Dr.Jit vectors; it runs inside a kernel
     tolerance  absolute, per integral; if cells run out, the reported error is larger
     """
-    cells, points = _seeded(sample, integrand, wo, seed)
+    cells, points = _seeded(sample, integrand, wo, seed, SAMPLES)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
+    if points.missed_by(cells, first.most).sum() > tolerance:
+        cells, points = _seeded(sample, integrand, wo, seed, MORE)
+        (first,), way = _values(integrand, wo, cells, _GAUSS)
     way[points.missed_by(cells, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
@@ -187,29 +190,29 @@ class _Points(NamedTuple):
         return _Points(quarter, at, self.value[inside], self.light[inside])
 
 
-def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
-    """The initial cells, divided around the samples that carry light, the mirror direction and wo, and these samples
-    inside them."""
+def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, _Points]:
+    """The initial cells, divided around the samples that carry light, `per` of each wo, the mirror direction and wo,
+    and these samples inside them."""
     n_theta, n_phi = FIRST
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * FIRST_SIZE
     row, side, cell = np.meshgrid(np.arange(len(wo)), [1.0, -1.0], np.arange(len(corner)), indexing="ij")
     cells = _Cells(row.ravel(), side.ravel(), corner[cell.ravel()], np.broadcast_to(FIRST_SIZE, (row.size, 2)).copy())
     rng = np.random.default_rng([seed, 77])
-    many = np.repeat(wo, SAMPLES, axis=0)
+    many = np.repeat(wo, per, axis=0)
     drawn = sample(many, rng.random((len(many), 3)).astype(np.float32).clip(max=ALMOST_ONE).astype(float))
     good = (drawn.pdf > 0.0) & ~drawn.delta & (np.abs(np.linalg.norm(drawn.wi, axis=1) - 1.0) < OFF)
     value = _summed(integrand, many, np.where(good[:, None], drawn.wi, UP))
     good &= value > 0.0
-    value, light = value[good], value[good] / (drawn.pdf[good] * SAMPLES)
+    value, light = value[good], value[good] / (drawn.pdf[good] * per)
     mirror = wo * np.array([-1.0, -1.0, 1.0])
     likely = np.concatenate([drawn.wi[good], mirror, wo, -wo])
-    owner = np.concatenate([np.repeat(np.arange(len(wo)), SAMPLES)[good], *([np.arange(len(wo))] * 3)])
+    owner = np.concatenate([np.repeat(np.arange(len(wo)), per)[good], *([np.arange(len(wo))] * 3)])
     angles = np.stack(
         [np.arctan2(np.hypot(likely[:, 0], likely[:, 1]), np.abs(likely[:, 2])),
          np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)], -1
     )  # fmt: skip
     below = (likely[:, 2] < 0.0).astype(int)
-    crowd = np.where(np.arange(len(likely)) < len(value), 1, CROWD)  # a marker alone divides its cell
+    crowd = np.where(np.arange(len(likely)) < len(value), 1.0, CROWD * per)  # a marker alone divides its cell
     homes, first = np.zeros(len(likely), int), 0
     left = np.arange(len(likely))  # points in cells that are not accepted yet
     accepted: list[_Cells] = []
@@ -220,7 +223,7 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int) ->
         mine = _key(cells.row, (cells.side < 0).astype(int), np.round(cells.low / cells.size), most)
         order = np.argsort(mine)
         cell = order[np.searchsorted(mine[order], point)]
-        crowded = np.bincount(cell, crowd[left], len(mine)) >= CROWD
+        crowded = np.bincount(cell, crowd[left], len(mine)) > CROWD * per - 0.5
         crowded &= level < SEEDED - 1
         homes[left] = first + (np.cumsum(~crowded) - 1)[cell]
         accepted.append(cells.take(~crowded))

@@ -124,7 +124,7 @@ class Pdf(Law):
                 cause = explain(there, tested.cells, held, seed) if held is not None else None
                 if cause is not None:
                     yield cause
-        yield from _from_below(oblique_tests)
+        yield from _from_below(there, oblique_tests, seed)
         above = oblique[oblique[:, 2] > 0.0]
         for view in above[:, None]:
             clamped = _clamped(there, view, seed)
@@ -139,18 +139,33 @@ class Pdf(Law):
 
 
 ALL, LACKING = 0.995, 0.03  # shares of the samples: that do not fail, and that the pdf lacks
+MISSING = 0.01  # share of the samples that the pdf predicts and that do not occur
+STEEP = 0.7  # ratio of what the pdf lacks near the normal to what it lacks at an oblique view
 
 
-def _from_below(tests: list[_Tested]) -> Iterator[Cause]:
-    """Samples never fail, and the pdf lacks the more of them the more oblique the view."""
+def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[Cause]:
+    """Samples never fail, and the pdf lacks the more of them the more oblique the view, but has nowhere too many."""
     above = [tested for tested in tests if tested.wo[2] > 0.0]
+    if len(above) < 2 or min(tested.cells.observed.sum() / tested.cells.drawn for tested in above) < ALL:
+        return
     lacking = [1.0 - tested.total for tested in above]
-    drawn = [tested.cells.observed.sum() / tested.cells.drawn for tested in above]
-    if len(above) > 1 and min(drawn) > ALL and lacking[-1] > max(LACKING, lacking[0] + 0.5 * LACKING):
+    if lacking[-1] < max(LACKING, lacking[0]) or max(_missing(tested.cells) for tested in above) > MISSING:
+        return
+    near = _chi_square(subject, FEW, seed, directions.single(directions.at(np.array([ABOVE[1][0]]), ABOVE[1][1])))
+    if near and 1.0 - near[0].total < STEEP * lacking[-1]:
         shares = ", ".join(f"{share:.2g} at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
         words = f"no sample fails, and the pdf lacks {shares} degrees of wo"
         guess = "directions from below the horizon that are mirrored up or clamped, where they should fail"
         yield Cause(f"{words}: {guess}?", "samples from below")
+
+
+def _missing(cells: SampleCells) -> float:
+    """Share of the samples that the pdf predicts where significantly fewer fall."""
+    held = crowding.blocks(cells)
+    if held is None:
+        return 1.0
+    expected = held.joined(held.expected)
+    return float(np.maximum(expected - held.observed - 4.0 * np.sqrt(expected), 0.0).sum() / held.drawn)
 
 
 SWEEP = 512  # values of one number
