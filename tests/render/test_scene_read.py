@@ -233,7 +233,7 @@ WRONG = [
     ("/output/filename", "a.jpeg", None, "no known kind of picture", "exr"),
     ("/output/filename", "../a.exr", None, "outside the folder", "plain file name"),
     ("/output/filename", "/tmp/a.exr", None, "outside the folder", "plain file name"),
-    ("/outputs", {}, None, "unknown key 'outputs'", "did you mean 'output'"),
+    ("/outputs", {}, None, "unknown key 'outputs' of scene description", "did you mean 'output'"),
 ]
 
 

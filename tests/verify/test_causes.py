@@ -441,3 +441,11 @@ def test_causes_of_the_last_examiners(name: str, law: str, words: str) -> None:
     module = cases(f"{folder}.{name.partition('.')[0]}")
     found = cause(next(one.target for one in module if one.name == f"{folder}.{name}"), law)  # type: ignore[arg-type]
     assert words in found, found
+
+
+def test_a_call_that_no_integrator_makes_explains_no_other_failure() -> None:
+    """The plugin ignores the requested types, and draws its metal from a part of the unit square."""
+    target = next(one.target for one in cases("sixth.w3_plugins") if one.name.endswith(".W3PluginBlend"))
+    report = verify(target, quick=True, law=["calls", "energy"])  # type: ignore[arg-type]
+    assert report["calls"].grade == "interface" and report["energy"].failed
+    assert not report["energy"].cause.startswith("follows"), report["energy"].cause

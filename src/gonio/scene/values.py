@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+import re
 import sys
 from collections.abc import Mapping
 from itertools import pairwise
@@ -76,7 +77,7 @@ class Part(BaseModel):
     @classmethod
     def describe(cls, data: Mapping[str, object]) -> str:
         kind = data.get("type")
-        return f"'{kind}'" if isinstance(kind, str) else cls.__name__.lower()
+        return f"'{kind}'" if isinstance(kind, str) else re.sub("(?<=[a-z])(?=[A-Z])", " ", cls.__name__).lower()
 
 
 def _docstrings(cls: type[Part]) -> dict[str, str]:
