@@ -30,18 +30,30 @@ class Grid(NamedTuple):
     sides  which sides of the surface have cells
     rows   edges of 1 - |z|, (N, sides, rows + 1), float32
     columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
+    pilot  the samples that placed them, (n, 3) of each wo
     """
 
     wo: np.ndarray
     sides: tuple[int, ...]
     rows: np.ndarray
     columns: np.ndarray
+    pilot: list[np.ndarray]
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
         """(N, sides, rows, columns)."""
         n, sides, rows, edges = self.columns.shape
         return n, sides, rows, edges - 1
+
+    def cell_of(self, row: int, side: int, w: np.ndarray) -> np.ndarray:
+        """The number, in this shape, of the cell of each direction (n, 3) on `sides[side]`, for wo `row`."""
+        _, sides, rows, columns = self.shape
+        edges, turns = self.rows[row, side], pseudo_angle(w)
+        line = (np.searchsorted(edges[1:-1], height(w).astype(np.float32), "right")).astype(np.int64)
+        # columns of all rows in one increasing list: pseudo-angles end at 4
+        lines = (self.columns[row, side, :, 1:-1].astype(float) + 8.0 * np.arange(rows)[:, None]).ravel()
+        column = np.searchsorted(lines, turns + 8.0 * line, "right") - (columns - 1) * line
+        return np.asarray(((row * sides + side) * rows + line) * columns + column)
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
@@ -79,7 +91,7 @@ def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cell
                 first, last = np.searchsorted(heights, [a, b])
                 more = max(300 - (last - first), 0) // 2  # a row with few samples takes those of its neighbors
                 columns[i, j, r] = _edges(turns[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
-    return Grid(wo, sides, rows, columns)
+    return Grid(wo, sides, rows, columns, pilot)
 
 
 def _spread(wi: np.ndarray) -> float:

@@ -15,11 +15,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..energy.albedo.cells import Seen, product, rim, step_aside
+from ..energy.albedo.cubature import UNSEEN
 from ..ops import backend
 from ..ops.backend import Array, Types
 from ..transport.sampler import mix, unit
 from . import statistics
-from .cells import Density, Grid, boxes, direction
+from .cells import Density, Grid, boxes, direction, height
 from .subject import Subject, guarded
 
 COARSE = (10, 10)  # rows and columns per cell of the coarse test, which detects small errors of broad lobes
@@ -72,6 +73,7 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
     unresolved = np.zeros(len(grid.wo))
+    points = _Points.of(pdf, grid, owner)
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
         two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
@@ -83,24 +85,69 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
         area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
         aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
+        missed = points.missed_by(area, last.most)
+        aside = np.maximum(aside, missed)
         divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
         if 4 * divide.sum() > MAX_CELLS:  # a pdf that is rough everywhere: only the roughest cells
-            worst = np.argsort(-np.where(divide, off / allowed, 0.0))
+            worst = np.argsort(-np.where(divide, np.maximum(off, missed) / allowed, 0.0))
             divide[worst[MAX_CELLS // 4 :]] = False
         np.add.at(unresolved, row[owner[~divide]], np.maximum(rough, aside)[~divide])
         np.add.at(integral, owner[~divide], four[~divide])
         if not divide.any():
             break
+        which = divide
         box, owner = box[divide], np.repeat(owner[divide], 4)
         lo_a, hi_a, lo_c, hi_c = box.T
         # the heights of a narrow lobe span decades: they are halved in ratio
         m = np.where(hi_a > 4.0 * lo_a, np.maximum(np.sqrt(lo_a * hi_a), hi_a / 64.0), 0.5 * (lo_a + hi_a))
         q = 0.5 * (lo_c + hi_c)
+        points = points.within(which, m, q)
         parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
         box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
     shaped = integral.reshape(shape)
     return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved)
+
+
+class _Points(NamedTuple):
+    """The pilot's samples inside boxes: the box's number, 1 - |z| and azimuth, the pdf, and the sample's share of all."""
+
+    box: np.ndarray
+    height: np.ndarray
+    azimuth: np.ndarray
+    value: np.ndarray
+    share: np.ndarray
+
+    @classmethod
+    def of(cls, pdf: Density | Subject, grid: Grid, owner: np.ndarray) -> _Points:
+        """The samples that placed a grid's cells, in the boxes of the cells `owner`."""
+        box_of = np.full(int(np.prod(grid.shape)), -1)
+        box_of[owner] = np.arange(len(owner))
+        columns = []
+        for i, samples in enumerate(grid.pilot):
+            for j, side in enumerate(grid.sides):
+                w = samples[side * samples[:, 2] > 0.0]
+                box = box_of[grid.cell_of(i, j, w)]
+                w, box = w[box >= 0], box[box >= 0]
+                wo = np.repeat(grid.wo[i : i + 1], len(w), axis=0)
+                value = pdf.pdf(wo, w) if isinstance(pdf, Subject) else pdf(wo, w)
+                turn = np.arctan2(w[:, 1], w[:, 0]) % (2.0 * np.pi)
+                columns.append((box, height(w), turn, value, np.full(len(w), 1.0 / max(len(samples), 1))))
+        return cls(*[np.concatenate(column) for column in zip(*columns, strict=True)])
+
+    def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """The share of samples in each box whose nodes, with the largest value `most`, are all dark beside one of the
+        samples, else 0: the lobe is narrower than the box."""
+        bright = np.zeros(len(most))
+        np.maximum.at(bright, self.box, self.value)
+        share = np.bincount(self.box, self.share, len(most))
+        return np.where(most < UNSEEN * bright, np.minimum(bright * area, share), 0.0)
+
+    def within(self, divided: np.ndarray, height: np.ndarray, azimuth: np.ndarray) -> _Points:
+        """The points in divided boxes, numbered by the quarters, which meet at these heights and azimuths."""
+        kept = _Points(*[column[divided[self.box]] for column in self])
+        box = (np.cumsum(divided) - 1)[kept.box]
+        return kept._replace(box=4 * box + (kept.height > height[box]) + 2 * (kept.azimuth > azimuth[box]))
 
 
 _GAUSS = {order: product(order) for order in (2, 3, 4)}

@@ -23,9 +23,10 @@ FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2e-4 is that narrow
 SEEDED = 17  # halvings around samples
-SAMPLES, MORE = 1024, 4096  # per wo; for lobes narrower than cells: the ends of a streak are as dim as samples are few
+SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more, where light is unseen by the fewer
 CROWD = 1 / 32  # share of the samples in a cell for which it is divided before the integrand is evaluated
 UNSEEN = 0.25  # below this fraction of a sample's value, the values at a cell's nodes have missed its lobe
+FAINT = 0.01  # of what is missed: a cell's nodes show less by chance only, and show nothing in the next cell
 BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
 OFF = 1e-3  # of 1, the length of a sampled direction that is not used
 UP = np.array([0.0, 0.0, 1.0])
@@ -94,16 +95,35 @@ def integrate(
 
     sample     the model's sampling, which shows where its lobes are
     integrand  (wo, wi) -> a vector with one entry per channel, of float64 Dr.Jit vectors; it runs inside a kernel
-    tolerance  absolute, per integral; if cells run out, the reported error is larger
+    tolerance  absolute, per integral; if cells or samples run out, the reported error is larger
     """
-    cells, points = _seeded(sample, integrand, wo, seed, SAMPLES)
+    per, *more = SAMPLES
+    value, error, unseen = _integrate(sample, integrand, wo, tolerance, seed, per)
+    for per in more:
+        dark = unseen > tolerance
+        if not dark.any():
+            break
+        value[dark], error[dark], unseen[dark] = _integrate(sample, integrand, wo[dark], tolerance, seed, per)
+    return Integral(value, error + unseen[:, None])
+
+
+def _integrate(
+    sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float, seed: int, per: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values and errors of integrals, whose first cells follow `per` samples of each wo, and an estimate of the light
+    in lobes that are narrower than the cells and that no sample has shown, (N,).
+
+    Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as one
+    beside the streak. The light of samples that are alone in a cell which is divided for them estimates what is left
+    (I. J. Good, "The population frequencies of species and the estimation of population parameters", Biometrika 40,
+    1953, eq. 9).
+    """
+    cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
-    if points.missed_by(cells, first.most).sum() > tolerance:
-        cells, points = _seeded(sample, integrand, wo, seed, MORE)
-        (first,), way = _values(integrand, wo, cells, _GAUSS)
     way[points.missed_by(cells, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
+    unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # by a single sample
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
     allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
@@ -118,6 +138,11 @@ def integrate(
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells, 4.0 * inner.most.reshape(-1, 4).max(1))
+        alone = np.bincount(points.cell, minlength=len(missed)) == 1
+        by_samples = (missed > allowed) & (difference.max(1) < FAINT * missed)
+        done = shown & alone & ~by_samples
+        unseen += np.bincount(cells.row[done], points.light_in(done), len(wo))
+        shown = by_samples & alone
         difference += missed[:, None]
         divide |= missed > allowed
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
@@ -131,8 +156,9 @@ def integrate(
         next_ = np.repeat(divide, 4)
         cells, way = fine_cells.take(next_), ways[next_]
         way[points.missed_by(cells, inner.most[next_]) > 0.0] = QUADRANTS
+        shown = np.repeat(shown[divide], 4)
         coarse = fine[divide].reshape(-1, channels)
-    return Integral(value, errors.total())
+    return value, errors.total(), unseen
 
 
 class _Errors:
@@ -178,7 +204,11 @@ class _Points(NamedTuple):
         bright = np.zeros(len(most))
         np.maximum.at(bright, self.cell, self.value * np.sin(self.at[:, 0]))
         bright *= cells.size.prod(1)
-        return np.where(most < UNSEEN * bright, np.minimum(bright, np.bincount(self.cell, self.light, len(most))), 0.0)
+        return np.where(most < UNSEEN * bright, np.minimum(bright, self.light_in(np.ones(len(most), bool))), 0.0)
+
+    def light_in(self, which: np.ndarray) -> np.ndarray:
+        """The sum of the samples' light in each of some cells."""
+        return np.bincount(self.cell, self.light, len(which))[which]
 
     def within(self, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> _Points:
         """The points in divided cells, numbered by these cells' quarters."""
