@@ -32,7 +32,7 @@ def test_text_that_differs_fails_with_language_function_and_values(monkeypatch: 
         made = bundle(material, language)
         return dataclasses.replace(made, text=made.text.replace("0.31830987", "0.3183"))
 
-    monkeypatch.setattr(shader, "bundle", wrong)
+    monkeypatch.setattr("gonio.shaders.bundle", wrong)
     found = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)["shader"]
     assert found.status == "fail" and "sl, " in found.worst and " expected" in found.worst
 
@@ -46,7 +46,7 @@ def test_without_a_compiler_the_law_is_not_tried_and_does_not_pass(monkeypatch: 
     def missing() -> str:
         raise MachineError("no compiler of shaders is installed", "shader", "install it")
 
-    monkeypatch.setattr(shader, "compiler", missing)
+    monkeypatch.setattr("gonio.spirv.compiler.compiler", missing)
     report = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)
     found = report["shader"]
     assert found.status == "not tried" and "no compiler" in found.why[0] and found.figure is not None
@@ -64,7 +64,7 @@ def test_text_that_differs_fails_without_a_compiler_too(monkeypatch: pytest.Monk
         made = bundle(material, language)
         return dataclasses.replace(made, text=made.text.replace("0.31830987", "0.3183"))
 
-    monkeypatch.setattr(shader, "compiler", missing)
-    monkeypatch.setattr(shader, "bundle", wrong)
+    monkeypatch.setattr("gonio.spirv.compiler.compiler", missing)
+    monkeypatch.setattr("gonio.shaders.bundle", wrong)
     found = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)["shader"]
     assert found.status == "fail" and found.worst.startswith("wgsl")

@@ -37,6 +37,7 @@ from . import documents, outside, texts
 from .texts import apart, assignment, class_named, split, taken_apart
 
 Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
+SHOWN = 1000  # numbers of an array that are written
 
 __all__ = [
     "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
@@ -228,7 +229,8 @@ def typed(parameter: Parameter, value: Value) -> object:
 
 
 def written(value: Value) -> str:
-    """A value in the form that `typed` accepts, a material with its non-default parameters."""
+    """A value in the form that `typed` accepts, a material with its non-default parameters; of one value per ray only
+    the shape."""
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={setting(value, name, v)}" for name, v in settings(value).items())
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
@@ -237,7 +239,10 @@ def written(value: Value) -> str:
     if isinstance(value, DispersiveIndex):
         return value.constants.name
     if np.ndim(value):
-        return ",".join(f"{v:.6g}" for v in np.asarray(value).ravel())
+        array = np.asarray(value)
+        if array.size > SHOWN:
+            return f"an array of shape {array.shape}"
+        return ",".join(f"{v:.6g}" for v in array.ravel())
     if isinstance(value, float | int | np.floating | np.integer):
         return f"{value:.6g}"
     return str(value)

@@ -233,6 +233,7 @@ def _on_numpy(
             if not ok:
                 _check_values(array, label, f"{name}: {label}")
     else:
+        backend.drjit().eval(parts)  # in one kernel: each part alone would repeat what they have in common
         arrays = [backend.to_numpy(value, max(count, 1))[: count or None] for value in parts]
         arrays = [array[:0] for array in arrays] if count == 0 else arrays
     if len(shape) != 1 and not many:

@@ -45,16 +45,6 @@ class Grid(NamedTuple):
         n, sides, rows, edges = self.columns.shape
         return n, sides, rows, edges - 1
 
-    def cell_of(self, row: int, side: int, w: np.ndarray) -> np.ndarray:
-        """The number, in this shape, of the cell of each direction (n, 3) on `sides[side]`, for wo `row`."""
-        _, sides, rows, columns = self.shape
-        edges, turns = self.rows[row, side], pseudo_angle(w)
-        line = (np.searchsorted(edges[1:-1], height(w).astype(np.float32), "right")).astype(np.int64)
-        # columns of all rows in one increasing list: pseudo-angles end at 4
-        lines = (self.columns[row, side, :, 1:-1].astype(float) + 8.0 * np.arange(rows)[:, None]).ravel()
-        column = np.searchsorted(lines, turns + 8.0 * line, "right") - (columns - 1) * line
-        return np.asarray(((row * sides + side) * rows + line) * columns + column)
-
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
     """Cells around the pilot's samples; None if no sample has a density."""
@@ -134,19 +124,21 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
     if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
     even, far = count // 4 - 2, count // 4
-    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count - 1 - even - far).astype(int)]
-    first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
-    tails = [
-        middle + sign * _growing(reach, high - low, far // 2)
-        for sign, reach in ((1, last - middle), (-1, middle - first))
-    ]
+    many = count - 1 - even - far
+    own = np.sort(inside)[np.arange(many) * (len(inside) - 1) // (many - 1)]
+    first, middle, last = own[many // 4], own[many // 2], own[3 * many // 4]
+    edges = np.full(count + 1, high)
+    edges[:many] = own
     # a density with a step at its end has it just beyond the outermost samples
-    beyond = [own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])]
-    spread = np.concatenate([own, beyond, np.linspace(low, high, even + 2)[1:-1], *tails])
-    edges = np.sort(np.clip(spread, low, high))
+    edges[many : many + 2] = own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])
+    edges[many + 2 : many + 2 + even] = low + (high - low) / (even + 1) * np.arange(1, even + 1)
+    tail = many + 2 + even
+    for sign, reach in ((1, last - middle), (-1, middle - first)):
+        edges[tail : tail + far // 2] = middle + sign * _growing(reach, high - low, far // 2)
+        tail += far // 2
     # clipped tails leave several edges at an end: cells of zero width, which count and expect nothing
-    edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]
-    edges[-1] = high
+    edges = np.sort(edges.clip(low, high))
+    edges[0], edges[-1] = low, high
     return edges.astype(np.float32)
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..energy.albedo.cells import Seen, product, rim, step_aside
-from ..energy.albedo.cubature import UNSEEN
+from ..energy.albedo.cubature import FAINT, UNSEEN
 from ..ops import backend
 from ..ops.backend import Array, Types
 from ..transport.sampler import mix, unit
@@ -31,12 +31,14 @@ MIN_EXPECTED = 10.0  # of a pooled cell: Pearson's statistic then follows its li
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and its error from
-    cells that were not fully divided."""
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), its error from cells
+    that were not fully divided, and an estimate of what each cell lacks of lobes that no sample of the pilot has shown
+    (`cubature`), (N, sides, rows, columns)."""
 
     cells: np.ndarray
     total: np.ndarray
     error: np.ndarray
+    unseen: np.ndarray
 
 
 class Counts(NamedTuple):
@@ -64,16 +66,15 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     pdf        of a subject, or a function of rows
     tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
     """
-    shape = grid.shape
     look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
     a, b, c, d = (edge.ravel() for edge in boxes(grid.rows, grid.columns))
-    row, side, _, _ = np.unravel_index(np.arange(len(a)), shape)
+    row, side, _, _ = np.unravel_index(np.arange(len(a)), grid.shape)
     side = np.array(grid.sides)[side]
-    integral = np.zeros(len(a))
+    integral, unseen = np.zeros(len(a)), np.zeros(len(a))
+    unresolved = np.zeros(len(grid.wo))
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
-    unresolved = np.zeros(len(grid.wo))
-    points = _Points.of(pdf, grid, owner)
+    points, shown = _Points.of(look, grid, owner), np.zeros(len(owner), bool)  # by a single sample
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
         two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
@@ -86,6 +87,10 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
         aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
         missed = points.missed_by(area, last.most)
+        by_samples = (missed > allowed) & (off < FAINT * missed)
+        left = shown & ~by_samples & points.alone(len(box))
+        np.add.at(unseen, owner[left], points.share_in(len(box))[left])
+        shown = by_samples & points.alone(len(box))
         aside = np.maximum(aside, missed)
         divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
@@ -96,21 +101,25 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         np.add.at(integral, owner[~divide], four[~divide])
         if not divide.any():
             break
-        which = divide
-        box, owner = box[divide], np.repeat(owner[divide], 4)
-        lo_a, hi_a, lo_c, hi_c = box.T
-        # the heights of a narrow lobe span decades: they are halved in ratio
-        m = np.where(hi_a > 4.0 * lo_a, np.maximum(np.sqrt(lo_a * hi_a), hi_a / 64.0), 0.5 * (lo_a + hi_a))
-        q = 0.5 * (lo_c + hi_c)
-        points = points.within(which, m, q)
-        parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
-        box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
-    shaped = integral.reshape(shape)
-    return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved)
+        owner, shown = np.repeat(owner[divide], 4), np.repeat(shown[divide], 4)
+        box, heights, azimuths = _quarters(box[divide])
+        points = points.within(divide, heights, azimuths)
+    shaped, left = integral.reshape(grid.shape), unseen.reshape(grid.shape)
+    return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved + left.sum((1, 2, 3)), left)
+
+
+def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N,)."""
+    a, b, c, d = box.T
+    # the heights of a narrow lobe span decades: they are halved in ratio
+    m = np.where(b > 4.0 * a, np.maximum(np.sqrt(a * b), b / 64.0), 0.5 * (a + b))
+    q = 0.5 * (c + d)
+    parts = [(a, m, c, q), (m, b, c, q), (a, m, q, d), (m, b, q, d)]
+    return np.stack([np.stack(part, -1) for part in parts], 1).reshape(-1, 4), m, q
 
 
 class _Points(NamedTuple):
-    """The pilot's samples inside boxes: the box's number, 1 - |z| and azimuth, the pdf, and the sample's share of all."""
+    """The pilot's samples inside boxes: the box's number, 1 - |z|, azimuth, the pdf, and the share of all samples."""
 
     box: np.ndarray
     height: np.ndarray
@@ -119,29 +128,36 @@ class _Points(NamedTuple):
     share: np.ndarray
 
     @classmethod
-    def of(cls, pdf: Density | Subject, grid: Grid, owner: np.ndarray) -> _Points:
+    def of(cls, look: _Look, grid: Grid, owner: np.ndarray) -> _Points:
         """The samples that placed a grid's cells, in the boxes of the cells `owner`."""
+        dr = backend.drjit()
+        kind = backend.types("float32")
+        which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
+        wi = np.concatenate(grid.pilot)
+        index, inside = _cell_of(grid, kind.module.UInt32(which), backend.vector_of(wi, 3, kind))
+        dr.eval(index, inside)
         box_of = np.full(int(np.prod(grid.shape)), -1)
         box_of[owner] = np.arange(len(owner))
-        columns = []
-        for i, samples in enumerate(grid.pilot):
-            for j, side in enumerate(grid.sides):
-                w = samples[side * samples[:, 2] > 0.0]
-                box = box_of[grid.cell_of(i, j, w)]
-                w, box = w[box >= 0], box[box >= 0]
-                wo = np.repeat(grid.wo[i : i + 1], len(w), axis=0)
-                value = pdf.pdf(wo, w) if isinstance(pdf, Subject) else pdf(wo, w)
-                turn = np.arctan2(w[:, 1], w[:, 0]) % (2.0 * np.pi)
-                columns.append((box, height(w), turn, value, np.full(len(w), 1.0 / max(len(samples), 1))))
-        return cls(*[np.concatenate(column) for column in zip(*columns, strict=True)])
+        box = np.where(inside.numpy(), box_of[index.numpy()], -1)
+        which, wi, box = which[box >= 0], wi[box >= 0], box[box >= 0]
+        share = 1.0 / np.maximum([len(samples) for samples in grid.pilot], 1)
+        turn = np.arctan2(wi[:, 1], wi[:, 0]) % (2.0 * np.pi)
+        return cls(box, height(wi), turn, look.at(which, wi), share[which])
+
+    def alone(self, count: int) -> np.ndarray:
+        """Whether each of `count` boxes has one sample."""
+        return np.bincount(self.box, minlength=count) == 1
+
+    def share_in(self, count: int) -> np.ndarray:
+        """The share of all samples in each of `count` boxes."""
+        return np.bincount(self.box, self.share, count)
 
     def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
         """The share of samples in each box whose nodes, with the largest value `most`, are all dark beside one of the
         samples, else 0: the lobe is narrower than the box."""
         bright = np.zeros(len(most))
         np.maximum.at(bright, self.box, self.value)
-        share = np.bincount(self.box, self.share, len(most))
-        return np.where(most < UNSEEN * bright, np.minimum(bright * area, share), 0.0)
+        return np.where(most < UNSEEN * bright, np.minimum(bright * area, self.share_in(len(most))), 0.0)
 
     def within(self, divided: np.ndarray, height: np.ndarray, azimuth: np.ndarray) -> _Points:
         """The points in divided boxes, numbered by the quarters, which meet at these heights and azimuths."""
@@ -160,6 +176,9 @@ class _Look(Protocol):
     def __call__(
         self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
     ) -> Seen: ...
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        """The pdf at directions (M, 3), for the wo of these rows."""
 
 
 CHUNK = 1 << 22  # directions at a time
@@ -182,6 +201,9 @@ class _ByRows:
             values[part] = self.pdf(np.repeat(self.wo[row[part]], len(s), axis=0), wi).reshape(-1, len(s))
         a, b, c, d = box.T
         return Seen(values @ weight * (b - a) * (d - c), values.min(1), values.max(1))
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        return self.pdf(self.wo[row], wi)
 
 
 class _InKernel:
@@ -228,10 +250,19 @@ class _InKernel:
         wo = own.vec3(*[of_cell(column) for column in self.wo[row].T])
         pdf = guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, wi))
         value = exact.float(pdf) + dr.zeros(exact.float, len(index))
-        integral = dr.block_sum(value * of_node(weight) * (b - a) * (d - c), len(s))
+        weighed = value * of_node(weight) * (b - a) * (d - c)
+        dr.eval(value, weighed)  # together: each reduction would evaluate the pdf anew
+        integral = dr.block_sum(weighed, len(s))
         least, most = (dr.block_reduce(op, value, len(s)) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max))
         dr.eval(integral, least, most)
         return Seen(integral.numpy(), least.numpy(), most.numpy())
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        dr, own = backend.drjit(), backend.types(self.precision)
+        number = own.module.UInt32(row)
+        wo = own.vec3(*[dr.gather(own.float, backend.float_of(column, own), number) for column in self.wo.T])
+        i = backend.vector_of(wi, 3, own)
+        return backend.to_numpy(guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, i)), len(row))
 
 
 # --------------------------------------------------------------------------- the counts of samples
@@ -262,9 +293,21 @@ def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
 def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> Counts:
     """Count of valid directions in each cell; `which` is the number of each direction's wo."""
     dr = backend.drjit()
+    UInt = backend.types("float32").module.UInt32
+    cell, inside = _cell_of(grid, which, wi)
+    counts = dr.zeros(UInt, int(np.prod(grid.shape)))
+    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), cell, inside & valid)
+    dr.eval(counts)
+    cells = counts.numpy().astype(np.int64).reshape(grid.shape)
+    return Counts(cells, drawn - cells.sum((1, 2, 3)), drawn)
+
+
+def _cell_of(grid: Grid, which: Array, wi: Array) -> tuple[Array, Array]:
+    """The number of each direction's cell, and whether it is on a side that has cells."""
+    dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
-    n, sides, rows, columns = grid.shape
+    _, sides, rows, columns = grid.shape
     reach = dr.abs(wi.x) + dr.abs(wi.y)
     turn = wi.y / dr.select(reach > 0.0, reach, 1.0)
     turn = dr.select(wi.x < 0.0, 2.0 - turn, dr.select(wi.y < 0.0, 4.0 + turn, turn))
@@ -280,11 +323,7 @@ def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> C
     row = _find(kind, row_edges, group * (rows + 1), rows, height)
     line = group * rows + row
     column = _find(kind, column_edges, line * (columns + 1), columns, turn)
-    counts = dr.zeros(UInt, n * sides * rows * columns)
-    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * columns + column, inside & valid)
-    dr.eval(counts)
-    cells = counts.numpy().astype(np.int64).reshape(grid.shape)
-    return Counts(cells, drawn - cells.sum((1, 2, 3)), drawn)
+    return line * columns + column, inside
 
 
 def random_numbers(kind: Types, index: Array, seed: int) -> Array:
@@ -314,8 +353,10 @@ def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None =
     e, o = expected.cells[row] * n, counts.cells[row]
     sides, rows, columns = e.shape
     coarse = (sides, rows // COARSE[0], COARSE[0], columns // COARSE[1], COARSE[1])
-    fine = _pearson(e.ravel(), o.ravel(), n, None if grid is None else _rounding(grid, row).ravel())
-    broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
+    unseen = expected.unseen[row] * n
+    rounded = np.zeros_like(e) if grid is None else _rounding(grid, row) * e
+    fine = _pearson(e.ravel(), o.ravel(), unseen.ravel(), rounded.ravel())
+    broad = _pearson(*[one.reshape(coarse).sum((2, 4)).ravel() for one in (e, o, unseen)])
     return Outcome(
         fine, broad, _others(float(expected.total[row]), float(expected.error[row]), int(counts.others[row]), n)
     )
@@ -336,16 +377,21 @@ def _rounding(grid: Grid, row: int) -> np.ndarray:
     return np.asarray(across[..., None] + along[..., None] / np.maximum(turns, along[..., None]))
 
 
-def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int, rounding: np.ndarray | None = None) -> float:
-    """Chi-square of cells, small ones pooled; conditional on the number of samples in them, which `_others` tests."""
+def _pearson(
+    expected: np.ndarray, observed: np.ndarray, unseen: np.ndarray, rounded: np.ndarray | float = 0.0
+) -> float:
+    """Chi-square of cells, small ones pooled; conditional on the number of samples in them, which `_others` tests.
+
+    unseen   samples that the expectation of each cell may lack; its square adds to the variance
+    rounded  samples that rounding may move to the next cell, which adds likewise; pooled cells are wide
+    """
     inside, total = expected.sum(), observed.sum()
     if total < MIN_EXPECTED or inside <= 0.0:
         return 1.0 if abs(total - inside) < 6.0 * np.sqrt(max(total, inside, 1.0)) else 0.0
     expected = expected * (total / inside)
     order = np.argsort(expected, kind="stable")
-    e, o = expected[order], observed[order]
-    # the number of samples that rounding moves, squared, adds to the variance; pooled cells are wide
-    more = np.zeros(len(e)) if rounding is None else (rounding[order] * e) ** 2
+    e, o, unseen = expected[order], observed[order], unseen[order]
+    off = np.hypot(unseen, np.broadcast_to(rounded, order.shape)[order])
     cumulative = np.cumsum(e)
     # one pool for all cells below the least expectation
     small = np.searchsorted(e, MIN_EXPECTED)
@@ -354,12 +400,12 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int, rounding: n
     if small:
         e = np.concatenate([[cumulative[small - 1]], e[small:]])
         o = np.concatenate([[o[:small].sum()], o[small:]])
-        more = np.concatenate([[0.0], more[small:]])
+        off = np.concatenate([[unseen[:small].sum()], off[small:]])
     if len(e) < 2:
         return 1.0
-    if e[0] <= 0.0:
+    if e[0] <= 0.0 and off[0] <= 0.0:
         return 0.0 if o[0] else 1.0
-    return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / (e + more))), len(e) - 1)
+    return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / (e + off**2))), len(e) - 1)
 
 
 QUADRATURE = 3e-5  # error of float32 pdfs summed over thousands of cells

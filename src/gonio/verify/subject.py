@@ -255,21 +255,25 @@ class Subject:
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
         if not (self.transmits or method == "sample" or "mode" not in more):
             more["mode"] = "radiance"  # both modes are equal, and one kernel is enough
-        takes = inspect.signature(getattr(self.model, method)).parameters
-        if "mode" in more and "mode" not in takes and not isinstance(self.model, BSDF):
+        if "mode" in more and not (isinstance(self.model, BSDF) or self._takes_mode(method)):
             del more["mode"]
         return guarded(self.model, method, lambda: getattr(self.model, method)(first, second, **more))
 
+    def _takes_mode(self, method: str) -> bool:
+        return "mode" in inspect.signature(getattr(self.model, method)).parameters
+
     def _shaped(self, what: str, value: Any, count: int, dimensions: int) -> np.ndarray:
         array = np.asarray(value)
-        expected = f"({count},)" if dimensions == 1 else f"({count}, channels)"
-        place = _place(self.model, what.split(":")[0])
+        fault = ""
         if array.dtype.kind not in "fiu" or array.ndim != dimensions or (array.ndim and array.shape[0] != count):
-            raise Fault(f"{what} returned shape {array.shape}, {expected} expected", place)
-        if what in ("eval", "sample: weight") and array.shape[1] not in (1, 3, 4):
-            raise Fault(f"{what} returned {array.shape[1]} channels, those of a spectrum expected", place)
-        if what == "sample: wi" and array.shape[1] != 3:
-            raise Fault(f"{what} returned {array.shape[1]} components, 3 expected", place)
+            expected = f"({count},)" if dimensions == 1 else f"({count}, channels)"
+            fault = f"shape {array.shape}, {expected} expected"
+        elif what in ("eval", "sample: weight") and array.shape[1] not in (1, 3, 4):
+            fault = f"{array.shape[1]} channels, those of a spectrum expected"
+        elif what == "sample: wi" and array.shape[1] != 3:
+            fault = f"{array.shape[1]} components, 3 expected"
+        if fault:
+            raise Fault(f"{what} returned {fault}", _place(self.model, what.split(":")[0]))
         return array.astype(np.float64)
 
 

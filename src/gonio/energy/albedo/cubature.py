@@ -305,8 +305,10 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         wi = types.vec3(sin * cos_phi, sin * sin_phi, cos * of_cell(part.side))
         value = list(integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi))
         area = sin * width * height
-        sums = [dr.block_sum(channel * (area * weight), each) for channel in value]
+        weighed = [channel * (area * weight) for channel in value]
         summed = sum(value[1:], start=value[0]) * area
+        dr.eval(weighed, summed)  # together: each reduction would evaluate the integrand anew
+        sums = [dr.block_sum(channel, each) for channel in weighed]
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         # nodes are in rows of equal theta; a range along theta needs columns
         columns_first = dr.gather(

@@ -83,7 +83,9 @@ def over_azimuths(
     slope, weight = _azimuth(view, eta, chi_node, chi_weight, side)
     sums = _over_slopes(ndf, terms, channels, view, eta, slope, _cuts(view, eta, slope, limit), n_slope)
     factor = weight * view.alpha.x * view.alpha.y / view.mu
-    return [np.asarray((dr.block_sum(total * factor, block) * (2.0 / sides)).numpy()) for total in sums]
+    scaled = [total * factor for total in sums]
+    dr.eval(scaled)  # together: each reduction would run the loop anew
+    return [np.asarray((dr.block_sum(total, block) * (2.0 / sides)).numpy()) for total in scaled]
 
 
 class _View(NamedTuple):

@@ -174,7 +174,9 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
 
     def albedo(model: BSDF) -> Array:
         value = model.eval(wo, wi)
-        return type(value)(*[dr.block_sum(channel * share, POINTS) for channel in value])
+        parts = [channel * share for channel in value]
+        dr.eval(parts)  # together: each reduction would evaluate the base anew
+        return type(value)(*[dr.block_sum(part, POINTS) for part in parts])
 
     albedos = albedo(white), albedo(base)
     dr.eval(albedos)

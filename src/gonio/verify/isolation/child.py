@@ -182,7 +182,6 @@ class _Pool:
         self.waiting: list[int] = []  # numbers of the cards that no process judges yet
         self.laws: list[str] = []
         self.unread: list[Unread] = []
-        self.looked = 0.0  # when time and memory were checked
         self.begun: set[tuple[int, str]] = set()
         self.told: set[tuple[int, str]] = set()
         self.warned: set[str] = set()
@@ -223,9 +222,6 @@ class _Pool:
                 if worker in self.workers:
                     name, *what = answer or ("lost", worker.why())
                     getattr(self, f"_{name}")(worker, *what)
-        if time.monotonic() < self.looked + LOOK:
-            return  # thousands of calls are announced
-        self.looked = time.monotonic()
         for worker in self.workers:
             over = worker.over(self.limit, self.memory)
             if over:
@@ -250,9 +246,6 @@ class _Pool:
         if self.tell and (card, text) not in self.told:  # a card may be judged twice
             self.told.add((card, text))
             self.tell(text)
-
-    def _call(self, worker: Process, *call: str) -> None:
-        worker.call = (call[0], call[1], call[2]) if call else None
 
     def _loaded(self, worker: Process, titles: list[str], laws: list[str], unread: list[Unread]) -> None:
         self.unread = unread
@@ -287,7 +280,7 @@ class _Pool:
 
     def _lost(self, worker: Process, reason: str) -> None:
         """A process has ended: its card is judged again without the step or the call in progress."""
-        last = worker.last_line()
+        last, call = worker.last_line(), worker.call
         worker.close()
         self.workers.remove(worker)
         words = f"{reason}; the last line that it printed: {last}" if last else reason
@@ -300,7 +293,7 @@ class _Pool:
             one = self.states[worker.card]
             if last:
                 one.notes[f"the last line that it printed before it ended: {last}"] = None
-            one.avoid(self.laws, worker.step, worker.call, reason)
+            one.avoid(self.laws, worker.step, call, reason)
             self.waiting.insert(0, worker.card)
 
 

@@ -1,8 +1,8 @@
 """The process in which a BSDF is tested, started by `child`: it may loop, crash, print, or exhaust memory.
 
 Orders arrive pickled on standard input; answers leave pickled by a copy of standard output, and what the BSDF prints
-goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step, and around
-each call of the BSDF, an answer says what comes next, so that the parent knows what was in progress when it ends.
+goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step an answer, and
+around each call of the BSDF a file, says what comes next: the parent knows what was in progress when the process ends.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def main() -> None:
     """Follow the parent's orders until it closes the pipe."""
     orders, say = _pipes()
     _end_with(os.getppid())
-    task, limit = pickle.load(orders)
-    calls = _Calls(say)
+    task, limit, in_progress = pickle.load(orders)
+    calls = _Calls(in_progress)
     watch.watched, watch.LIMIT, watch.calling = True, limit, calls
     warnings.showwarning = lambda message, category, *more, **options: (
         say("warning", str(message)) if issubclass(category, GonioWarning) else None
@@ -135,14 +135,15 @@ class _Stuck(BaseException):
 
 
 class _Calls:
-    """Announces each call of the BSDF to the parent, and refuses those that ended a process before.
+    """Writes each call of the BSDF into a file for the parent, and refuses those that ended a process before.
 
+    in_progress the file
     forbidden   by method and values, the reason why it must not be called again
     given       key of the values that the material was given
     """
 
-    def __init__(self, say: Say) -> None:
-        self.say = say
+    def __init__(self, in_progress: str) -> None:
+        self.file = os.open(in_progress, os.O_CREAT | os.O_WRONLY, 0o600)
         self.forbidden: dict[tuple[str, str], str] = {}
         self.given = ""
         self._keys: dict[int, tuple[Any, str, str]] = {}
@@ -156,17 +157,23 @@ class _Calls:
         why = self.forbidden.get((method, key)) or (key != self.given and self.forbidden.get((method, OTHERS)))
         if why:
             raise Fault(why)
-        self.say("call", method, key, words)
+        self._note(method, key, words)
         try:
             yield
         except TimeoutError as error:
             raise _Stuck(str(error)) from error  # the parent still knows the call
         except BaseException as error:
-            self.say("call")
+            self._note()
             if isinstance(error, KeyboardInterrupt):  # raised by the BSDF: Ctrl-C does not reach this process
                 raise Fault(f"KeyboardInterrupt in {method}") from error
             raise
-        self.say("call")
+        self._note()
+
+    def _note(self, *call: str) -> None:
+        with contextlib.suppress(OSError, ValueError):  # the BSDF may have closed what it did not open
+            sys.stdout.flush()  # an abort would lose it
+            os.lseek(self.file, 0, os.SEEK_SET)
+            os.write(self.file, pickle.dumps(call))
 
     def _values(self, model: Any) -> tuple[str, str]:
         """The values of a material's parameters as a key, the same in every process, and as text."""

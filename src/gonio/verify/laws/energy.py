@@ -366,6 +366,7 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
         u = histogram.random_numbers(single, index, seed + 8191 * start)
         s = guarded(subject.model, "sample", lambda many=many, u=u: model.sample(many, u, mode))
         weight = exact.vec3(dr.select(s[2] > 0.0, single.vec3(s[1]), 0.0)) + dr.zeros(exact.float, len(part) * count)
+        dr.eval(weight)  # all channels together: each reduction would draw the samples anew
         sums = [dr.block_sum(channel, count) for channel in weight]
         squares = [dr.block_sum(dr.square(channel), count) for channel in weight]
         most = [dr.block_reduce(dr.ReduceOp.Max, channel, count) for channel in weight]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...errors import GonioError, InputError
 from ...material import BSDF
-from ...shaders import bundle, read_back
-from ...shaders.program import FUNCTIONS, check
-from ...spirv.compiler import compiler
 from .. import directions
 from .. import subject as subjects
 from ..effort import Effort
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs
+
+if TYPE_CHECKING:
+    from ...shaders import read_back
 
 SHOWN = 8  # parameters of the worst case
 PAIRS = 2048  # thresholds such as alpha < 1e-4 need some
@@ -36,6 +38,8 @@ class Shader(Law):
         model = subject.model
         if not isinstance(model, BSDF):
             raise DoesNotApply("it is no material of Gonio's, and no shader code is written from it")
+        from ...shaders.program import FUNCTIONS, check  # imported late: 0.1 s, and this law is tried on request
+
         try:
             check(model, FUNCTIONS, "shader")
         except InputError as error:
@@ -48,6 +52,8 @@ class Shader(Law):
 
     def _compare(self, model: BSDF, inputs: tuple[np.ndarray, ...], seed: int, finding: Finding) -> None:
         """Add the differences in all languages to the finding."""
+        from ...shaders import bundle, read_back
+
         original: read_back.Original | None = None
         wo, wi, u = inputs
         for language in languages(finding):
@@ -91,6 +97,9 @@ def _add(
 
 def languages(finding: Finding) -> list[str]:
     """The languages that can be read here: without a compiler WGSL alone, and the law cannot pass."""
+    from ...shaders import read_back
+    from ...spirv.compiler import compiler
+
     try:
         compiler()
     except GonioError as error:
