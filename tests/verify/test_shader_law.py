@@ -9,7 +9,6 @@ from gonio.errors import MachineError
 from gonio.shaders import bundle
 from gonio.verify import page, verify
 from gonio.verify.ci import github, junit
-from gonio.verify.laws import shader
 
 
 class Own(go.BSDF):

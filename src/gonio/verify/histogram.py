@@ -88,9 +88,9 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
         missed = points.missed_by(area, last.most)
         by_samples = (missed > allowed) & (off < FAINT * missed)
-        left = shown & ~by_samples & points.alone(len(box))
+        left = shown & ~by_samples & points.single(len(box))
         np.add.at(unseen, owner[left], points.share_in(len(box))[left])
-        shown = by_samples & points.alone(len(box))
+        shown = by_samples & points.single(len(box))
         aside = np.maximum(aside, missed)
         divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
@@ -144,7 +144,7 @@ class _Points(NamedTuple):
         turn = np.arctan2(wi[:, 1], wi[:, 0]) % (2.0 * np.pi)
         return cls(box, height(wi), turn, look.at(which, wi), share[which])
 
-    def alone(self, count: int) -> np.ndarray:
+    def single(self, count: int) -> np.ndarray:
         """Whether each of `count` boxes has one sample."""
         return np.bincount(self.box, minlength=count) == 1
 
@@ -161,9 +161,9 @@ class _Points(NamedTuple):
 
     def within(self, divided: np.ndarray, height: np.ndarray, azimuth: np.ndarray) -> _Points:
         """The points in divided boxes, numbered by the quarters, which meet at these heights and azimuths."""
-        kept = _Points(*[column[divided[self.box]] for column in self])
-        box = (np.cumsum(divided) - 1)[kept.box]
-        return kept._replace(box=4 * box + (kept.height > height[box]) + 2 * (kept.azimuth > azimuth[box]))
+        inside = _Points(*[column[divided[self.box]] for column in self])
+        box = (np.cumsum(divided) - 1)[inside.box]
+        return inside._replace(box=4 * box + (inside.height > height[box]) + 2 * (inside.azimuth > azimuth[box]))
 
 
 _GAUSS = {order: product(order) for order in (2, 3, 4)}

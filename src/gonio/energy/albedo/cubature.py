@@ -138,11 +138,11 @@ def _integrate(
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells, 4.0 * inner.most.reshape(-1, 4).max(1))
-        alone = np.bincount(points.cell, minlength=len(missed)) == 1
+        single = np.bincount(points.cell, minlength=len(missed)) == 1
         by_samples = (missed > allowed) & (difference.max(1) < FAINT * missed)
-        done = shown & alone & ~by_samples
+        done = shown & single & ~by_samples
         unseen += np.bincount(cells.row[done], points.light_in(done), len(wo))
-        shown = by_samples & alone
+        shown = by_samples & single
         difference += missed[:, None]
         divide |= missed > allowed
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:

@@ -66,6 +66,14 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
     They are rounded to float32, so that both precisions get the same input; with `exact` they are unit vectors to 64
     bits.
     """
+    key = f"pairs {count} {seed} {exact}"
+    if key not in subject.memo:  # several laws look at the same ones
+        subject.memo[key] = _pairs(subject, count, seed, exact)
+    wo, wi = subject.memo[key]
+    return wo.copy(), wi.copy()
+
+
+def _pairs(subject: Subject, count: int, seed: int, exact: bool) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng([seed, 1])
     sides = np.array(subject.sides or (1,))
     wo = directions.uniform(rng, count)
