@@ -21,7 +21,7 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.verify import cells, directions, histogram, subject, verify
+from gonio.verify import cells, directions, expectation, histogram, subject, verify
 from scipy import stats
 
 ROOT = Path(__file__).parents[1]
@@ -136,7 +136,7 @@ def uniform(seeds: int) -> None:
     found: dict[str, list[float]] = {"fine": [], "coarse": [], "others": []}
     for seed in range(seeds):
         grid = cells.place(one, wo, seed)
-        expected = histogram.expect(one, grid, 0.1 * 2.0**-9)
+        expected = expectation.expect(one, grid, 0.1 * 2.0**-9)
         counts = histogram.count(one, grid, 18, seed)
         for row in range(len(wo)):
             for kind, p in histogram.compare(expected, counts, row)._asdict().items():

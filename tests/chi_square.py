@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from gonio.verify import cells, histogram, statistics
+from gonio.verify import cells, expectation, histogram, statistics
 
 SUITE = 400  # chi-square tests in the whole suite: Sidak's correction keeps the chance of one false alarm at 1 %
 SIGNIFICANCE = statistics.sidak(0.01, SUITE)
@@ -24,7 +24,7 @@ def p_value(samples: np.ndarray, valid: np.ndarray, density: Callable[[np.ndarra
         return density(wi)
 
     grid = cells.place_around([pilot], np.array([[0.0, 0.0, 1.0]]), pdf)
-    expected = histogram.expect(pdf, grid, 0.1 * drawn**-0.5)
+    expected = expectation.expect(pdf, grid, 0.1 * drawn**-0.5)
     outcome = histogram.compare(expected, histogram.count_given(counted, drawn, grid), 0)
     lowest = min(outcome)
     return 1.0 - (1.0 - lowest) ** len(outcome), float(expected.total[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.verify import cells, directions, histogram, statistics, subject, verify
+from gonio.verify import cells, directions, expectation, histogram, statistics, subject, verify
 from scipy import stats
 
 WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0, 20.0, 200.0])))
@@ -15,7 +15,7 @@ def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -
     one = subject.of(model)
     grid = cells.place(one, wo, seed)
     assert grid is not None
-    expected = histogram.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
+    expected = expectation.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
     counts = histogram.count(one, grid, log_samples, seed)
     assert np.all(counts.cells.sum((1, 2, 3)) + counts.others == counts.drawn)
     return [histogram.compare(expected, counts, row) for row in range(len(wo))]
@@ -92,5 +92,5 @@ def test_a_step_beside_the_edges_of_a_ring_of_cells_is_found(place: float) -> No
     def density(_: np.ndarray, wi: np.ndarray) -> np.ndarray:
         return np.where(1.0 - np.abs(wi[:, 2]) < edge, 2.0, 1.0) / (2.0 * np.pi * (1.0 + edge)) * (wi[:, 2] > 0.0)
 
-    expected = histogram.expect(density, grid, 0.1 * 2.0**-10)
+    expected = expectation.expect(density, grid, 0.1 * 2.0**-10)
     assert expected.total[0] == pytest.approx(1.0, abs=3e-5)

@@ -13,6 +13,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..ops import backend
+from ..ops.backend import Array, Types
 from . import directions
 from .subject import Subject
 
@@ -162,3 +164,33 @@ def direction(height: np.ndarray, azimuth: np.ndarray, side: np.ndarray | float)
     """Unit vectors (..., 3) of 1 - |z| and azimuth, on a side of the surface."""
     r = np.sqrt(height * (2.0 - height))
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), (1.0 - height) * side], -1)
+
+
+def cell_of(grid: Grid, which: Array, wi: Array) -> tuple[Array, Array]:
+    """The number of each direction's cell, and whether it is on a side that has cells."""
+    dr = backend.drjit()
+    kind = backend.types("float32")
+    UInt = kind.module.UInt32
+    _, sides, rows, columns = grid.shape
+    reach = dr.abs(wi.x) + dr.abs(wi.y)
+    turn = wi.y / dr.select(reach > 0.0, reach, 1.0)
+    turn = dr.select(wi.x < 0.0, 2.0 - turn, dr.select(wi.y < 0.0, 4.0 + turn, turn))
+    height = (wi.x * wi.x + wi.y * wi.y) / (1.0 + dr.abs(wi.z))
+    above = wi.z > 0.0
+    if sides == 2:
+        group = which * 2 + dr.select(above, UInt(0), UInt(1))
+        inside = wi.z != 0.0
+    else:
+        group = which
+        inside = above if grid.sides[0] > 0 else wi.z < 0.0
+    row_edges, column_edges = (kind.float(np.ascontiguousarray(e.ravel())) for e in (grid.rows, grid.columns))
+    row = _find(kind, row_edges, group * (rows + 1), rows, height)
+    line = group * rows + row
+    column = _find(kind, column_edges, line * (columns + 1), columns, turn)
+    return line * columns + column, inside
+
+
+def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> Array:
+    """The cell of a value: the last whose lower edge is not above it."""
+    dr = backend.drjit()
+    return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)

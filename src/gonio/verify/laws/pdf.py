@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import directions, estimators, histogram, severity
+from .. import directions, estimators, expectation, histogram, severity
 from ..cells import place
 from ..effort import Effort
 from ..figures import SampleCells
@@ -299,13 +299,13 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
     grid = place(subject, wo, seed, effort.cells)
     if grid is None or not len(grid.wo):
         return []
-    expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
+    expected = expectation.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
     counts = histogram.count(subject, grid, effort.log_samples, seed)
     tested = []
     for i in range(len(grid.wo)):
-        expectation = expected.cells[i] * counts.drawn
+        predicted = expected.cells[i] * counts.drawn
         cells = SampleCells(
-            expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides
+            predicted, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides
         )
         outcome = histogram.compare(expected, counts, i, grid)
         tested.append(

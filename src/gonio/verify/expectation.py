@@ -1,0 +1,240 @@
+"""What the chi-square test expects: a pdf's integral over every cell.
+
+Cells whose error exceeds what the noise of their counts allows are divided, also where only the samples that placed the
+cells show a lobe that is narrower than a cell.
+
+    expected = expect(subject, grid, tolerance)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..energy.albedo.cells import Seen, product, rim, step_aside
+from ..energy.albedo.cubature import FAINT, UNSEEN
+from ..ops import backend
+from ..ops.backend import Array
+from .cells import Density, Grid, boxes, cell_of, direction, height
+from .subject import Subject, guarded
+
+DEPTH = 9  # divisions of a cell; cells with a step, such as that of total reflection, are divided to the last
+ASIDE = 1.1  # ratio: a step of a tenth at the edges of a ring of cells is 1e-4 of the total
+MAX_CELLS = 400_000  # of one round, some 10 M directions
+
+
+class Expectation(NamedTuple):
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), its error from cells
+    that were not fully divided, and an estimate of what each cell lacks of lobes that no sample of the pilot has shown
+    (`cubature`), (N, sides, rows, columns)."""
+
+    cells: np.ndarray
+    total: np.ndarray
+    error: np.ndarray
+    unseen: np.ndarray
+
+
+def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
+    """The pdf's integral over every cell; cells whose error exceeds what their noise allows are divided.
+
+    pdf        of a subject, or a function of rows
+    tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
+    """
+    look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
+    a, b, c, d = (edge.ravel() for edge in boxes(grid.rows, grid.columns))
+    row, side, _, _ = np.unravel_index(np.arange(len(a)), grid.shape)
+    side = np.array(grid.sides)[side]
+    integral, unseen = np.zeros(len(a)), np.zeros(len(a))
+    unresolved = np.zeros(len(grid.wo))
+    owner = np.flatnonzero((b > a) & (d > c))
+    box = np.stack([a, b, c, d], -1)[owner]
+    points, shown = _Points.of(look, grid, owner), np.zeros(len(owner), bool)  # by a single sample
+    for depth in range(DEPTH):
+        place = row[owner], side[owner], box
+        two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
+        four = last.integral
+        # The error of four nodes is far below the difference from two: for smooth cells its square, over the value.
+        # With a step through the middle, two and four agree by chance, and three does not.
+        rough = np.abs(four - three.integral)
+        off = np.maximum(0.3 * np.abs(four - two.integral), rough)
+        allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
+        area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
+        aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
+        missed = points.missed_by(area, last.most)
+        by_samples = (missed > allowed) & (off < FAINT * missed)
+        left = shown & ~by_samples & points.single(len(box))
+        np.add.at(unseen, owner[left], points.share_in(len(box))[left])
+        shown = by_samples & points.single(len(box))
+        aside = np.maximum(aside, missed)
+        divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
+        divide &= depth < DEPTH - 1
+        if 4 * divide.sum() > MAX_CELLS:  # a pdf that is rough everywhere: only the roughest cells
+            worst = np.argsort(-np.where(divide, np.maximum(off, missed) / allowed, 0.0))
+            divide[worst[MAX_CELLS // 4 :]] = False
+        np.add.at(unresolved, row[owner[~divide]], np.maximum(rough, aside)[~divide])
+        np.add.at(integral, owner[~divide], four[~divide])
+        if not divide.any():
+            break
+        owner, shown = np.repeat(owner[divide], 4), np.repeat(shown[divide], 4)
+        box, heights, azimuths = _quarters(box[divide])
+        points = points.within(divide, heights, azimuths)
+    shaped, left = integral.reshape(grid.shape), unseen.reshape(grid.shape)
+    return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved + left.sum((1, 2, 3)), left)
+
+
+def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N,)."""
+    a, b, c, d = box.T
+    # the heights of a narrow lobe span decades: they are halved in ratio
+    m = np.where(b > 4.0 * a, np.maximum(np.sqrt(a * b), b / 64.0), 0.5 * (a + b))
+    q = 0.5 * (c + d)
+    parts = [(a, m, c, q), (m, b, c, q), (a, m, q, d), (m, b, q, d)]
+    return np.stack([np.stack(part, -1) for part in parts], 1).reshape(-1, 4), m, q
+
+
+class _Points(NamedTuple):
+    """The pilot's samples inside boxes: the box's number, 1 - |z|, azimuth, the pdf, and the share of all samples."""
+
+    box: np.ndarray
+    height: np.ndarray
+    azimuth: np.ndarray
+    value: np.ndarray
+    share: np.ndarray
+
+    @classmethod
+    def of(cls, look: _Look, grid: Grid, owner: np.ndarray) -> _Points:
+        """The samples that placed a grid's cells, in the boxes of the cells `owner`."""
+        dr = backend.drjit()
+        kind = backend.types("float32")
+        which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
+        wi = np.concatenate(grid.pilot)
+        index, inside = cell_of(grid, kind.module.UInt32(which), backend.vector_of(wi, 3, kind))
+        dr.eval(index, inside)
+        box_of = np.full(int(np.prod(grid.shape)), -1)
+        box_of[owner] = np.arange(len(owner))
+        box = np.where(inside.numpy(), box_of[index.numpy()], -1)
+        which, wi, box = which[box >= 0], wi[box >= 0], box[box >= 0]
+        share = 1.0 / np.maximum([len(samples) for samples in grid.pilot], 1)
+        turn = np.arctan2(wi[:, 1], wi[:, 0]) % (2.0 * np.pi)
+        return cls(box, height(wi), turn, look.at(which, wi), share[which])
+
+    def single(self, count: int) -> np.ndarray:
+        """Whether each of `count` boxes has one sample."""
+        return np.bincount(self.box, minlength=count) == 1
+
+    def share_in(self, count: int) -> np.ndarray:
+        """The share of all samples in each of `count` boxes."""
+        return np.bincount(self.box, self.share, count)
+
+    def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """The share of samples in each box whose nodes, with the largest value `most`, are all dark beside one of the
+        samples, else 0: the lobe is narrower than the box."""
+        bright = np.zeros(len(most))
+        np.maximum.at(bright, self.box, self.value)
+        return np.where(most < UNSEEN * bright, np.minimum(bright * area, self.share_in(len(most))), 0.0)
+
+    def within(self, divided: np.ndarray, height: np.ndarray, azimuth: np.ndarray) -> _Points:
+        """The points in divided boxes, numbered by the quarters, which meet at these heights and azimuths."""
+        inside = _Points(*[column[divided[self.box]] for column in self])
+        box = (np.cumsum(divided) - 1)[inside.box]
+        return inside._replace(box=4 * box + (inside.height > height[box]) + 2 * (inside.azimuth > azimuth[box]))
+
+
+_GAUSS = {order: product(order) for order in (2, 3, 4)}
+_RIM = rim(1e-4)
+
+
+class _Look(Protocol):
+    """The pdf at nodes of boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere."""
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen: ...
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        """The pdf at directions (M, 3), for the wo of these rows."""
+
+
+CHUNK = 1 << 22  # directions at a time
+
+
+class _ByRows:
+    """The pdf as a function of rows (wo, wi)."""
+
+    def __init__(self, pdf: Density, wo: np.ndarray) -> None:
+        self.pdf, self.wo = pdf, wo
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        values = np.empty((len(box), len(s)))
+        for start in range(0, len(box), CHUNK // len(s)):
+            part = slice(start, start + CHUNK // len(s))
+            a, b, c, d = box[part].T[..., None]
+            wi = direction(a + (b - a) * s, c + (d - c) * t, side[part, None]).reshape(-1, 3)
+            values[part] = self.pdf(np.repeat(self.wo[row[part]], len(s), axis=0), wi).reshape(-1, len(s))
+        a, b, c, d = box.T
+        return Seen(values @ weight * (b - a) * (d - c), values.min(1), values.max(1))
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        return self.pdf(self.wo[row], wi)
+
+
+class _InKernel:
+    """The pdf of a subject, with directions generated in its kernel."""
+
+    def __init__(self, subject: Subject, wo: np.ndarray) -> None:
+        self.subject = subject
+        self.precision = subject.best
+        self.model = subject.bound(self.precision)
+        self.wo = wo
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        parts = [
+            self._part(row[i : i + n], side[i : i + n], box[i : i + n], s, t, weight)
+            for n in [CHUNK // len(s)]
+            for i in range(0, len(box), n)
+        ]
+        if not parts:
+            return Seen(*np.empty((3, 0)))
+        return Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])
+
+    def _part(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        dr = backend.drjit()
+        exact, own = backend.types("float64"), backend.types(self.precision)
+        UInt = exact.module.UInt32
+        index = dr.arange(UInt, len(box) * len(s))
+        cell, node = index // len(s), index % len(s)
+
+        def of_cell(column: np.ndarray) -> Array:
+            return dr.gather(exact.float, backend.float_of(column, exact), cell)
+
+        def of_node(column: np.ndarray) -> Array:
+            return dr.gather(exact.float, backend.float_of(column, exact), node)
+
+        a, b, c, d = (of_cell(column) for column in box.T)
+        height, phi = a + (b - a) * of_node(s), c + (d - c) * of_node(t)
+        r = dr.sqrt(height * (2.0 - height))
+        sin, cos = dr.sincos(phi)
+        wi = own.vec3(r * cos, r * sin, (1.0 - height) * of_cell(side))
+        wo = own.vec3(*[of_cell(column) for column in self.wo[row].T])
+        pdf = guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, wi))
+        value = exact.float(pdf) + dr.zeros(exact.float, len(index))
+        weighed = value * of_node(weight) * (b - a) * (d - c)
+        dr.eval(value, weighed)  # together: each reduction would evaluate the pdf anew
+        integral = dr.block_sum(weighed, len(s))
+        least, most = (dr.block_reduce(op, value, len(s)) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max))
+        dr.eval(integral, least, most)
+        return Seen(integral.numpy(), least.numpy(), most.numpy())
+
+    def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        dr, own = backend.drjit(), backend.types(self.precision)
+        number = own.module.UInt32(row)
+        wo = own.vec3(*[dr.gather(own.float, backend.float_of(column, own), number) for column in self.wo.T])
+        i = backend.vector_of(wi, 3, own)
+        return backend.to_numpy(guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, i)), len(row))
