@@ -33,7 +33,12 @@ from gonio.work.cluster import Cluster
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-pytest.importorskip("distributed")
+
+@pytest.fixture(scope="module", autouse=True)
+def distributed() -> None:
+    """Without it nothing here can be tried. It takes 0.7 s to import, in each process that collects tests."""
+    pytest.importorskip("distributed")
+
 
 LARGE = (120, 80)  # enough lanes for many parts
 

@@ -71,6 +71,10 @@ def test_what_is_written_is_read_again() -> None:
         assert not same(again, go.Lambert())
 
 
+def test_one_value_per_ray_is_not_written_out() -> None:
+    assert notation.written(np.zeros((2000, 3))) == "an array of shape (2000, 3)"
+
+
 class Strict(BSDF):
     """A user's own class without defaults."""
 

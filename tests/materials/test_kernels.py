@@ -29,6 +29,30 @@ def test_more_directions_compile_no_kernel(material: go.BSDF) -> None:
     assert compiled[1] == 0, compiled
 
 
+@pytest.mark.parametrize("method", ["eval", "pdf", "sample"])
+def test_all_parts_of_an_answer_are_one_kernel(method: str) -> None:
+    """A sample has five parts; a kernel for each would compute the half vector five times."""
+    dr = backend.drjit()
+    wo, other = random_directions(65, 1), random_directions(65, 2) if method != "sample" else np.full((65, 3), 0.3)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        getattr(go.Conductor(alpha=0.3), method)(wo, other)
+        assert len(dr.kernel_history([dr.KernelType.JIT])) == 1
+
+
+def test_an_integral_evaluates_its_integrand_once_for_all_channels() -> None:
+    from gonio.energy.albedo import cubature
+    from gonio.verify import subject
+
+    dr = backend.drjit()
+    one = subject.of(go.Conductor(alpha=0.3))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        cubature.integrate(one.sample, one.power(), np.array([[0.6, 0.0, 0.8]]), 1e-3)
+        sizes = [k["size"] for k in dr.kernel_history([dr.KernelType.JIT]) if k["operation_count"] > 100]
+    assert sorted(sizes) == [1024, 1024, *sorted(set(sizes) - {1024})]  # samples and their values, then each round
+
+
 def test_a_changed_width_compiles_no_kernel() -> None:
     dr = backend.drjit()
     wo, wi = random_directions(65, 1), random_directions(65, 2)

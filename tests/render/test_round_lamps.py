@@ -153,7 +153,7 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     assert found[0] == pytest.approx(found[1], rel=4e-3)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize(
     "shape, flipped",

@@ -74,7 +74,9 @@ def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> 
     assert _failures(page, GLSL, {"broken": GLSL_HEAD + "float f() { return 1; }" + end}) != {}
 
 
-@HALVES
+@pytest.mark.parametrize(
+    "names", [SINGLE[::3], pytest.param([*EVERY], marks=pytest.mark.slow)], ids=["every third of one layer", "all"]
+)
 def test_wgsl_of_every_model_compiles_in_webgpu(page: Any, names: list[str]) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):
         pytest.skip("NOT TRIED in WebGPU: this browser has no adapter")
@@ -98,8 +100,8 @@ def _glslang(text: str, folder: Path) -> str:
     return "" if done.returncode == 0 else f"exit {done.returncode}: {done.stdout}{done.stderr}"
 
 
-# of the long ones one at once: they differ in what the other languages' compilers see too
-QUICK = set(SHAPES) - set(materials.COMPOSED) | {"openpbr"}
+# the long ones differ in what the other languages' compilers see too
+QUICK = set(SHAPES) - set(materials.COMPOSED)
 
 
 @pytest.mark.sample(2)

@@ -11,9 +11,11 @@ from scipy import stats
 WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0, 20.0, 200.0])))
 
 
-def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -> list[histogram.Outcome]:
+def outcomes(
+    model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO, size: tuple[int, int] = cells.CELLS
+) -> list[histogram.Outcome]:
     one = subject.of(model)
-    grid = cells.place(one, wo, seed)
+    grid = cells.place(one, wo, seed, size)
     assert grid is not None
     expected = expectation.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
     counts = histogram.count(one, grid, log_samples, seed)
@@ -31,7 +33,7 @@ def test_a_right_model_is_not_rejected_at_any_width(alpha: float) -> None:
 def test_a_streak_that_is_narrower_than_cells_is_expected_where_the_samples_are() -> None:
     streak = go.Conductor(alpha=(0.0003, 0.2), ndf="beckmann")
     wo = directions.single(directions.at(np.array([61.0]), 300.0))
-    assert min(min(o) for o in outcomes(streak, 18, 1, wo)) > statistics.sidak(0.001, 2)
+    assert min(min(o) for o in outcomes(streak, 16, 1, wo, (50, 100))) > statistics.sidak(0.001, 2)
 
 
 def test_there_are_as_many_cells_as_promised() -> None:

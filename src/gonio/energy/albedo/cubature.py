@@ -270,6 +270,7 @@ def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
     """The sum of the channels at rows of directions, (N,); 0 where it is not a number."""
     types = backend.types("float64")
     values = list(integrand(backend.vector_of(wo, 3, types), backend.vector_of(wi, 3, types)))
+    backend.drjit().eval(values)
     return np.nan_to_num(np.sum([backend.to_numpy(value, len(wi)) for value in values], axis=0), posinf=0.0)
 
 
