@@ -108,6 +108,7 @@ def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precis
         body=body,
         labels=("i", "total", "squares", "rng"),
     )
+    dr.eval(total, squares)  # together: each alone would run the loop
     mean = np.asarray(total.numpy(), float) / spp
     variance = np.maximum(np.asarray(squares.numpy(), float) / spp - mean**2, 0.0)
     return Estimate(mean.reshape(shape), np.sqrt(variance / spp).reshape(shape))

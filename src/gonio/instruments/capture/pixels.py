@@ -154,6 +154,7 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
     types = backend.types("float64")
     ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
     view = observe(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
+    backend.drjit().eval(view)
     wo, wi, square = (backend.to_numpy(part, len(place)) for part in view)
     return wo, wi, square
 
@@ -335,6 +336,7 @@ def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
 
     types = backend.types("float64")
     coordinates = angles.half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
+    backend.drjit().eval(coordinates)
     theta_h, theta_d, phi_d = (backend.to_numpy(part, len(wo)) for part in coordinates)
     return theta_h, theta_d, phi_d % np.pi
 

@@ -141,6 +141,7 @@ def albedo(table: Measurement, theta: Floats) -> Floats:
     for angle in theta:
         wo = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], (POINTS, 3))
         drawn = table.draw(backend.vector_of(wo, 3, types), backend.vector_of(lattice, 3, types))
+        backend.drjit().eval(drawn)
         wi, pdf = (backend.to_numpy(part, POINTS) for part in drawn)
         upper = (pdf > 0.0) & (wi[:, 2] > 0.0)
         albedos.append((table.rgb(wo[upper], wi[upper]) / pdf[upper, None]).sum(axis=0) / POINTS)
