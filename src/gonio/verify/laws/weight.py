@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...ops import Precision
+from ...ops import Mode, Precision
 from .. import directions, estimators, severity, statistics
 from ..effort import Effort
 from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject
 from ..verdict import Finding, Trial
-from .base import Law, pair_in_words, relative, rounding, worst_of
+from .base import Law, beyond_rounding, pair_in_words, relative, worst_of
 
 EXACT = 1e-10
 SINGLE = 2e-3
@@ -103,7 +103,7 @@ class Weight(Law):
     def _at(
         self, subject: Subject, wo: np.ndarray, u: np.ndarray, precision: Precision, problems: list[str]
     ) -> tuple[float, int, np.ndarray]:
-        modes = ("radiance", "importance") if subject.transmits else ("radiance",)
+        modes: tuple[Mode, ...] = ("radiance", "importance") if subject.transmits else ("radiance",)
         worst, where, wi = 0.0, 0, wo[0]
         for mode in modes:
             s = subject.sample(wo, u, mode, precision)
@@ -136,16 +136,18 @@ class Weight(Law):
             c, d = s.pdf[rows, None], pdf[rows, None]
             scale = np.maximum(s.pdf[rows, None] * np.abs(s.weight[rows]).max(initial=1.0), 0.0)
             floor = 1e-6 * scale
+            least = 1e-6 * scale.max(1, keepdims=True)
             if precision == "float64":
-                noise_value: np.ndarray | float = 0.0
-                noise_pdf: np.ndarray | float = 0.0
+                of_value, of_pdf = relative(a, b, 0.0, floor), relative(c, d, 0.0, least)
             else:
-                noise_value = rounding(lambda o, i, m=mode: subject.eval(o, i, m, precision), wo[rows], s.wi[rows])  # type: ignore[misc]
-                noise_pdf = rounding(lambda o, i: subject.pdf(o, i, precision)[:, None], wo[rows], s.wi[rows])
-            error = np.maximum(
-                relative(a, b, noise_value, floor).max(1),
-                relative(c, d, noise_pdf, 1e-6 * scale.max(1, keepdims=True))[:, 0],
-            )
+                o, i = wo[rows], s.wi[rows]
+
+                def evaluate(o: np.ndarray, i: np.ndarray, mode: Mode = mode) -> np.ndarray:
+                    return subject.eval(o, i, mode, precision)
+
+                of_value = beyond_rounding(a, b, evaluate, o, i, floor, SINGLE)
+                of_pdf = beyond_rounding(c, d, lambda o, i: subject.pdf(o, i, precision)[:, None], o, i, least, SINGLE)
+            error = np.maximum(of_value.max(1), of_pdf[:, 0])
             if precision == "float32" and not error.max() <= SINGLE:
                 # a direction that rounding moves over an edge (the horizon, total reflection) is not an error
                 error = np.where(_on_edge(subject, wo[rows], s.wi[rows], precision), 0.0, error)
