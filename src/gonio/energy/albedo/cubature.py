@@ -115,8 +115,7 @@ def _integrate(
 
     Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as one
     beside the streak. The light of samples that are alone in a cell which is divided for them estimates what is left
-    (I. J. Good, "The population frequencies of species and the estimation of population parameters", Biometrika 40,
-    1953, eq. 9).
+    (Good1953: if N_1 of N draws are alone of their kind, kinds not seen yet have the probability N_1 / N).
     """
     cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
