@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -137,3 +139,9 @@ def test_what_the_command_line_tells_is_there_in_python(tmp_path: Path) -> None:
     assert list(go.info(tmp_path / "m.json")) == ["path", "materials"]
     with pytest.raises(InputError):
         go.info(tmp_path / "a.png")
+
+
+def test_a_module_that_is_not_imported_yet_says_how() -> None:
+    code = "import gonio\ntry: gonio.mitsuba\nexcept AttributeError as error: print(error)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "module 'gonio' has no attribute 'mitsuba': write `import gonio.mitsuba`\n", done.stderr

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -189,7 +190,9 @@ if not TYPE_CHECKING:  # a type checker would accept every misspelt name
         if class_name in _FLAT:
             return __getattr__(class_name)
         if class_name.islower():  # a submodule that is being imported, not a material
-            raise AttributeError(f"module 'gonio' has no attribute '{name}'")
+            module = Path(__file__).with_name(name)
+            hint = f": write `import gonio.{name}`" if module.is_dir() or module.with_suffix(".py").is_file() else ""
+            raise AttributeError(f"module 'gonio' has no attribute '{name}'{hint}")
         for cls in __getattr__("models")().values():
             if cls.__name__ == class_name:
                 return cls

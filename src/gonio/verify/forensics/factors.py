@@ -21,7 +21,7 @@ Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of (wo, wi)
 
 
 class Factor(NamedTuple):
-    """A factor: its formula, the mistake that it suggests, its values; `of_wo`: known but for a number for each wo."""
+    """A factor: its formula, the mistake that it suggests, and its values; with `of_wo`, only up to a number per wo."""
 
     formula: str
     guess: str

@@ -144,7 +144,8 @@ STEEP = 0.7  # ratio of what the pdf lacks near the normal to what it lacks at a
 
 
 def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[Cause]:
-    """Samples never fail, and the pdf lacks the more of them the more oblique the view, but has nowhere too many."""
+    """No sample fails, and the pdf predicts too few, the fewer the more oblique the view; nowhere does it predict too
+    many."""
     above = [tested for tested in tests if tested.wo[2] > 0.0]
     if len(above) < 2 or min(tested.cells.observed.sum() / tested.cells.drawn for tested in above) < ALL:
         return
