@@ -68,7 +68,7 @@ class Process:
         """The call that was in progress when the process ended; None outside of any call."""
         try:
             return pickle.loads(self.in_progress.read_bytes()) or None
-        except (OSError, EOFError):  # before the first call
+        except Exception:  # before the first call, or of a process that ended while it wrote
             return None
 
     def over(self, limit: float, memory: float) -> str:
