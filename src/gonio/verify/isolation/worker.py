@@ -170,8 +170,9 @@ class _Calls:
         self._note()
 
     def _note(self, *call: str) -> None:
-        with contextlib.suppress(OSError, ValueError):  # the BSDF may have closed what it did not open
-            sys.stdout.flush()  # an abort would lose it
+        with contextlib.suppress(Exception):  # the BSDF may have closed it
+            sys.stdout.flush()  # an abort would lose what it holds
+        with contextlib.suppress(OSError):
             os.lseek(self.file, 0, os.SEEK_SET)
             os.write(self.file, pickle.dumps(call))
 
