@@ -87,7 +87,7 @@ def test_masked_visible_area_is_the_projected_area(gamma: float, alpha: float, d
     assert ndf.G1(vector(v), widths).numpy()[0] * visible == pytest.approx(v[2], rel=1e-4)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "alpha"),
     [("ggx", (0.15, 0.6)), ("beckmann", (0.3, 0.3)), ("slopes", (0.15, 0.6)), ("gtr", (0.3, 0.3))],

@@ -104,13 +104,14 @@ def agree(scene: Any, theirs_dict: dict, spp: int = 256, runs: int = 4, **settin
         assert worst < 6, f"{worst:.1f} sigma apart"
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_path_agrees_with_mitsuba_under_every_light(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))
     agree(scene, {"type": "path", "max_depth": 5}, integrator="path", max_depth=5)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("lamp", ["area", "gonio_area", "point", "constant", "two areas"])
 def test_direct_agrees_with_mitsuba(lamp: str) -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS[lamp]))

@@ -209,6 +209,7 @@ def test_passes_of_any_size_add_up_to_the_same_bits(scene: Path, tmp_path: Path,
     assert np.array_equal(a, b) and one.done == other.done > 2 * until.FIRST
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("at", [5, 16, 27])
 def test_one_that_was_stopped_goes_on_to_the_same_bits(scene: Path, tmp_path: Path, shared_out: None, at: int) -> None:
     whole = finish(drawing(scene, 3e-4, tmp_path))

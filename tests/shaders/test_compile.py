@@ -52,21 +52,22 @@ def _failures(page: Any, script: str, texts: dict[str, str]) -> dict[str, str]:
     return {name: log for name, log in zip(texts, found, strict=True) if log}
 
 
-# the whole run compiles what the quick one leaves: those of many layers, of which HLSL has one
 SINGLE = [n for n in SHAPES if n not in materials.COMPOSED]
-HALVES = pytest.mark.parametrize(
-    "names", [SINGLE, pytest.param([n for n in EVERY if n not in SINGLE], marks=pytest.mark.slow)],
-    ids=["every model of one layer", "the rest"],
-)  # fmt: skip
 
 
-def test_the_quick_run_compiles_every_model() -> None:
+def some(step: int) -> pytest.MarkDecorator:
+    """Of the models of one layer every few, and, in the whole run, every model."""
+    rest = pytest.param([*EVERY], marks=pytest.mark.slow)
+    return pytest.mark.parametrize("names", [SINGLE[::step], rest], ids=["some", "every model"])
+
+
+def test_the_whole_run_compiles_every_model() -> None:
     # random walks are refused; the others take materials or files: pages of them are written in tests/viewer
     elsewhere = {"bump", "measured", "random-walk", "sum"}
-    assert {EVERY[name].name for name in SINGLE} == set(go.models()) - elsewhere - {"openpbr", "disney2015"}
+    assert {material.name for material in EVERY.values()} == set(go.models()) - elsewhere
 
 
-@HALVES
+@some(2)
 def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> None:
     end = "\nout vec4 color;\nvoid main() { color = vec4(0.0); }\n"
     texts = {name: GLSL_HEAD + written(name, "glsl").text + end for name in names}
@@ -74,9 +75,7 @@ def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> 
     assert _failures(page, GLSL, {"broken": GLSL_HEAD + "float f() { return 1; }" + end}) != {}
 
 
-@pytest.mark.parametrize(
-    "names", [SINGLE[::3], pytest.param([*EVERY], marks=pytest.mark.slow)], ids=["every third of one layer", "all"]
-)
+@some(3)
 def test_wgsl_of_every_model_compiles_in_webgpu(page: Any, names: list[str]) -> None:
     if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):
         pytest.skip("NOT TRIED in WebGPU: this browser has no adapter")

@@ -72,6 +72,7 @@ def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
     _check(page, "glsl", name, 64)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "name",
     [

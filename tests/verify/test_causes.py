@@ -158,7 +158,7 @@ class EncodedUnderVarnish(RightDiffuse):
         return both * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("mistake", "law", "words"),
     [
