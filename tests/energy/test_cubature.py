@@ -73,6 +73,7 @@ def test_the_stated_error_covers_steps_along_cells_and_across_them(tolerance: fl
         assert found.error.max() < 20.0 * tolerance
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("share", [1.0, 0.3])
 def test_a_streak_is_resolved_to_its_dim_ends(share: float) -> None:
     """Along a streak that is a thousand times as long as wide, most of it lies between samples."""

@@ -103,6 +103,7 @@ def test_within_a_ball_light_is_a_geometric_series(flipped: bool) -> None:
         assert image == pytest.approx(2 - 0.5 ** (depth - 1), rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("shape", ["cube", "sphere"])
 def test_a_closed_lamp_sends_the_same_whether_its_inner_side_shines(shape: str) -> None:

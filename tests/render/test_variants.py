@@ -117,7 +117,7 @@ def _answers(bsdf: Any) -> tuple[np.ndarray, ...]:
     return value, np.array(pdf), weight, np.array(bs.wo), np.array(bs.pdf)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", PAIRS)
 def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
     if name == "measured metal" and not mi.is_spectral:

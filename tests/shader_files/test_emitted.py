@@ -57,7 +57,7 @@ SLOW = [*(("nested", one) for one in ("wgsl", "glsl", "hlsl")), ("compensated", 
 QUICK = [(name, language) for name in NESTED for language in ("wgsl", "glsl", "hlsl") if (name, language) not in SLOW]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "language"), [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW)])
 def test_folder_read_again_has_the_values_of_its_material(name: str, language: str, tmp_path: Path) -> None:
     needs_compiler(language)

@@ -103,7 +103,7 @@ def _glslang(text: str, folder: Path) -> str:
 QUICK = set(SHAPES) - set(materials.COMPOSED)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", materials.each(EVERY, QUICK))
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = written(name, "hlsl").text

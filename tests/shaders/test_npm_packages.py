@@ -269,6 +269,7 @@ BOUND = """async ({url, values, pairs}) => {
 }"""
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "values", "metal"),
     [

@@ -443,6 +443,7 @@ def test_causes_of_the_last_examiners(name: str, law: str, words: str) -> None:
     assert words in found, found
 
 
+@pytest.mark.slow
 def test_a_call_that_no_integrator_makes_explains_no_other_failure() -> None:
     """The plugin ignores the requested types, and draws its metal from a part of the unit square."""
     target = next(one.target for one in cases("sixth.w3_plugins") if one.name.endswith(".W3PluginBlend"))

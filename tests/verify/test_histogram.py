@@ -30,6 +30,7 @@ def test_a_right_model_is_not_rejected_at_any_width(alpha: float) -> None:
     assert lowest > statistics.sidak(0.001, 9)
 
 
+@pytest.mark.slow
 def test_a_streak_that_is_narrower_than_cells_is_expected_where_the_samples_are() -> None:
     streak = go.Conductor(alpha=(0.0003, 0.2), ndf="beckmann")
     wo = directions.single(directions.at(np.array([61.0]), 300.0))

@@ -64,6 +64,7 @@ def test_a_package_adds_a_law_by_one_file(packages: Path, tmp_path: Path) -> Non
     assert "f stays below 10" in page and "The largest value that was seen." in page
 
 
+@pytest.mark.slow
 def test_the_law_judges_and_its_name_is_known(packages: Path) -> None:
     done = outside.gonio(packages, "verify", "conductor", "-p", "alpha=0.01", "--quick", "--law", "dim")
     assert done.returncode == 1 and "Highlights clip." in done.stdout, done.stderr
