@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...ops import Scalar, Spectrum, abs, fma, function, maximum, rsqrt, sqr, sqrt, where
-from .base import Fresnel
+from .base import Fresnel, average
 
 
 class Exact(Fresnel):
@@ -21,6 +21,10 @@ class Exact(Fresnel):
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
         """Mean of R_s and R_p at a real index."""
         return dielectric(cos_i, cos_t, eta)
+
+    def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """As of any kind, in shaders a function of its own."""
+        return conductor_average(eta, k)
 
 
 @function
@@ -100,3 +104,9 @@ def _refracted(sin2: Scalar | float, eta: Spectrum, k: Spectrum) -> tuple[Spectr
     # the larger of a^2 and b^2; the other would cancel. The gradient of rsqrt, its cube, must not overflow float32
     larger = maximum(0.5 * (w2 + abs(t)), 1e-24)
     return w2, rsqrt(larger) * where(t > 0.0, larger, eta_k)
+
+
+@function
+def conductor_average(eta: Spectrum, k: Spectrum) -> Spectrum:
+    """F_avg = 2 int F mu dmu of a conductor by Gauss's rule in sqrt(mu), error 2e-7."""
+    return average(lambda mu: conductor(mu, eta, k))
