@@ -127,6 +127,17 @@ def test_average_fresnel_has_its_closed_forms() -> None:
     assert fresnel.kind("exact").dielectric_average(n) == pytest.approx(closed, abs=1e-7)
 
 
+@pytest.mark.parametrize("metal", ["Au", "Ag", "Ti"])
+def test_a_metals_average_is_the_integral(metal: str) -> None:
+    m = go.Conductor.preset(metal)
+    exact = fresnel.kind("exact")
+    for eta, k in zip(m.eta, m.k, strict=True):
+        x, w = np.polynomial.legendre.leggauss(200)
+        root = 0.5 * (x + 1.0)  # of the cosine: the reflectance is smooth in it
+        integral = np.sum(0.5 * w * 4.0 * root**3 * np.array([exact.conductor(r * r, eta, k) for r in root]))
+        assert exact.conductor_average(eta, k) == pytest.approx(integral, abs=1e-6)
+
+
 def test_the_imageworks_fit_is_within_a_percent_of_the_integral() -> None:
     for metal in ("Au", "Ag", "Cu", "Al", "Fe", "Ti"):
         m = go.Conductor.preset(metal)

@@ -97,3 +97,20 @@ def test_a_step_beside_the_edges_of_a_ring_of_cells_is_found(place: float) -> No
 
     expected = expectation.expect(density, grid, 0.1 * 2.0**-10)
     assert expected.total[0] == pytest.approx(1.0, abs=3e-5)
+
+
+def test_what_no_sample_has_shown_of_a_cell_adds_to_its_variance() -> None:
+    """A cell with five times the expected samples fails, unless as much is known to be unseen."""
+    cell = np.full((1, 1, 20, 40), 1.0 / 800.0)
+    drawn = np.random.default_rng(1).multinomial(80_000, cell.ravel()).reshape(cell.shape)
+    counts = histogram.Counts(drawn, np.zeros(1, int), 80_000)
+    lacking, unseen = cell.copy(), np.zeros_like(cell)
+    lacking[0, 0, 3, 7] = 0.2 / 800.0
+    unseen[0, 0, 3, 7] = 0.8 / 800.0
+    total = lacking.sum((1, 2, 3))
+    without, known = (
+        histogram.compare(expectation.Expectation(lacking, total, 1.0 - total, one), counts, 0)
+        for one in (np.zeros_like(cell), unseen)
+    )
+    assert without.fine < 1e-6
+    assert known.fine > 0.01
