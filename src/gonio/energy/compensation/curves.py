@@ -304,14 +304,19 @@ def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
     return ops.lookup(isotropic(ndf, masking), row)
 
 
-def turn(channels: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, ...]:
+Coefficients = namedtuple("Coefficients", [f"c{k}" for k in range(DEGREE + 1)])
+Coefficients.__doc__ = "c_0 to c_10."
+
+
+@ops.function
+def turn(channels: tuple[Array, ...], along: Array, across: Array) -> Coefficients:
     """c_0 to c_10 of a direction from the channels of `anisotropic`.
 
     along, across  (1 + y) / 2 and (1 - y) / 2
     """
     terms = _harmonics(along, across)
     count = (DEGREE + 1) * HARMONICS
-    return tuple(_weigh(channels[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
+    return Coefficients._make(_weigh(channels[at : at + HARMONICS], terms) for at in range(0, count, HARMONICS))
 
 
 Harmonics = namedtuple("Harmonics", "h0 h1 h2 h3 h4 h5 h6")
