@@ -67,7 +67,7 @@ tests: .venv/installed
 	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow'
 
 test-all: .venv/installed browser lint
-	$(BIN)/python -m pytest $(PARALLEL)
+	$(BIN)/python -m pytest $(PARALLEL) -o faulthandler_timeout=1800
 
 # The core of the suite on the CUDA variant. Where there is no GPU nothing is tried, which is said loudly, and fails.
 GPU_TESTS := tests/render/test_integrators.py tests/render/test_adapter.py tests/render/test_run.py \

@@ -17,14 +17,11 @@ from book.generated import written
 PAGE = Path(__file__).parent / "errata.md"
 HEAD = """# Errata of the field
 
-Public threads in which somebody doubts a material, a table or a density, and the figures with which Gonio answers
-them. The numbers after
-**Computed** are made by `python docs/make_errata.py`, and a test compares them with this page; columns named
-"thread" quote the thread. Only
-threads for which something was computed are listed. None of the other programs was run here, except for the
-[report cards of engines](report-cards/engines/README.md). Findings about
-Mitsuba's plugins, each with a
-program that needs Mitsuba alone, are on the [report cards](report-cards/README.md).
+In the public threads below, somebody doubts a material, a table or a density; Gonio answers with computed values.
+`python docs/make_errata.py` computes the numbers after **Computed**, and a test compares them with this page. Columns
+headed "thread" quote the thread. Threads for which nothing was computed are not listed. The programs that the threads
+discuss were not run here, except for the [report cards of engines](report-cards/engines/README.md). Findings about
+Mitsuba's plugins, each with a program that needs only Mitsuba, are on the [report cards](report-cards/README.md).
 """
 SEED = 1
 
@@ -58,20 +55,18 @@ def three_turquin() -> str:
             ]
         )
     headings = [
-        *("roughness", "n.v", "single scattering", "thread: before", "of the loss recovered", "thread: after"),
+        *("roughness", "n.v", "single scattering", "thread: before", "fraction of the loss recovered", "thread: after"),
         *("`turquin`", "`kulla-conty`"),
     ]
-    return f"""A multiplicative term that cites Turquin recovered "less than half" of what single scattering loses,
-and the formula of the paper
-replaced it. **Computed**, white furnace at F = 1:
+    return f"""A multiplicative term that cites Turquin recovered "less than half" of the light that single scattering
+loses. It was replaced by the formula of the paper. **Computed** albedo in a white furnace at F = 1:
 
 {table(headings, rows)}
 
-The thread's values of single scattering are confirmed. With an exact E the formula of the paper gives 1
-everywhere: it multiplies the lobe
-by 1 / E. If the new term does the same with the E of a table, that table is too large by 6 % and 12 % in the last
-two rows. It is: [the card of three.js](report-cards/engines/three.md) shows where, and
-how to mend it. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
+The thread's values of single scattering are confirmed. With an exact E, the formula of the paper gives 1 everywhere,
+because it multiplies the lobe by 1 / E. If the new term does the same with a tabulated E, the table is too large by 6 %
+and 12 % in the last two rows. It is indeed too large; the [report card of three.js](report-cards/engines/three.md)
+shows where, and how to fix the table. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
 
 
 def blended_metalness() -> str:
@@ -90,14 +85,13 @@ def blended_metalness() -> str:
         together, apart = lobe(0.5 * 1.0 + 0.5 * 0.04), 0.5 * lobe(1.0) + 0.5 * lobe(0.04)
         single = 0.52 * a + b
         rows.append([f"{x:.3f}" for x in (roughness[row], mu[column], single, together, apart)])
-    return f"""Half metal (F0 = 1), half dielectric (0.04): is F0 blended before the compensation, or is each
-compensated and then blended? Single
-scattering is linear in F0, the compensation is not. **Computed** albedo of the specular lobe, from Gonio's
-split-sum table:
+    return f"""A material is half metal (F0 = 1) and half dielectric (F0 = 0.04). Should F0 be blended before the
+compensation, or should each half be compensated before the two are blended? Single scattering is linear in F0, but the
+compensation is not. **Computed** albedo of the specular lobe, from Gonio's split-sum table:
 
 {table(["roughness", "n.v", "single scattering", "F0 blended first", "each compensated, then blended"], rows)}
 
-Blended first, the lobe loses the difference in a white furnace.
+If F0 is blended first, the lobe loses the difference in a white furnace.
 
 Try it: `gonio bake ggx --lut dfg -o tables`."""
 
@@ -111,13 +105,13 @@ def added_lobes() -> str:
         column = int(np.argmin(abs(mu - wanted)))
         specular = 0.04 * dfg[row, column, 0] + dfg[row, column, 1]
         rows.append([f"{mu[column]:.3f}", f"{1.0 + specular:.3f}", f"{specular + (1.0 - specular):.3f}"])
-    return f"""A white diffuse lobe under a dielectric reflection of F0 = 0.04, simply added: more light leaves
-than arrives. **Computed**
-albedo at roughness {roughness[row]:.3f}:
+    return f"""If a white diffuse lobe and a dielectric reflection of F0 = 0.04 are simply added, more light leaves
+than arrives. **Computed** albedo at roughness {roughness[row]:.3f}:
 
-{table(["n.v", "sum of the lobes", "diffuse lobe times one minus the albedo of the reflection"], rows)}
+{table(["n.v", "sum of the lobes", "sum with the diffuse lobe scaled by one minus the albedo of the reflection"], rows)}
 
-The second form conserves energy, but depends on the view alone and is not reciprocal; `coat` and `openpbr` are both
+The second form conserves energy, but its scale factor depends only on the view direction, so it is not reciprocal.
+`coat` and `openpbr` (without fuzz) are reciprocal; `coat` conserves energy, and `openpbr` does so approximately
 ([energy](energy.md), [OpenPBR](openpbr.md))."""
 
 
@@ -125,10 +119,10 @@ def split_sum() -> str:
     baked = go.bake("ggx", lut=["dfg"], resolution=64)
     worst = baked.manifest["error"]["dfg"]["max"]
     a, b = baked.arrays["dfg"][32, 32]
-    return f"""How is a table of the split sum computed? `gonio bake ggx --lut dfg --resolution 256 -o tables`
-writes it as .npz, .exr and .png, with
-its error. **Computed** for 64 texels: the worst error of an entry is {worst:.1e}; in the middle
-(roughness and n.v 0.508) A = {a:.4f}, B = {b:.4f}. [Energy](energy.md) has the errors of tables that are sampled."""
+    return f"""How is a table of the split sum computed? `gonio bake ggx --lut dfg --resolution 256 -o tables` writes it
+as .npz, .exr and .png, together with its error. **Computed** for 64 texels per axis: the largest error of an entry is
+{worst:.1e}; in the middle (roughness and n.v 0.508), A = {a:.4f} and B = {b:.4f}. [Energy](energy.md) gives the errors
+of tables that are computed by sampling."""
 
 
 def bounded_normals() -> str:
@@ -148,16 +142,17 @@ def bounded_normals() -> str:
         weight = np.asarray(sample.weight)[:, 0]
         above = float(np.mean((np.asarray(sample.wi)[:, 2] > 0) & (weight > 0)))
         rows.append([f"`{sampling}`", f"{integral:.2f}", f"{above:.2f}", f"{weight.mean():.2f}", f"{weight.std():.2f}"])
-    headings = ["sampling", "integral of the pdf above the surface", "samples above", "mean weight", "its deviation"]
-    return f"""What is the density of bounded visible normals (Eto2023)? D over the area of the part of the cap
-that is sampled:
-`bounded_per_cosine` in `optics/ndf/ggx.py`. It is right if its integral is the share of samples that land above
-the surface. **Computed** for
-GGX, alpha 0.8, seen at 1.3 rad:
+    headings = [
+        *("sampling", "integral of the pdf above the surface", "fraction of samples above"),
+        *("mean weight", "its standard deviation"),
+    ]
+    return f"""What is the density of bounded visible normals (Eto2023)? It is D divided by the area of the sampled part
+of the cap: `bounded_per_cosine` in `optics/ndf/ggx.py`. The pdf is right if its integral equals the fraction of samples
+that land above the surface. **Computed** for GGX with alpha = 0.8, viewed at 1.3 rad from the normal:
 
 {table(headings, rows)}
 
-Both have the same mean, the albedo; the bounded one wastes fewer samples. Try it:
+Both have the same mean weight, the albedo; bounded sampling wastes fewer samples. Try it:
 `gonio verify metal -p sampling=bounded --law pdf`."""
 
 
@@ -173,13 +168,12 @@ def film_in_transmission() -> str:
         transmitted = np.mean(weight * ~up, axis=0) * 1.5**2  # the power: radiance is compressed in the glass
         show = [" ".join(f"{value:.2f}" for value in one) for one in (reflected, transmitted, reflected + transmitted)]
         rows.append([f"{thickness:g} nm", *show])
-    return f"""A thin film must color the light that passes it, too: what is not reflected is transmitted.
-**Computed** for a film of index 2 on
-glass of 1.5, at 0.6 rad, in red, green and blue:
+    return f"""A thin film must also color the transmitted light, because what is not reflected is transmitted.
+**Computed** for a film of index 2 on glass of index 1.5, at 0.6 rad, in red, green and blue:
 
 {table(["film", "reflected", "transmitted", "sum"], rows)}
 
-`film-dielectric` and `openpbr` have it in both lobes ([thin films](thin-film.md))."""
+`film-dielectric` and `openpbr` apply the film to both lobes ([thin films](thin-film.md))."""
 
 
 def reciprocal_coat() -> str:
@@ -189,12 +183,12 @@ def reciprocal_coat() -> str:
     there, back = (np.asarray(coat.f(*pair, precision="float64"))[:, 0] for pair in ((wo, wi), (wi, wo)))
     worst = float(np.max(abs(there - back) / np.maximum(there, 1e-9)))
     white_coat = furnace(coat, [0.1, 0.5, 1.0])
-    return f"""Is reciprocity the price of a coat that conserves energy? **Computed** for Gonio's `coat` over a
-white Lambertian base: f differs by
-at most {_below(worst)} of its value when the directions are exchanged (2,000 pairs), and the white furnace is
-{", ".join(f"{value:.3f}" for value in white_coat)} at cosines of 0.1, 0.5 and 1. Both hold, because the tables of
-the layers depend on both
-directions. Try it: `gonio verify coat -p base=lambert --law reciprocity`."""
+    return f"""Must a coat that conserves energy give up reciprocity? **Computed** for Gonio's `coat` over a white
+Lambertian base: when the directions are swapped, f changes by at most {_below(worst)} of its value (2,000 pairs), and
+the albedo in a white furnace is
+{", ".join(f"{value:.3f}" for value in white_coat)} at cosines of 0.1, 0.5 and 1.
+Both properties hold, because the tables of the layers depend on both directions. Try it:
+`gonio verify coat -p base=lambert --law reciprocity`."""
 
 
 def _hemisphere(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -229,15 +223,14 @@ def sheen() -> str:
         values = _quadrature(NeubeltSheen(alpha=roughness**2), cosines)
         rows.append([f"{roughness:g}", *(f"{value:.3f}" for value in values)])
     headings = ["roughness", *(f"n.v = {cosine:g}" for cosine in cosines)]
-    return f"""A curve for the albedo of sheen was off by 62 % in the mean, and was fitted again. The values to
-fit, **Computed** from the formula as a
-short material (`NeubeltSheen` in `docs/make_errata.py`), for a white sheen color:
+    return f"""A fitted curve for the albedo of sheen was off by 62 % on average, and was fitted again.
+**Computed** values to fit, for a white sheen color, from the formula as a short material (`NeubeltSheen` in
+`docs/make_errata.py`):
 
 {table(headings, rows)}
 
-More of them: `gonio bake docs/make_errata.py:NeubeltSheen -p alpha=0.36 -o sheen`. Gonio's own `sheen-charlie` has
-the masking term of
-Estevez2017 instead."""
+For more values, run `gonio bake docs/make_errata.py:NeubeltSheen -p alpha=0.36 -o sheen`. Gonio's own `sheen-charlie`
+uses the masking term of Estevez2017 instead."""
 
 
 def _quadrature(material: go.BSDF, cosines: Sequence[float]) -> list[float]:

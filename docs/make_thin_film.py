@@ -115,7 +115,7 @@ def check() -> None:
 
 def table(head: str, rows: list[tuple[str, Callable[[Floats], Floats]]], found: dict[str, Floats]) -> str:
     """Mean and worst of each form, of what each row picks."""
-    lines = [f"| {head} | " + " | ".join(f"{name}, mean | worst" for name in FORMS.values()) + " |"]
+    lines = [f"| {head} | " + " | ".join(f"{name}, mean | {name}, worst" for name in FORMS.values()) + " |"]
     lines.append("|---|" + "---|" * (2 * len(FORMS)))
     for label, pick in rows:
         cells = [f"{f(pick(found[form])):.1f}" for form in FORMS for f in (np.mean, np.max)]
@@ -168,33 +168,35 @@ def encoded(linear: Floats) -> Floats:
 
 PAGE = """# Thin films
 
-`film-conductor` and `film-dielectric` have a clear film of `thickness` nm and index `film_eta` on every facet.
+`film-conductor` and `film-dielectric` have a clear film on every facet, with a thickness of `thickness` nm and an index
+of `film_eta`.
 
     gonio render "film-conductor(preset=Cr,alpha=.15,thickness=400)" -o heat.png
     gonio plot "film-dielectric(eta=1,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
 
-![Titanium under its oxide, index 2.3, above; a bubble's skin, index 1.33, below](images/films.jpg)
+![Above, titanium under its oxide, of index 2.3; below, the film of a soap bubble, of index 1.33](images/films.jpg)
 
-At a single wavelength the waves from both interfaces sum to r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)),
-in agreement with the characteristic matrix of a layer (to 1e-12, `tests/optics/test_film.py`); spectral variants
-render this. The parameter `form` selects how three color channels are derived from it:
+At a single wavelength, the sum of all waves that the two interfaces reflect is
+r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). It agrees with the characteristic matrix of a layer to 1e-12
+(`tests/optics/test_film.py`). Spectral variants render with this amplitude directly. Otherwise, the parameter `form`
+selects how the three color channels are derived from it:
 
-- `local` (default) is the locally spectral form proposed by OpenPBR's authors (issue 246, pull request 262): the sum
-  at 20 wavelengths, under D65 for the CIE 1931 observer. The metal's index is interpolated linearly between its
-  values at 650, 550 and 450 nm.
-- `belcour-barla` (Belcour2017) approximates the observer's curves by Gaussians over wave numbers, for which the
-  interference is a damped wave. It is faster, and thick films correctly fade to gray; the mean term is treated as a
-  color.
+- `local` (default) is the locally spectral form that the authors of OpenPBR proposed (issue 246, pull request 262). It
+  evaluates the reflectance at 20 wavelengths, under D65 and for the CIE 1931 observer. The metal's index is
+  interpolated linearly between its values at 650, 550 and 450 nm.
+- `belcour-barla` (Belcour2017) approximates the observer's curves by Gaussians in wave number, for which interference
+  becomes a damped wave. It is faster, and thick films correctly fade to gray. The mean of the reflectance over
+  wavelengths is computed per RGB channel.
 
-At thickness 0 `local` gives the color of the bare metal's whole spectrum, which is more saturated than the three
-numbers of a `conductor`; `belcour-barla` gives the `conductor`, within 2 %.
+At thickness 0, `local` gives the color of the bare metal's whole spectrum, which is more saturated than the
+three-channel color of a `conductor`. `belcour-barla` reproduces the `conductor` to within 2 %.
 
 ## Accuracy
 
-The reference is an exact multilayer: `tmm` (transfer matrices) at 81 wavelengths with the metal's whole measured
-spectrum, under D65, for films of 50 to 2,000 nm with index 1.38 and 2.0. The forms use the metal's index at three
-wavelengths only. The unit is CIE Delta E 2000 (Sharma2005): 1 is just noticeable side by side, 5 is another shade, 10
-another color.
+The reference is the exact reflectance of the multilayer by the package `tmm` (transfer matrices). It is computed at 81
+wavelengths with the metal's whole measured spectrum, under D65, for films of 50 to 2,000 nm with indices 1.38 and 2.0.
+Both forms use the metal's index at three wavelengths only. The unit is CIE Delta E 2000 (Sharma2005): a difference of
+1 is just noticeable side by side, one of 5 is a different shade, and one of 10 is a different color.
 
 {metals}
 
@@ -204,7 +206,7 @@ another color.
 
 {indices}
 
-![Colors of films on three metals over their thickness: exact, Belcour-Barla and local](images/thin-film.png)
+![Colors of films on three metals by thickness: exact, Belcour-Barla and local](images/thin-film.png)
 
 **Summary.** {words}
 
@@ -228,14 +230,14 @@ def main() -> None:
     within = [[k for k, d in enumerate(THICKNESSES) if low <= d <= high] for low, high in BINS]
     thick = [(f"{low} to {high} nm", lambda e, k=k: e[:, :, k]) for (low, high), k in zip(BINS, within, strict=True)]
     angles = [(f"{a:g} degrees", lambda e, k=k: e[:, :, :, k]) for k, a in enumerate(ANGLES)]
-    films = [(f"film of index {film}", lambda e, i=i: e[i]) for i, film in enumerate(FILMS)]
+    films = [(f"index {film}", lambda e, i=i: e[i]) for i, film in enumerate(FILMS)]
     films.append(("all", lambda e: e))
     picture(truth, models)
     page = PAGE.format(
         metals=table("metal", metals, found),
         thicknesses=table("thickness", thick, found),
         angles=table("angle", angles, found),
-        indices=table("", films, found),
+        indices=table("film", films, found),
         words=words(found),
     )
     (HERE / "thin-film.md").write_text(page)
@@ -249,9 +251,10 @@ def words(found: dict[str, Floats]) -> str:
     near = {form: e[:, :, thin].mean() for form, e in found.items()}
     far = {form: e[:, :, ~thin].mean() for form, e in found.items()}
     return (
-        f"`local` is within 2 in {100 * share['local']:.0f} % of the cases, `belcour-barla` in "
-        f"{100 * share['belcour-barla']:.0f} %. Up to 800 nm\ntheir means are {near['local']:.1f} and "
-        f"{near['belcour-barla']:.1f}, beyond {far['local']:.1f} and {far['belcour-barla']:.1f}."
+        f"The error of `local` is below 2 in {100 * share['local']:.0f} % of the cases, that of `belcour-barla` in "
+        f"{100 * share['belcour-barla']:.0f} %.\nTheir mean errors are {near['local']:.1f} and "
+        f"{near['belcour-barla']:.1f} for films of up to 800 nm, and {far['local']:.1f} and "
+        f"{far['belcour-barla']:.1f} for thicker films."
     )
 
 

@@ -29,11 +29,11 @@ PHONG = len(re.findall(r"^## \d\.", (ROOT / "docs/phong-limits.md").read_text(en
 @pytest.mark.parametrize(
     ("page", "sentence"),
     [
-        ("README.md", f"{WORDS[LAWS]} laws judge"),
+        ("README.md", f"{WORDS[LAWS]} laws such as"),
         ("README.zh.md", f"{CHINESE[LAWS]}条定律"),
-        ("docs/index.md", f"by {WORDS[LAWS]} laws"),
+        ("docs/index.md", f"against {WORDS[LAWS]} laws"),
         ("docs/tour.md", f"# {WORDS[LAWS]} laws"),
-        ("docs/verify.md", f"{WORDS[LAWS]} laws judge"),
+        ("docs/verify.md", f"{WORDS[LAWS]} laws test"),
         ("docs/phong-limits.md", f"none of the {WORDS[PHONG]}"),
         ("examples/lab-sheet.ipynb", f"{WORDS[PHONG]} times over"),
         ("README.md", f"| {len(go.models())} models |"),

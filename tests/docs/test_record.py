@@ -28,7 +28,9 @@ RECORD = script()
 def test_figures_and_pictures_are_as_recorded() -> None:
     stored = json.loads((DOCS / "record.json").read_text(encoding="utf-8"))
     changed = RECORD.differences(stored, RECORD.current())
-    assert changed == [], "measure or render again, then python docs/make_record.py PATH"
+    assert changed == [], (
+        "measure or render again, then run: python docs/make_record.py PAGE (for a formula: docs/book/formulas.py)"
+    )
 
 
 def test_every_page_is_recorded_computed_or_a_translation() -> None:

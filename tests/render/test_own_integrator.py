@@ -29,11 +29,14 @@ from gonio.transport.integrators.base import FIRST_FREE
 class Occlusion(Integrator):
     """The share of the sky that a surface sees, weighted by the cosine."""
 
-    name = "occlusion"
+    name = "strangersOcclusion"
 
     def show(self, si, key, index):
-        local = self.mi.warp.square_to_cosine_hemisphere(self.mi.Point2f(*self.pair(key, index, FIRST_FREE)))
-        hidden = self.scene.ray_test(si.spawn_ray(si.to_world(local)), si.is_valid())
+        u = self.mi.Point2f(*self.direction_pair(key, index, FIRST_FREE))
+        local = self.mi.warp.square_to_cosine_hemisphere(u)
+        local.z = dr.mulsign(local.z, si.wi.z)
+        ray = self.surfaces.offsets.ray(si, si.to_world(local))
+        hidden = self.surfaces.blocked(ray, si.is_valid())
         return self.mi.Color3f(dr.select(hidden, 0.0, 1.0))
 
 
@@ -57,7 +60,7 @@ SCENE = {
         "verticalFov": 20,
         "film": {"size": [8, 8]},
     },
-    "integrator": {"type": "occlusion"},
+    "integrator": {"type": "strangersOcclusion"},
     "scene": {
         "shapes": [{"type": "parallelogram", "base": [-9, -9, 0], "edge0": [18, 0, 0], "edge1": [0, 18, 0]}],
         "lights": [{"type": "environmentLight", "radiance": 1}],
@@ -99,7 +102,7 @@ def test_a_registered_integrator_renders_by_the_scenes_word_and_by_the_options(
 
 
 def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)unknown type 'occlusion'.*known: caustics, direct"):
+    with pytest.raises(InputError, match=r"(?s)unknown type 'strangersOcclusion'"):
         prepare(Request(scene))
     scene.write_text(json.dumps({**SCENE, "integrator": {"type": "normal"}}))
     with pytest.raises(InputError, match=r"(?s)--integrator: unknown integrator 'whited'.*did you mean 'whitted'"):
@@ -136,7 +139,7 @@ def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_p
         command = [sys.executable, "-m", "gonio.cli", *words]
         return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120)
 
-    done = gonio("render", str(scene), "--integrator", "occlusion", "--spp", "4", "-o", "sky.exr")
+    done = gonio("render", str(scene), "--integrator", "strangersOcclusion", "--spp", "4", "-o", "sky.exr")
     assert done.returncode == 0, done.stderr
     picture = images.read(tmp_path / "sky.exr")
     assert np.all(picture.pixels == 1.0) and picture.metadata["integrator"] == "occlusion"

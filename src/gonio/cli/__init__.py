@@ -28,6 +28,10 @@ def main(arguments: list[str] | None = None) -> None:
 
     streams.prepare()
     with signals.at_once(), garbage.paused():  # imports leave no garbage
+        if (sys.argv[1:] if arguments is None else arguments)[:1] == ["verify"]:
+            from ..verify.isolation import process
+
+            process.start_ahead()
         from . import app
     with signals.as_exceptions() as ended:
         sys.exit(app.run(arguments, ended))

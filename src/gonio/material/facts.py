@@ -13,8 +13,8 @@ class KnownViolation(NamedTuple):
     """A law that a model violates by design.
 
     reason   why, as part of a sentence; the manual and the verifier print it
-    size     the largest violation, in the unit of the law's figure: a number, or a function of the model; 0 if the law
-             holds with these parameters
+    size     the largest violation, in the unit of the law's figure (of `energy`, the gain of the lossless variant): a
+             number, or a function of the model; 0 if the law holds with these parameters, math.inf if nothing bounds it
     certain  whether the violation is always present: the verifier then fails a model that satisfies the law
     """
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import ops
-from ..ops import Direction, Pair, Scalar, dot, function, sincos, sqr, vec3
+from ..ops import Direction, Mask, Pair, Scalar, dot, function, sincos, sqr, vec3, where
 
 
 @function
@@ -90,3 +92,16 @@ def half_vector(wo: Direction, wi: Direction) -> Direction:
 
 # The smallest normal float32 is 1.2e-38; its root, squared again, must not underflow in a quotient.
 TINY = 1e-30
+
+
+class _Lit(NamedTuple):
+    above: Mask
+    wo: Direction
+    wi: Direction
+
+
+def lit(wo: Direction, wi: Direction) -> _Lit:
+    """(whether both are above the surface, both directions, with the normal in place of one below): masked values must
+    not bring infinity or the root of a negative number into a gradient."""
+    above = (wo.z > 0.0) & (wi.z > 0.0)
+    return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

@@ -121,11 +121,11 @@ class MaterialPart(Part):
 
     type: str
     normalmap: NormalMap | None = None
-    """Normals from an image."""
+    """An image of normals."""
     bump: BumpMap | None = None
-    """Heights from an image."""
+    """An image of heights."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """Whether both sides reflect alike; by default, true for all materials that transmit no light."""
+    """Whether both sides reflect alike. The default is true for all materials that transmit no light."""
 
     _given: bool = PrivateAttr(False)  # made by a program: paths of files are used unchanged
     _source: str = PrivateAttr("")  # the document that contains the material

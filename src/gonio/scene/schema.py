@@ -33,7 +33,7 @@ class Output(Part):
     """The file that the picture is written to."""
 
     filename: str = Field(min_length=1)
-    """.hdr, .png, .exr or .npz; the top row comes first. With `-o FILE`, any name is accepted."""
+    """A name ending in .hdr, .png, .exr or .npz; with `-o FILE`, any name is accepted. The top row comes first."""
 
     @model_validator(mode="after")
     def _known_format(self, info: ValidationInfo) -> Output:
@@ -45,10 +45,10 @@ class Output(Part):
 
 
 class Sampler(Part):
-    """Number of samples per pixel, and their point set. Give xSamples and ySamples, or samples."""
+    """The number of samples per pixel, and their point set. Give either xSamples and ySamples or samples."""
 
     type: str = "independent"
-    """The lab's "independent" states no preference and means "default"; other names force a sampler."""
+    """Lab 2's "independent" expresses no preference and means "default"; any other name selects that sampler."""
     x_samples: Whole | None = Field(None, alias="xSamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     y_samples: Whole | None = Field(None, alias="ySamples", ge=1, le=MAX_SAMPLES)
@@ -90,7 +90,7 @@ class Sampler(Part):
 
 
 class CameraTransform(Part):
-    """Position and orientation of the camera. right = forward x up."""
+    """Position and orientation of the camera; right = forward x up."""
 
     position: Vector
     """Position of the camera."""
@@ -142,20 +142,21 @@ class Camera(Part):
     type: Literal["pinhole"] = "pinhole"
     transform: CameraTransform
     vertical_fov: Number = Field(alias="verticalFov", gt=0, lt=180)
-    """Angle between the lower and the upper edge of the picture, degrees."""
+    """Angle between the lower and the upper edge of the picture, in degrees."""
     film: Film
     t_near: Positive = Field(1e-4, alias="tNear")
     """Near clipping distance."""
     t_far: Positive = Field(1e10, alias="tFar")
     """Far clipping distance."""
     polarizer: Number | None = None
-    """An ideal linear polarizer over the lens: the direction that it transmits, in degrees, counterclockwise from the
-    picture's horizontal. It halves unpolarized light. Mitsuba's path tracer renders it in a polarized variant.
+    """The direction of polarization that an ideal linear polarizer in front of the lens transmits, in degrees
+    counterclockwise from the picture's horizontal. Unpolarized light loses half of its power. Mitsuba's path tracer
+    renders the scene, in a polarized variant.
     """
     time_start: Number = Field(0.0, alias="timeStart")
-    """Without effect: nothing moves."""
+    """No effect: scenes are static."""
     time_end: Number = Field(0.0, alias="timeEnd")
-    """Without effect: nothing moves."""
+    """No effect: scenes are static."""
 
     @model_validator(mode="after")
     def _depth_range(self) -> Camera:
@@ -187,7 +188,7 @@ class Integrator(Part):
 
     type: str
     max_depth: Whole | None = Field(None, alias="maxDepth", ge=1, le=100_000)
-    """Maximum path length: N means N - 1 shaded vertices; 1 shows lights only, 2 adds direct light."""
+    """Maximum path length in segments: N allows N - 1 shaded vertices; 1 shows only lights, 2 adds direct light."""
 
     @model_validator(mode="after")
     def _known_type(self) -> Integrator:
@@ -253,7 +254,7 @@ class ShapePart(Part):
 
 
 class Sphere(ShapePart):
-    """u = atan2(x, z) / 2pi, v = angle from +y / pi."""
+    """A sphere; u = atan2(x, z) / (2 pi), v = (angle from +y) / pi."""
 
     type: Literal["sphere"]
     center: Vector
@@ -262,7 +263,7 @@ class Sphere(ShapePart):
 
 
 class Parallelogram(ShapePart):
-    """base + u edge0 + v edge1, u and v in [0, 1]; its normal is normalize(edge0 x edge1)."""
+    """The points base + u edge0 + v edge1, with u and v in [0, 1]; the normal is normalize(edge0 x edge1)."""
 
     type: Literal["parallelogram"]
     base: Vector
@@ -281,7 +282,7 @@ class Parallelogram(ShapePart):
 
 
 class Cube(ShapePart):
-    """[-1, 1]^3. On the face across axis i, u runs along axis i + 1 and v along i + 2, from -1 to 1."""
+    """The cube [-1, 1]^3. On faces normal to axis i, u runs along axis i + 1 and v along axis i + 2, from -1 to 1."""
 
     type: Literal["cube"]
 
@@ -303,7 +304,7 @@ class Disk(ShapePart):
     inner_radius: NonNegative = 0.0
     """Radius of the hole."""
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, radians."""
+    """Angle of the sector, in radians."""
 
     @model_validator(mode="after")
     def _has_an_area(self) -> Disk:
@@ -323,7 +324,7 @@ class Cylinder(ShapePart):
     radius: Positive = 1.0
     height: Positive = 1.0
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, radians."""
+    """Angle of the sector, in radians."""
 
 
 class Cone(ShapePart):
@@ -333,15 +334,15 @@ class Cone(ShapePart):
     radius: Positive = 1.0
     height: Positive = 1.0
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, radians."""
+    """Angle of the sector, in radians."""
 
 
 class Mesh(ShapePart):
-    """Triangles from a file in the scene's folder, .obj or .ply. `triangle` is the lab's name for this type."""
+    """Triangles from an .obj or .ply file in the scene's folder. `triangle` is Lab 2's name for this type."""
 
     type: Literal["triangle", "mesh"]
     file: str = Field(min_length=1)
-    """Texture coordinates are used unchanged, v = 0 is the top of a texture; without normals, it is flat-shaded."""
+    """Texture coordinates are used unchanged; v = 0 is the top of a texture. A mesh without normals is flat-shaded."""
 
 
 Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
@@ -357,7 +358,7 @@ class AreaLight(Part):
 
 
 class SpotLight(Part):
-    """A point light of equal intensity in all directions (the name is the lab's)."""
+    """A point light with equal intensity in all directions (the name comes from Lab 2)."""
 
     type: Literal["spotLight"]
     position: Vector
@@ -366,7 +367,7 @@ class SpotLight(Part):
 
 
 class DirectionalLight(Part):
-    """Parallel light from infinity, like that of a point-like sun."""
+    """Parallel light from infinity, as from a point-like sun."""
 
     type: Literal["directionalLight"]
     direction: Vector
@@ -387,7 +388,7 @@ class DirectionalLight(Part):
 
 
 class EnvironmentLight(Part):
-    """Light from all directions: direction (sin t sin p, cos t, sin t cos p) has u = p/2pi, v = t/pi."""
+    """Light from all directions; direction (sin t sin p, cos t, sin t cos p) has u = p / (2 pi), v = t / pi."""
 
     type: Literal["environmentLight"]
     texture: Sky | None = None
@@ -410,11 +411,11 @@ class Contents(Part):
     """The shapes and lights of the scene."""
 
     acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
-    """Without effect: Gonio always uses Mitsuba's acceleration structure."""
+    """No effect: Gonio uses Mitsuba's acceleration structure, or none for a few simple shapes."""
     shapes: list[Shape] = Field(default_factory=list)
     lights: list[LightSource] = Field(default_factory=list)
     ambient: Light | None = None
-    """Radiance Ia of the ambient light of the lab sheet's eq. 1, for materials with `ka`."""
+    """Radiance Ia of the ambient light in eq. 1 of the Lab 2 sheet; it applies to materials with `ka`."""
 
     @model_validator(mode="after")
     def _one_environment(self) -> Contents:
@@ -424,7 +425,7 @@ class Contents(Part):
 
 
 class SceneDescription(Part):
-    """A scene in the lab's JSON format with Gonio's additions. `read` makes one; `build` renders from it."""
+    """A scene in Lab 2's JSON format, with Gonio's additions."""
 
     json_schema: str | None = Field(None, alias="$schema")
     """URL of the JSON Schema, for editors."""
@@ -434,7 +435,7 @@ class SceneDescription(Part):
     integrator: Integrator
     contents: Contents = Field(alias="scene")
     top_ambient: Light | None = Field(None, alias="ambient")
-    """Same as scene.ambient."""
+    """The same as scene.ambient."""
 
     _path: Path = PrivateAttr(default=Path("scene.json"))
     _allow_outside: bool = PrivateAttr(default=False)

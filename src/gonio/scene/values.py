@@ -168,13 +168,13 @@ Factor = Annotated[
 
 
 class ImageTexture(Part):
-    """An image over the surface's uv. v = 0 is the top of the image; 8-bit values count as v/255."""
+    """An image, mapped by the surface's uv; v = 0 is the top of the image. 8-bit values are divided by 255."""
 
     type: Literal["imageTex"]
     file: str = Field(min_length=1)
-    """Image beside the scene: .png, .jpg, .hdr or .exr; FILE.glb#N is the image N inside a glTF file."""
+    """An image in the scene's folder: .png, .jpg, .hdr or .exr; FILE.glb#N is image number N of a glTF file."""
     color_space: Literal["raw", "srgb"] = Field("raw", alias="colorSpace")
-    """"srgb" decodes 8-bit values to linear light; "raw" (the lab's default) leaves them unchanged."""
+    """"srgb" decodes 8-bit values to linear light; "raw" (Lab 2's default) leaves them unchanged."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """Interpolation between texels."""
     wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
@@ -182,27 +182,27 @@ class ImageTexture(Part):
     channel: Literal["r", "g", "b", "a"] | None = None
     """The single channel to use, as gray; without it, a scalar parameter takes the mean of red, green and blue."""
     factor: Factor = 1.0
-    """Factor of the image's values, one number or three."""
+    """Factor by which the image's values are multiplied: one number, or one per channel."""
     mean: Annotated[bool, Strict()] = False
     """Whether to use the image's mean everywhere, for a parameter that must not vary over a surface."""
 
 
 class NormalMap(Part):
-    """An image of normals: 2c - 1 is (tangent, bitangent, normal); tangent = dp/du, bitangent = normal x tangent."""
+    """An image of normals: color c encodes 2c - 1 along tangent (dp/du), bitangent (normal x tangent) and normal."""
 
     type: Literal["imageTex"] = "imageTex"
     file: str = Field(min_length=1)
-    """Image beside the scene."""
+    """An image in the scene's folder."""
     scale: Number = 1.0
-    """Factor of the slopes."""
+    """Factor by which the slopes are multiplied."""
 
 
 class BumpMap(Part):
-    """An image of heights over the surface's uv, 0 to 1 (8-bit values count as v/255) times `scale`."""
+    """An image of heights, mapped by the surface's uv: values from 0 to 1 (8-bit values: v/255) times `scale`."""
 
     type: Literal["imageTex"] = "imageTex"
     file: str = Field(min_length=1)
-    """Image beside the scene."""
+    """An image in the scene's folder."""
     scale: Number
     """Height of the value 1, in units of the scene."""
 
@@ -215,7 +215,7 @@ class LightSpectrum(Part):
 
 
 class Daylight(LightSpectrum):
-    """CIE standard illuminant D65: white."""
+    """CIE standard illuminant D65, which is white."""
 
     type: Literal["d65"]
 
@@ -229,11 +229,11 @@ class Blackbody(LightSpectrum):
 
 
 class Led(LightSpectrum):
-    """Light-emitting diodes: a sum of Gaussians over the wavelength."""
+    """Light-emitting diodes: a sum of Gaussians in wavelength."""
 
     type: Literal["led"]
     peaks: Annotated[list[tuple[Positive, Annotated[Number, Field(ge=2, le=500)], NonNegative]], Field(min_length=1)]
-    """One [wavelength, full width at half maximum, height] per peak, in nm; heights are relative."""
+    """One [wavelength in nm, full width at half maximum in nm, relative height] per peak."""
 
     @model_validator(mode="after")
     def _shines(self) -> Led:
@@ -246,7 +246,7 @@ class Led(LightSpectrum):
 
 
 class MeasuredLight(LightSpectrum):
-    """A lamp's measured spectrum: relative radiance per wavelength, interpolated linearly, 0 outside."""
+    """A lamp's measured spectrum: relative radiance by wavelength, interpolated linearly; 0 outside the range."""
 
     type: Literal["spectrum"]
     wavelengths: list[Positive] = Field(min_length=2)

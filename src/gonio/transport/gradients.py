@@ -105,7 +105,7 @@ class _Derivatives:
 
 
 class _ForwardDerivatives(Integrator):
-    """The paths of another integrator, vertex by vertex, with derivatives.
+    """The paths of another integrator, bounce by bounce, with derivatives.
 
     walked  the integrator that generates the paths
     """
@@ -122,12 +122,12 @@ class _ForwardDerivatives(Integrator):
         mi = self.mi
         zeros = [mi.Spectrum(0) for _ in self.along]
         state = _Derivatives(self.walked.camera_path(pixel, key, index), zeros, list(zeros))
-        state = self.vertex(state, key)
-        if isinstance(self.walked, Path) and not self.walked.one_vertex:
+        state = self.bounce(state, key)
+        if isinstance(self.walked, Path) and not self.walked.one_bounce:
             state = dr.while_loop(
                 (state,),
                 lambda s: s.path.active,
-                lambda s: (self.vertex(s, key),),
+                lambda s: (self.bounce(s, key),),
                 mode="symbolic",
                 label="vertices",
             )[0]
@@ -136,7 +136,7 @@ class _ForwardDerivatives(Integrator):
             values += [*slope]
         return values
 
-    def vertex(self, state: _Derivatives, key: UInt) -> _Derivatives:
+    def bounce(self, state: _Derivatives, key: UInt) -> _Derivatives:
         """One vertex of the path, with the derivatives propagated by the chain rule."""
         path, mi = state.path, self.mi
         with dr.resume_grad():
@@ -144,7 +144,7 @@ class _ForwardDerivatives(Integrator):
             values = self.attached.fresh_values()
             leaves = [throughput, radiance, *(v for named in values.values() for v in named.values())]
             dr.enable_grad(leaves)
-            following, _ = self.walked.vertex(replace(path, throughput=throughput, radiance=radiance), key)
+            following, _ = self.walked.bounce(replace(path, throughput=throughput, radiance=radiance), key)
             outgoing = [own_variable(following.throughput, following.active), following.radiance]
             slopes = []
             for one, before in zip(self.along, zip(state.throughput, state.radiance, strict=True), strict=True):

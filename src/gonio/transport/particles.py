@@ -33,7 +33,7 @@ from .scene_data import SceneData
 
 # Dimensions of a particle at the lamp and at each vertex.
 PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
-LOBE, CHOICE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
+DIRECTION, LOBE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
 
 ROULETTE_DEPTH = 5  # segments, as for paths
 
@@ -119,24 +119,20 @@ class Particles:
         return particle, flight
 
     def intersect(self, flight: Flight) -> Vertex:
-        """The surface that a particle hits; media on the way attenuate its throughput."""
-        mi, data, active = self.mi, self.data, flight.active
-        si = data.surfaces.interaction(flight.hit, flight.ray, active)
-        vertex = Vertex(si, si.bsdf(flight.ray))
-        if data.media.known:
-            flight.throughput *= dr.select(active, data.media.transmitted(flight.inside, si, si.t), 1)
-            vertex.crossing = data.media.crossing(si, vertex.bsdf, flight.inside, active)
-            si.duv_dx = mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
+        """The surface that a particle hits; media on the way attenuate its throughput. It traces no ray."""
+        data, active = self.data, flight.active
+        vertex, throughput = data.vertex(flight.hit, flight.ray, flight.inside, flight.throughput, active)
+        flight.throughput = throughput
         if data.disperses:
             here = active & ((vertex.bsdf.flags() & DISPERSES) != 0)
-            flight.throughput, flight.hero_only = keep_hero(mi, flight.throughput, flight.hero_only, here)
+            flight.throughput, flight.hero_only = keep_hero(self.mi, throughput, flight.hero_only, here)
         return vertex
 
     def sample_bsdf(self, key: UInt, low: UInt, flight: Flight, vertex: Vertex) -> tuple[BSDFSample, Radiance]:
         """A scattered direction, and the weight of the flux in that direction."""
         mi, data, si, active = self.mi, self.data, vertex.si, flight.active
-        lobe, _ = data.pair(key, low, flight.dimension + CHOICE)
-        u = mi.Point2f(*data.direction_pair(key, low, flight.dimension + LOBE))
+        lobe, _ = data.pair(key, low, flight.dimension + LOBE)
+        u = mi.Point2f(*data.direction_pair(key, low, flight.dimension + DIRECTION))
         bs, weight = vertex.bsdf.sample(self.context, si, lobe, u, active)
         bs, weight = data.scattering.pass_through(vertex, bs, weight, active)
         if not self.bent:
@@ -175,7 +171,7 @@ class Particles:
         active = active & dr.any(throughput != 0) & (flight.depth + 1 < self.max_depth)
         survive = dr.clip(dr.max(throughput), 1e-6, 0.95)
         plays = flight.depth >= ROULETTE_DEPTH
-        active &= ~plays | (data.pair(key, low, flight.dimension + CHOICE)[1] < survive)
+        active &= ~plays | (data.pair(key, low, flight.dimension + LOBE)[1] < survive)
         throughput = dr.select(plays, throughput / survive, throughput)
         inside = flight.inside if vertex.crossing is None else vertex.side(bs.wo)
         ray = data.surfaces.offsets.ray(si, si.to_world(bs.wo))

@@ -29,7 +29,7 @@ from . import sampler
 from .camera import Camera
 from .lights.lights import Lights
 from .media import Media
-from .scattering import Scattering
+from .scattering import Scattering, Vertex
 from .surfaces import Surfaces
 
 # The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm): white of radiance 1 has Y = 1.
@@ -127,6 +127,18 @@ class SceneData:
     def begins_path(self, hit: Hit) -> Mask:
         """Whether a camera ray that ends at `hit` begins a path: every one does, but in `foreground.py`."""
         return self.mi.Bool(True)
+
+    def vertex(self, hit: Hit, ray: Ray, inside: UInt, throughput: Radiance, active: Mask) -> tuple[Vertex, Radiance]:
+        """The surface at a hit, and the throughput there after absorption by the media that contain the ray."""
+        si = self.surfaces.interaction(hit, ray, active)
+        vertex = Vertex(si, si.bsdf(ray))
+        if self.media.known:
+            here = active & si.is_valid()
+            throughput = dr.select(here, throughput * self.media.transmitted(inside, si, si.t), throughput)
+            vertex.crossing = self.media.crossing(si, vertex.bsdf, inside, here)
+            # carries the index outside to `bridge.adapter.plugin`, which sees nothing else of the media
+            si.duv_dx = self.mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
+        return vertex, throughput
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """Lanes from whose surface a point that is on no surface is visible."""

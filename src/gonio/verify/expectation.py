@@ -12,8 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..energy.albedo.cells import Seen, product, rim, step_aside
-from ..energy.albedo.cubature import FAINT, UNSEEN
+from ..energy.albedo.cells import FAINT, Points, Seen, product, rim, step_aside
 from ..ops import backend
 from ..ops.backend import Array
 from .cells import Density, Grid, boxes, cell_of, direction, height
@@ -49,7 +48,7 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     unresolved = np.zeros(len(grid.wo))
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
-    points, shown = _Points.of(look, grid, owner), np.zeros(len(owner), bool)  # by a single sample
+    points, shown = _points(look, grid, owner), np.zeros(len(owner), bool)  # by a single sample
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
         two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
@@ -61,10 +60,10 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
         area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
         aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
-        missed = points.missed_by(area, last.most)
+        missed = points.missed_by(area, area * last.most)
         by_samples = (missed > allowed) & (off < FAINT * missed)
         left = shown & ~by_samples & points.single(len(box))
-        np.add.at(unseen, owner[left], points.share_in(len(box))[left])
+        np.add.at(unseen, owner[left], points.light_in(len(box))[left])
         shown = by_samples & points.single(len(box))
         aside = np.maximum(aside, missed)
         divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
@@ -77,68 +76,45 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         if not divide.any():
             break
         owner, shown = np.repeat(owner[divide], 4), np.repeat(shown[divide], 4)
-        box, heights, azimuths = _quarters(box[divide])
-        points = points.within(divide, heights, azimuths)
+        box, middle = _quarters(box[divide])
+        points = _within(points, divide, middle)
     shaped, left = integral.reshape(grid.shape), unseen.reshape(grid.shape)
     return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved + left.sum((1, 2, 3)), left)
 
 
-def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N,)."""
+def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N, 2)."""
     a, b, c, d = box.T
     # the heights of a narrow lobe span decades: they are halved in ratio
     m = np.where(b > 4.0 * a, np.maximum(np.sqrt(a * b), b / 64.0), 0.5 * (a + b))
     q = 0.5 * (c + d)
     parts = [(a, m, c, q), (m, b, c, q), (a, m, q, d), (m, b, q, d)]
-    return np.stack([np.stack(part, -1) for part in parts], 1).reshape(-1, 4), m, q
+    return np.stack([np.stack(part, -1) for part in parts], 1).reshape(-1, 4), np.stack([m, q], -1)
 
 
-class _Points(NamedTuple):
-    """The pilot's samples inside boxes: the box's number, 1 - |z|, azimuth, the pdf, and the share of all samples."""
+def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
+    """The samples that placed a grid's cells, in the boxes of the cells `owner`: at (1 - |z|, azimuth); their light is
+    a fraction of all samples."""
+    dr = backend.drjit()
+    kind = backend.types("float32")
+    which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
+    wi = np.concatenate(grid.pilot)
+    index, inside = cell_of(grid, kind.module.UInt32(which), backend.vector_of(wi, 3, kind))
+    dr.eval(index, inside)
+    box_of = np.full(int(np.prod(grid.shape)), -1)
+    box_of[owner] = np.arange(len(owner))
+    box = np.where(inside.numpy(), box_of[index.numpy()], -1)
+    which, wi, box = which[box >= 0], wi[box >= 0], box[box >= 0]
+    fraction = 1.0 / np.maximum([len(samples) for samples in grid.pilot], 1)
+    azimuth = np.arctan2(wi[:, 1], wi[:, 0]) % (2.0 * np.pi)
+    return Points(box, np.stack([height(wi), azimuth], -1), look.at(which, wi), fraction[which])
 
-    box: np.ndarray
-    height: np.ndarray
-    azimuth: np.ndarray
-    value: np.ndarray
-    share: np.ndarray
 
-    @classmethod
-    def of(cls, look: _Look, grid: Grid, owner: np.ndarray) -> _Points:
-        """The samples that placed a grid's cells, in the boxes of the cells `owner`."""
-        dr = backend.drjit()
-        kind = backend.types("float32")
-        which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
-        wi = np.concatenate(grid.pilot)
-        index, inside = cell_of(grid, kind.module.UInt32(which), backend.vector_of(wi, 3, kind))
-        dr.eval(index, inside)
-        box_of = np.full(int(np.prod(grid.shape)), -1)
-        box_of[owner] = np.arange(len(owner))
-        box = np.where(inside.numpy(), box_of[index.numpy()], -1)
-        which, wi, box = which[box >= 0], wi[box >= 0], box[box >= 0]
-        share = 1.0 / np.maximum([len(samples) for samples in grid.pilot], 1)
-        turn = np.arctan2(wi[:, 1], wi[:, 0]) % (2.0 * np.pi)
-        return cls(box, height(wi), turn, look.at(which, wi), share[which])
-
-    def single(self, count: int) -> np.ndarray:
-        """Whether each of `count` boxes has one sample."""
-        return np.bincount(self.box, minlength=count) == 1
-
-    def share_in(self, count: int) -> np.ndarray:
-        """The share of all samples in each of `count` boxes."""
-        return np.bincount(self.box, self.share, count)
-
-    def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """The share of samples in each box whose nodes, with the largest value `most`, are all dark beside one of the
-        samples, else 0: the lobe is narrower than the box."""
-        bright = np.zeros(len(most))
-        np.maximum.at(bright, self.box, self.value)
-        return np.where(most < UNSEEN * bright, np.minimum(bright * area, self.share_in(len(most))), 0.0)
-
-    def within(self, divided: np.ndarray, height: np.ndarray, azimuth: np.ndarray) -> _Points:
-        """The points in divided boxes, numbered by the quarters, which meet at these heights and azimuths."""
-        inside = _Points(*[column[divided[self.box]] for column in self])
-        box = (np.cumsum(divided) - 1)[inside.box]
-        return inside._replace(box=4 * box + (inside.height > height[box]) + 2 * (inside.azimuth > azimuth[box]))
+def _within(points: Points, divided: np.ndarray, middle: np.ndarray) -> Points:
+    """The points in divided boxes, numbered by the quarters, which meet at `middle` (boxes, 2)."""
+    inside = Points(*[column[divided[points.cell]] for column in points])
+    box = (np.cumsum(divided) - 1)[inside.cell]
+    return inside._replace(cell=4 * box + (inside.at > middle[box]) @ [1, 2])
 
 
 _GAUSS = {order: product(order) for order in (2, 3, 4)}

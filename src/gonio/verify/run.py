@@ -349,6 +349,8 @@ def decide(
             why.append(f"the violation, {size:.4g}, is more than the declared {breach.size:.4g}: {breach.reason}")
     elif over:
         why.append(_exceeds(finding))
+        if law.name in getattr(one.model, "known_violations", {}):
+            why.append("a violation is declared, but its size is 0 with these parameters")
     why += statistical
     if status == PASS and finding.untried:
         status, why = NOT_TRIED, [finding.untried]

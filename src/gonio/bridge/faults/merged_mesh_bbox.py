@@ -1,4 +1,4 @@
-"""Mitsuba 3.9: merging rectangles of equal material makes a mesh that has no bounding box.
+"""Mitsuba 3.9: merging meshes of equal material makes a mesh that has no bounding box.
 
     wall = {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}
     aside = mi.ScalarTransform4f().translate([3, 0, 0])
@@ -7,7 +7,8 @@
 The scene's box does not include it, and nothing outside the scene's box blocks a sky or a beam: under a distant roof a
 sky contributes 0.84 instead of 0.81.
 
-Workaround: compute the box, and reload a scene that was built without it.
+Workaround: compute the box before Gonio assembles a scene, and reload a scene of Mitsuba's that was assembled without
+it, since a scene keeps its own box.
 """
 
 from __future__ import annotations

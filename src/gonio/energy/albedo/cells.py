@@ -8,6 +8,8 @@ import numpy as np
 
 from ...optics.special import gauss
 
+UNSEEN = 0.25  # below this fraction of a sample's density, the values at a cell's nodes have missed its lobe
+FAINT = 0.01  # of what is missed: a cell's nodes show less by chance only, and show nothing in the next cell
 OUTSIDE = 0.07  # fraction of a cell's width outside the first of four nodes
 
 
@@ -25,6 +27,40 @@ class Seen(NamedTuple):
     integral: np.ndarray
     least: np.ndarray
     most: np.ndarray
+
+
+class Points(NamedTuple):
+    """Samples inside cells, which show lobes that are narrower than a cell.
+
+    cell     the number of the cell, (N,)
+    at       the two coordinates, (N, 2)
+    density  the integrand per unit of area in these coordinates, (N,)
+    light    what the sample contributes to an estimate of the integral, (N,)
+    """
+
+    cell: np.ndarray
+    at: np.ndarray
+    density: np.ndarray
+    light: np.ndarray
+
+    def single(self, count: int) -> np.ndarray:
+        """Whether each of `count` cells contains exactly one sample."""
+        return np.bincount(self.cell, minlength=count) == 1
+
+    def light_in(self, count: int) -> np.ndarray:
+        """The sum of the samples' light in each of `count` cells."""
+        return np.bincount(self.cell, self.light, count)
+
+    def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """What the samples in a cell make likely, (cells,), where one of them is bright and every node dark, else 0.
+
+        area  of each cell
+        most  the largest density at a cell's nodes, times its area
+        """
+        bright = np.zeros(len(area))
+        np.maximum.at(bright, self.cell, self.density)
+        bright *= area
+        return np.where(most < UNSEEN * bright, np.minimum(bright, self.light_in(len(area))), 0.0)
 
 
 def product(order: int) -> Nodes:

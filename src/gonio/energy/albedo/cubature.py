@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ...ops import Direction, Scalar, backend
-from .cells import Nodes, Seen, product, rimmed, step_aside
+from .cells import FAINT, Nodes, Points, Seen, product, rimmed, step_aside
 
 ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
@@ -25,8 +25,6 @@ DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2
 SEEDED = 17  # halvings around samples
 SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more, where light is unseen by the fewer
 CROWD = 1 / 32  # share of the samples in a cell for which it is divided before the integrand is evaluated
-UNSEEN = 0.25  # below this fraction of a sample's value, the values at a cell's nodes have missed its lobe
-FAINT = 0.01  # of what is missed: a cell's nodes show less by chance only, and show nothing in the next cell
 BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
 OFF = 1e-3  # of 1, the length of a sampled direction that is not used
 UP = np.array([0.0, 0.0, 1.0])
@@ -74,6 +72,11 @@ class _Cells(NamedTuple):
     low: np.ndarray
     size: np.ndarray
 
+    @property
+    def area(self) -> np.ndarray:
+        """Of each cell, in (theta, phi)."""
+        return np.asarray(self.size.prod(1))
+
     def take(self, which: np.ndarray) -> _Cells:
         return _Cells(*[part[which] for part in self])
 
@@ -119,7 +122,7 @@ def _integrate(
     """
     cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
-    way[points.missed_by(cells, first.most) > 0.0] = QUADRANTS
+    way[points.missed_by(cells.area, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
     unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # by a single sample
@@ -136,11 +139,11 @@ def _integrate(
         difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
         divide = (difference.max(1) > allowed) & ~small[cells.row]
-        missed = points.missed_by(cells, 4.0 * inner.most.reshape(-1, 4).max(1))
-        single = np.bincount(points.cell, minlength=len(missed)) == 1
+        missed = points.missed_by(cells.area, 4.0 * inner.most.reshape(-1, 4).max(1))
+        single = points.single(len(missed))
         by_samples = (missed > allowed) & (difference.max(1) < FAINT * missed)
         done = shown & single & ~by_samples
-        unseen += np.bincount(cells.row[done], points.light_in(done), len(wo))
+        unseen += np.bincount(cells.row[done], points.light_in(len(done))[done], len(wo))
         shown = by_samples & single
         difference += missed[:, None]
         divide |= missed > allowed
@@ -151,10 +154,10 @@ def _integrate(
         errors = errors.with_cells(cells.row[done], signed[:, done], difference[done])
         if not divide.any():
             break
-        points = points.within(cells, divide, way)
+        points = _within(points, cells, divide, way)
         next_ = np.repeat(divide, 4)
         cells, way = fine_cells.take(next_), ways[next_]
-        way[points.missed_by(cells, inner.most[next_]) > 0.0] = QUADRANTS
+        way[points.missed_by(cells.area, inner.most[next_]) > 0.0] = QUADRANTS
         shown = np.repeat(shown[divide], 4)
         coarse = fine[divide].reshape(-1, channels)
     return value, errors.total(), unseen
@@ -185,41 +188,17 @@ class _Errors:
         return np.asarray(np.abs(self.sums).max(0) + 3.0 * np.sqrt(self.squares))
 
 
-class _Points(NamedTuple):
-    """Samples inside cells: the number of the cell, theta and phi, the integrand, and its share of an estimate of the
-    integral."""
-
-    cell: np.ndarray
-    at: np.ndarray
-    value: np.ndarray
-    light: np.ndarray
-
-    def missed_by(self, cells: _Cells, most: np.ndarray) -> np.ndarray:
-        """What the samples in a cell make likely, where one of them is bright and every node dark, (M,), else 0: the
-        lobe is narrower than the cell.
-
-        most  the largest value at a cell's nodes, times its area on the sphere
-        """
-        bright = np.zeros(len(most))
-        np.maximum.at(bright, self.cell, self.value * np.sin(self.at[:, 0]))
-        bright *= cells.size.prod(1)
-        return np.where(most < UNSEEN * bright, np.minimum(bright, self.light_in(np.ones(len(most), bool))), 0.0)
-
-    def light_in(self, which: np.ndarray) -> np.ndarray:
-        """The sum of the samples' light in each of some cells."""
-        return np.bincount(self.cell, self.light, len(which))[which]
-
-    def within(self, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> _Points:
-        """The points in divided cells, numbered by these cells' quarters."""
-        inside = divided[self.cell]
-        cell, at = self.cell[inside], self.at[inside]
-        parts = WAYS[way[cell]]
-        place = np.floor((at - cells.low[cell]) / cells.size[cell] * parts).astype(int).clip(0, parts - 1)
-        quarter = 4 * (np.cumsum(divided) - 1)[cell] + place[:, 0] + parts[:, 0] % 4 * place[:, 1]
-        return _Points(quarter, at, self.value[inside], self.light[inside])
+def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> Points:
+    """The points in divided cells, numbered by these cells' quarters."""
+    inside = divided[points.cell]
+    cell, at = points.cell[inside], points.at[inside]
+    parts = WAYS[way[cell]]
+    place = np.floor((at - cells.low[cell]) / cells.size[cell] * parts).astype(int).clip(0, parts - 1)
+    quarter = 4 * (np.cumsum(divided) - 1)[cell] + place[:, 0] + parts[:, 0] % 4 * place[:, 1]
+    return Points(quarter, at, points.density[inside], points.light[inside])
 
 
-def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, _Points]:
+def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, Points]:
     """The initial cells, divided around the samples that carry light, `per` of each wo, the mirror direction and wo,
     and these samples inside them."""
     n_theta, n_phi = FIRST
@@ -261,7 +240,8 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, pe
         cells = cells.take(crowded).quarters()
         if not len(left):
             break
-    points = _Points(homes[: len(value)], angles[: len(value)], value, light)
+    at = angles[: len(value)]
+    points = Points(homes[: len(value)], at, value * np.sin(at[:, 0]), light)
     return _Cells(*[np.concatenate(parts) for parts in zip(*accepted, strict=True)]), points
 
 

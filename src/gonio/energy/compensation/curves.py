@@ -304,7 +304,7 @@ def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
     return ops.lookup(isotropic(ndf, masking), row)
 
 
-Coefficients = namedtuple("Coefficients", [f"c{k}" for k in range(DEGREE + 1)])
+Coefficients = namedtuple("Coefficients", "c0 c1 c2 c3 c4 c5 c6 c7 c8 c9 c10")
 Coefficients.__doc__ = "c_0 to c_10."
 
 

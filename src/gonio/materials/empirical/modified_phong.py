@@ -13,10 +13,9 @@ from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, clamp, function, inv_pi, mean, sqr, where
-from ...optics.frame import mirror
+from ...optics.frame import lit, mirror
 from ...optics.warp import power_about, square_to_cosine_hemisphere, square_to_power_lobe, to_frame
 from ..diffuse.lambert import Lambert
-from ..historic.glossy import lit
 
 
 class ModifiedPhong(BSDF):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from ...material.bsdf import BSDF, KnownViolation, Limit, Preset
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
-from ...optics.frame import TINY, normal_like
+from ...ops import Direction, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
+from ...optics.frame import TINY, lit, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 from ..diffuse.lambert import Lambert
 
@@ -130,16 +130,3 @@ def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
     total = wo + wi
     size = sqrt(maximum(dot(total, total), TINY))
     return total * (1.0 / size), 0.5 * size
-
-
-class _Lit(NamedTuple):
-    above: Mask
-    wo: Direction
-    wi: Direction
-
-
-def lit(wo: Direction, wi: Direction) -> _Lit:
-    """(whether both are above the surface, both directions, with the normal in place of one below): masked values must
-    not bring infinity or the root of a negative number into a gradient."""
-    above = (wo.z > 0.0) & (wi.z > 0.0)
-    return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

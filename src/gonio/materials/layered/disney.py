@@ -30,9 +30,10 @@ from ...ops import (
     where,
 )
 from ...optics import frame, masking
+from ...optics.frame import lit
 from ...optics.ndf import distribution
 from ...optics.warp import square_to_cosine_hemisphere
-from ..historic.glossy import facet, lit
+from ..historic.glossy import facet
 from ..microfacet import microfacet
 
 SMALLEST = 0.001  # width: the limit in Burley2012's code

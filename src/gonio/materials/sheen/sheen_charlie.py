@@ -13,7 +13,7 @@ from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Mode, Scalar, Spectrum, exp, function, inv_pi, log, sqr, where
 from ...optics import frame
-from ..historic.glossy import lit
+from ...optics.frame import lit
 from ..microfacet.microfacet import Terms
 
 # a, b, c, d, e of L(x) = a / (1 + b x^c) + d x + e at alpha = 0 and at alpha = 1 (Estevez2017, table 1)

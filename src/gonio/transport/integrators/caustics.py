@@ -42,7 +42,7 @@ class CausticPath:
 
 
 class Caustics(Path):
-    """Path tracing, with light by way of mirrors and smooth glass also taken from a photon map.
+    """Path tracing, with a photon map for the light that mirrors and smooth glass cast on other surfaces.
 
     Light that mirrors or glass cast on a surface is found by paths from the camera if the lamps are large, by particles
     from the lamps if they are small; both are weighted by their probability of finding it. A particle contributes
@@ -63,7 +63,7 @@ class Caustics(Path):
 
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
-        self.last_ray_apart = self.one_vertex = False  # its light is weighted against the particles
+        self.last_ray_apart = self.one_bounce = False  # its light is weighted against the particles
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         self.retraces = False
         if self.merging:
@@ -101,7 +101,7 @@ class Caustics(Path):
             wavelength = self.maps.wavelength(index // SAMPLES_PER_MAP, index) if mi.is_spectral else None
             fresh = self.begin(self.camera_path(pixel, key, index, begins, wavelength))
             state, begins = self.regenerate(fresh, state, key, begins)
-            state, features = self.merged_vertex(state, key)
+            state, features = self.merged_bounce(state, key)
             ended = ~state.path.active
             if self.retraces:
                 ended &= state.retrace.phase != delta_retrace.DUE
@@ -128,7 +128,7 @@ class Caustics(Path):
             fresh.blur = dr.select(retraced, state.blur, fresh.blur)
         return dr.select(begins, fresh, state), begins & ~retraced
 
-    def merged_vertex(self, state: CausticPath, key: UInt) -> tuple[CausticPath, list[Float]]:
+    def merged_bounce(self, state: CausticPath, key: UInt) -> tuple[CausticPath, list[Float]]:
         """A vertex of `path`, with the light of particles added."""
         path = state.path
         vertex, throughput = self.intersect(path)
@@ -145,8 +145,8 @@ class Caustics(Path):
         if self.retraces:
             u.lobe = state.retrace.lobe(u.lobe)
         light = self.sample_light(vertex, u, active)
-        value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        gathered = self.direct_light(vertex, light, value, pdf, active)
+        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        gathered = self.direct_light(vertex, light, light_value, light_pdf, active)
 
         # Light of particles, weighted against paths that go behind mirrors
         photons, excess, counts = self.gather_photons(state, vertex, u, active)

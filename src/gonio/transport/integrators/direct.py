@@ -20,7 +20,7 @@ class Direct(LightTransport):
         """Add samples [first, last) of every pixel to the sums."""
 
         def step(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
-            path, features = self.vertex(self.camera_path(pixel, key, index), key)
+            path, features = self.bounce(self.camera_path(pixel, key, index), key)
             every: Mask = self.mi.Bool(True)
             sums = sums.add([*self.data.rgb(path.radiance, path.ray.wavelengths)], every, features, every)
             return index + 1, sums
@@ -28,7 +28,7 @@ class Direct(LightTransport):
         state = (first + dr.zeros(self.mi.UInt32, dr.width(pixel)), sums)
         return dr.while_loop(state, lambda index, _: index < last, step, mode="symbolic", label="samples")[1]
 
-    def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
+    def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
         """Emission of the surface that the camera ray has hit, and the direct light that this surface reflects."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
@@ -38,8 +38,8 @@ class Direct(LightTransport):
         # Light sampling; the same call of the BSDF samples a direction.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active) if self.samples_lights else None
-        value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        radiance = radiance + throughput * self.direct_light(vertex, light, value, pdf, active)
+        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, light_value, light_pdf, active)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 

@@ -6,7 +6,7 @@ from .direct import Direct
 
 
 class DirectSampleLight(Direct):
-    """Direct light, by sampling the lights only (mirrors and smooth glass are followed)."""
+    """Direct light, by sampling the lights only, except at mirrors and smooth glass."""
 
     name = "directSampleLight"
     samples_lobes = False

@@ -16,7 +16,7 @@ from .light_transport import LightTransport
 
 
 class Light(LightTransport):
-    """Particle tracing from the lamps, with every vertex connected to the camera: the reference for `path`.
+    """Particle tracing from the lamps, with every vertex connected to the camera: a reference for `path`.
 
     Light that leaves mirrors and smooth glass toward the camera is missing, since no connection to the camera is
     possible there. A sample of the picture is as many particles as it has pixels. Splats are added up as integers,

@@ -1,6 +1,14 @@
 """The steps of a path, which integrators combine in loops of their own.
 
-    camera_path -> [ intersect, emitted -> sample_light, sample_bsdf, direct_light -> spawn, roulette -> trace ]
+    camera_path   the camera ray and its first hit; then, at each vertex:
+    intersect     the surface at the hit
+    emitted       its emission, weighted against light sampling (MIS)
+    sample_light  a point on a lamp
+    sample_bsdf   the BSDF toward that point, and the next direction
+    direct_light  the lamp's light, weighted against BSDF sampling (MIS), if a shadow ray finds nothing in between
+    spawn         the ray in the next direction
+    roulette      Russian roulette
+    trace         the first hit of that ray
 
 A vertex costs one call of its BSDF, which evaluates it toward a light and samples the next direction, and a shadow ray
 unless its contribution is zero.
@@ -31,7 +39,7 @@ SURVIVAL = 4.0
 
 # Dimensions of a path: each vertex uses VERTEX_DIMENSIONS of them.
 FIRST_VERTEX = FIRST_FREE
-LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
+LIGHT, DIRECTION, LOBE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 
 
 @dataclass
@@ -49,7 +57,7 @@ class PathState:
     radiance: Radiance  # accumulated so far
     hero_only: UInt  # 1 if the path continues with its first wavelength alone
     inside: UInt  # the media that contain it, see `media.py`
-    active: Mask
+    active: Mask  # False once it has ended: by its depth, by zero throughput, in `roulette`, or in `trace`
 
 
 @dataclass
@@ -64,7 +72,7 @@ class VertexNumbers:
 
 
 class LightTransport(Integrator):
-    """An integrator that follows light along paths: subclasses implement `vertex` and loop over vertices.
+    """An integrator that follows light along paths: subclasses implement `bounce` and loop over it.
 
     samples_lights  whether vertices sample the lights
     samples_lobes   whether they sample all lobes of the BSDF; delta lobes are always followed
@@ -86,13 +94,13 @@ class LightTransport(Integrator):
         """The longest path in segments; 2 is direct light."""
         return 2
 
-    def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """The path after its next vertex, and the features of that vertex (`SceneData.features`)."""
-        raise NotImplementedError(f"{type(self).__name__} has no vertex")
+    def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
+        """The path after the vertex at its hit, and the features of that vertex (`SceneData.features`)."""
+        raise NotImplementedError(f"{type(self).__name__} has no bounce")
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
         """[r, g, b] and the features of a sample that ends at its first vertex."""
-        path, features = self.vertex(self.camera_path(pixel, key, index), key)
+        path, features = self.bounce(self.camera_path(pixel, key, index), key)
         return [*self.data.rgb(path.radiance, path.ray.wavelengths), *features]
 
     # ------------------------------------------------------------------ the beginning of a path
@@ -128,34 +136,25 @@ class LightTransport(Integrator):
         )
 
     def numbers(self, path: PathState, key: UInt) -> VertexNumbers:
-        """The random numbers of the path's next vertex."""
+        """The random numbers of the vertex at the path's hit."""
         mi, data, index = self.mi, self.data, path.index
         dimension = path.depth * VERTEX_DIMENSIONS + FIRST_VERTEX
         pair = data.direction_pair if self.lights.has_environment else data.pair  # over the sphere, or on a lamp
         roulette, photons = sampler.independent_pair(key, index, dimension + ROULETTE)
         return VertexNumbers(
-            mi.Point2f(*pair(key, index, dimension + LIGHT)),
-            mi.Point2f(*data.direction_pair(key, index, dimension + LOBE)),
-            data.pair(key, index, dimension + CHOICE)[0],
-            roulette,
-            photons,
+            light=mi.Point2f(*pair(key, index, dimension + LIGHT)),
+            direction=mi.Point2f(*data.direction_pair(key, index, dimension + DIRECTION)),
+            lobe=data.pair(key, index, dimension + LOBE)[0],
+            roulette=roulette,
+            photons=photons,
         )
 
     # ------------------------------------------------------------------ the steps at a vertex
 
     def intersect(self, path: PathState) -> tuple[Vertex, Radiance]:
-        """The surface at the hit that `trace` or `camera_path` found, and the path's throughput there after absorption
-        by media on the way."""
-        active, throughput, media = path.active, path.throughput, self.media
-        si = self.data.surfaces.interaction(path.hit, path.ray, active)
-        vertex = Vertex(si, si.bsdf(path.ray))
-        if media.known:
-            here = active & si.is_valid()
-            throughput = dr.select(here, throughput * media.transmitted(path.inside, si, si.t), throughput)
-            vertex.crossing = media.crossing(si, vertex.bsdf, path.inside, here)
-            # carries the index outside to the plugins of materials, which see nothing else of the media
-            si.duv_dx = self.mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
-        return vertex, throughput
+        """The surface at the hit that `camera_path` or `trace` has found, and the path's throughput there after
+        absorption by media on the way. It traces no ray."""
+        return self.data.vertex(path.hit, path.ray, path.inside, path.throughput, path.active)
 
     def emitted(self, path: PathState, vertex: Vertex) -> Radiance:
         """Radiance along the path's ray, weighted against light sampling at its origin."""
@@ -229,8 +228,8 @@ class LightTransport(Integrator):
     def spawn(
         self, path: PathState, vertex: Vertex, bs: BSDFSample, light: LightSample | None, active: Mask
     ) -> PathState:
-        """The path with a ray in the sampled direction. `path` has the vertex's radiance, and the throughput after
-        it."""
+        """The path with a ray in the sampled direction (Mitsuba's `spawn_ray`, see `bridge.faults.ray_offset`). `path`
+        has the vertex's radiance, and the throughput after it."""
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         active = active & dr.any(path.throughput != 0) & (self.samples_lobes | delta)

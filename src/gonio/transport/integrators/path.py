@@ -25,11 +25,12 @@ class Path(LightTransport):
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
         depth = self.depth(settings)
-        # The last ray can only find light. If the only lamp is a single rectangle, the vertex before adds its light by
-        # a shadow ray (`light_along`). Otherwise it is a ray like the others, since media attenuate it or any of
+        # The last ray can only find light. With one bounce, or if the only lamp is a rectangle, the vertex before adds
+        # its light (`light_along`). Otherwise it is a ray like the others, since media attenuate it or any of
         # several lights may be its first hit; handled apart, it would add a second ray and its surface to each vertex.
         self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
-        self.one_vertex = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
+        # paths of one vertex need no loop over vertices: `Integrator.accumulate` loops over samples alone
+        self.one_bounce = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
@@ -44,13 +45,13 @@ class Path(LightTransport):
         A lane whose path has ended begins its next one at once, instead of idling until the longest of the 16 paths
         around it has ended.
         """
-        if self.one_vertex:
+        if self.one_bounce:
             return super().accumulate(pixel, key, first, last, sums)
 
         def step(index: UInt, path: PathState, sums: Sums) -> tuple[UInt, PathState, Sums]:
             begins = ~path.active
             path = dr.select(begins, self.camera_path(pixel, key, index, begins), path)
-            path, features = self.vertex(path, key)
+            path, features = self.bounce(path, key)
             ended = ~path.active
             sums = sums.add([*self.data.rgb(path.radiance, path.ray.wavelengths)], ended, features, begins)
             return index + dr.select(ended, self.mi.UInt32(1), 0), path, sums
@@ -58,7 +59,7 @@ class Path(LightTransport):
         state = (first + dr.zeros(self.mi.UInt32, dr.width(pixel)), self.idle_path(), sums)
         return dr.while_loop(state, lambda index, *_: index < last, step, mode="symbolic", label="vertices")[2]
 
-    def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
+    def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
         """Add the emission of the surface that the path's ray has hit and its direct light, and trace the next ray."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
@@ -68,8 +69,8 @@ class Path(LightTransport):
         # Light sampling; the same call of the BSDF samples the next direction.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active)
-        value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        radiance = radiance + throughput * self.direct_light(vertex, light, value, pdf, active)
+        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, light_value, light_pdf, active)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 

@@ -9,7 +9,7 @@ DEPTH = 10
 
 
 class Whitted(Path):
-    """Mirrors and smooth glass followed to depth 10, everything else lit by light sampling only."""
+    """Whitted ray tracing: mirrors and smooth glass to depth 10, direct light by light sampling elsewhere."""
 
     name = "whitted"
     takes_depth = False

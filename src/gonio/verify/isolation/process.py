@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import psutil
 
@@ -30,24 +30,45 @@ MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before i
 Call = tuple[str, str, str]  # a method, and the material's values as a key and in words
 
 
+class _Started(NamedTuple):
+    """A process that waits for its task, its folder, and the file there that holds what it prints."""
+
+    folder: tempfile.TemporaryDirectory[str]
+    log: Path
+    process: psutil.Popen
+
+
+_ahead: list[_Started] = []
+
+
+def start_ahead() -> None:
+    """Start the first process before its task is known: it loads while the command line is read."""
+    _ahead.append(_start())
+
+
+def _start() -> _Started:
+    folder = tempfile.TemporaryDirectory(prefix="gonio-verify-", ignore_cleanup_errors=True)
+    printed = Path(folder.name, "printed")
+    start = "from gonio.verify.isolation import worker; worker.main()"
+    code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
+    with printed.open("ab") as log:
+        process = psutil.Popen(
+            [sys.executable, "-P", "-c", code],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            start_new_session=True,  # Ctrl-C is for the parent; processes of the BSDF end with the session
+        )
+    return _Started(folder, printed, process)
+
+
 class Process:
     """One process: its card and step, since when, and the call in progress."""
 
     def __init__(self, task: object, limit: float, answers: queue.Queue[tuple[Process, Any]]) -> None:
-        self.folder = tempfile.TemporaryDirectory(prefix="gonio-verify-", ignore_cleanup_errors=True)
-        self.log = Path(self.folder.name, "printed")
+        self.folder, self.log, self.process = _ahead.pop() if _ahead else _start()
         self.in_progress = Path(self.folder.name, "call")  # written by the process: faster than an answer for each call
         self.counted = 0  # bytes of the log whose lines are counted
-        start = "from gonio.verify.isolation import worker; worker.main()"
-        code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
-        with self.log.open("ab") as log:
-            self.process = psutil.Popen(
-                [sys.executable, "-P", "-c", code],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                start_new_session=True,  # Ctrl-C is for the parent; processes of the BSDF end with the session
-            )
         self.busy, self.reason = True, ""
         self.begins(-1, STARTING)
         self.order(task, limit, str(self.in_progress))

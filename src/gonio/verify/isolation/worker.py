@@ -19,7 +19,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from ...catalog import notation, outside, shaders
 from ...errors import GonioError, GonioWarning, InputError, MachineError
@@ -38,15 +38,12 @@ def main() -> None:
     """Follow the parent's orders until it closes the pipe."""
     orders, say = _pipes()
     _end_with(os.getppid())
-    task, limit, in_progress = pickle.load(orders)
-    calls = _Calls(in_progress)
-    watch.watched, watch.LIMIT, watch.calling = True, limit, calls
     warnings.showwarning = lambda message, category, *more, **options: (
         say("warning", str(message)) if issubclass(category, GonioWarning) else None
     )
     warnings.simplefilter("always", GonioWarning)
     try:
-        _work(task, orders, say, calls)
+        _work(orders, say)
     except GonioError as error:
         say("error", error)
     except (_Stuck, Fault) as error:  # a fault here is that of a repeated test
@@ -65,7 +62,14 @@ def main() -> None:
     os._exit(0)  # whatever threads and handlers the BSDF has left behind
 
 
-def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
+def _work(orders: IO[bytes], say: Say) -> None:
+    chosen(None)  # loads the laws: the parent may not know its task yet
+    try:
+        task, limit, in_progress = cast(tuple[Task, float, str], pickle.load(orders))
+    except EOFError:  # it has none
+        return
+    calls = _Calls(in_progress)
+    watch.watched, watch.LIMIT, watch.calling = True, limit, calls
     say("step", -1, LOADING)
     subjects, unread = _loaded(task.items)
     laws = chosen(task.laws)

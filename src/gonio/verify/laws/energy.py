@@ -25,7 +25,8 @@ from .base import Law, pairs, where_found
 GAIN = 1e-3
 FINER = 100.0  # accuracy of an integral that is computed again
 STATED = "the albedo that is stated"
-LOST = "white furnace loses"
+FURNACE = "white furnace"
+LOST = f"{FURNACE} loses"
 COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo, to find what a loss depends on
 MOST_ALONE = 6  # parameters that are whitened alone
 ELSEWHERE = 88.0  # degrees; a view at other parameter values
@@ -85,7 +86,8 @@ class Energy(Law):
             self._furnace(white, wo, effort, seed, finding, curves)
             self._one_at_a_time(subject, wo, effort, seed, finding)
         if finding.figure > GAIN:
-            finding.shown = f"gain {finding.figure:.4f}"
+            of_variant = finding.worst.startswith(FURNACE)
+            finding.shown = f"gain {finding.figure:.4f}" + (" of the lossless variant" if of_variant else "")
         finding.evidence = curves
         return finding
 
@@ -200,7 +202,7 @@ class Energy(Law):
         theta = directions.angles(wo)[:, 0]
         if gain > finding.figure:
             finding.figure = gain
-            finding.worst = f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
+            finding.worst = f"{FURNACE}, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
         lost = np.round(1.0 - value.mean(1), 6) + 0.0  # not -0
         above = wo[:, 2] > 0.0
         order = np.argsort(wo[above, 2])
