@@ -12,10 +12,10 @@ install: .venv/installed
 .venv/installed: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $@
 
-# a checkout that is only looked at needs no test tools, and compiles no module that it does not import
+# a checkout that is only looked at needs no test tools; modules are compiled when they are imported
 .venv/rendering: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -97,7 +97,7 @@ docs: .venv/installed
 .venv/book: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[book]'
+	$(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --editable '.[book]'
 	touch $@
 
 book: .venv/book

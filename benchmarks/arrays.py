@@ -1,9 +1,9 @@
-"""Time of eval, pdf and sample on NumPy arrays, against Mitsuba's rough conductor on the same arrays.
+"""Time of eval, pdf and sample on NumPy arrays, compared with Mitsuba's rough conductor on the same arrays.
 
     python benchmarks/arrays.py [--pairs 10000000]
 
-Both get NumPy arrays (N, 3) of float32 and return NumPy arrays; the best of five calls each, by turns, so that other
-jobs of the machine disturb both alike. `arrays` is Mitsuba's call on arrays that are Dr.Jit's already.
+Both take float32 NumPy arrays (N, 3) and return NumPy arrays. Times are the minimum of five calls; the calls alternate,
+so that other programs affect both alike. `arrays` is Mitsuba's call on arrays that are already Dr.Jit's.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def directions(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def best(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
-    """The shortest time of each call, s, the first of each left out."""
+    """The shortest time of each call in seconds, excluding the first."""
     times = dict.fromkeys(calls, np.inf)
     for run in range(RUNS + 1):
         for name, call in calls.items():

@@ -2,8 +2,8 @@
 
     python benchmarks/bsdf.py [--pairs 16] [--rounds 7] [--check-samples 0]
 
-Both read the same directions from memory and write their results to memory; the two take turns, and the ratio is the
-median over the turns. `--check-samples N` also draws N million samples of every material and counts values that are
+Both read the same directions from memory and write their results to memory. The two alternate, and the ratio is the
+median over the rounds. `--check-samples N` also draws N million samples of every material and counts values that are
 not finite.
 """
 
@@ -96,7 +96,7 @@ def compare(name: str, count: int, rounds: int) -> list[tuple[str, float, float,
 
 
 def count_non_finite(millions: int) -> None:
-    """Draw samples of every material at awkward widths and indices; count what is not finite."""
+    """Draw samples of every material with difficult alphas and indices, and count values that are not finite."""
     metal = {"type": "gonio_conductor", "preset": "Au"}
     glass = {"type": "gonio_dielectric"}
     cases = [{**metal, "alpha": a, "ndf": n} for n in ("ggx", "beckmann", "student-t") for a in (0.001, 0.1, 1.0)]

@@ -1,16 +1,16 @@
-"""A material from photographs of a ball: accuracy, how often intervals hold the truth, faults, and plans.
+"""A material from photographs of a ball: accuracy, coverage of the intervals, calibration faults, and plans.
 
     python benchmarks/capture.py [--only accuracy,coverage,faults,plan] [--trials 50]
     python benchmarks/capture.py --only series [--cameras usual] [--seed-range 1:101] [--jobs 16] [-o capture.json]
 
-accuracy  8 lights, 256 x 256, 1 % noise: how far albedo and alpha are off after the fit, of several materials; seconds
-coverage  the same with a calibration that is off as it says (lamps by 1 degree, ball by 1 % and a pixel, intensities by
-          1 % each and .5 % together): how often the 95 % intervals hold the truth
-series    the same from series of three 16-bit exposures of four cameras, whose shutters are off by .5 % each, as the
-          calibration says; the file holds what that of `intervals.py` holds
+accuracy  8 lights, 256 x 256, 1 % noise: errors of albedo and alpha after the fit, for several materials; seconds
+coverage  the same with calibration errors of the stated size (lamps by 1 degree, ball by 1 % and a pixel, intensities
+          by 1 % each and 0.5 % together): coverage of the 95 % intervals
+series    the same from series of three 16-bit exposures of four cameras, with exposure times off by 0.5 % each, as
+          stated in the calibration; the file has the format of that of `intervals.py`
 faults    one fault at a time, and 8-bit photographs
-plan      4 planned photographs against 8 random ones, in pairs: root mean square error of the parameters, and what the
-          fits state of it. True errors of a pair are all but one random number, so that it takes some 80 pairs
+plan      4 planned photographs against 8 random ones, in pairs: root mean square error of the parameters, actual and as
+          stated by the fits. The actual error of a pair is almost a single random number, so some 80 pairs are needed
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from gonio.materials.combined.sum import Sum
 from intervals import Outcome, add_options, report, run, seeds_of
 
 MIDDLE, RADIUS, AWAY = np.array([0.0, 0.0, 500.0]), 50.0, 400.0
-ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # between lamp and camera, of the eight
+ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # angles between lamp and camera of the eight photographs
 PAINT = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick"))
-CAMERAS = {  # read noise, photons of full scale, relative noise
+CAMERAS = {  # read noise, photons at full scale, relative noise
     "deep wells": (0.5e-3, 60000, 0.0),
     "usual": (1.5e-3, 8000, 0.0),
     "small wells": (4e-3, 1000, 0.0),
     "a flickering lamp": (1.5e-3, 8000, 0.01),
 }
-TIMES = (0.02, 0.08, 0.32)  # seconds of a series
+TIMES = (0.02, 0.08, 0.32)  # exposure times of a series, seconds
 STATED = {"light": 1.0, "radius": 0.01, "center": 1.0, "intensity": 0.01, "scale": 0.005}
 SHUTTER = 0.005  # relative error of an exposure time
 
 
 def rig(lamps: np.ndarray, bits: int | None = None) -> dict[str, Any]:
-    """A calibration with lamps at these places."""
+    """A calibration with lamps at these positions."""
     suffix = "npz" if bits is None else "png"
     seconds = 1.0 if bits is None else 1.6
     return {
@@ -67,7 +67,7 @@ def eight() -> np.ndarray:
 
 
 def off(true: dict[str, Any], stated: dict[str, float], rng: np.random.Generator) -> dict[str, Any]:
-    """The calibration as one would write it who is off by what he states."""
+    """The calibration with errors drawn from the stated uncertainties."""
     lights = {}
     together = 1.0 + stated.get("scale", 0.0) * rng.normal()
     for name, lamp in true["lights"].items():
@@ -98,7 +98,7 @@ def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
 
 
 def in_series(true: dict[str, Any], times: np.ndarray) -> dict[str, Any]:
-    """The calibration with a series of exposures of each view."""
+    """The calibration with a series of exposures for each view."""
     photographs = [
         {
             "light": shot["light"],
@@ -118,10 +118,10 @@ def measured(
     bits: int | None = None,
     camera: str = "",
 ) -> tuple[Capture, np.ndarray, float]:
-    """What was found, the truth, and the seconds that it took."""
+    """The capture, the true parameters, and the seconds that it took."""
     true = rig(lamps, bits)
     with tempfile.TemporaryDirectory() as folder:
-        rng = np.random.default_rng([seed, 5, *camera.encode()])  # each camera has a calibration of its own
+        rng = np.random.default_rng([seed, 5, *camera.encode()])  # each camera has its own calibration
         told = off(true, stated, rng)
         noise: float | Noise = 0.01
         if camera:
@@ -160,7 +160,7 @@ def trials(
 
 
 def from_series(job: tuple[str, int]) -> list[Outcome]:
-    """One capture from series with every fault at once."""
+    """One capture from series of exposures with all faults at once."""
     camera, seed = job
     found, known, _ = measured(PAINT, "lambert+ggx", eight(), {**STATED, "seconds": SHUTTER}, seed, camera=camera)
     fit = found.fit
@@ -189,7 +189,7 @@ def faults(count: int) -> None:
 
 
 def plans(count: int) -> None:
-    """Two photographs planned from a guess, two more from what they say; against eight at random places."""
+    """Two photographs planned from a guess and two more from their fit, against eight at random positions."""
     stated = {"light": 1.0, "intensity": 0.01}
     errors = {"planned": [], "random": []}
     stated_errors = {"planned": [], "random": []}

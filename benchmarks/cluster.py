@@ -1,14 +1,15 @@
-"""The cost of a cluster: parts per second, bytes per part, and a model of them compared with processes of this machine.
+"""The cost of a cluster: parts per second, bytes per part, and a model of them compared with processes on this machine.
 
     python benchmarks/cluster.py [--workers 2,4,8] [--render]
 
-The master hands parts out and takes results in, one after the other: with W workers and parts of s seconds it keeps up
-as long as W / s parts a second are not more than R, what it manages where parts do nothing. A part travels while others
-are worked on, so that only the first and the last cost: a worker waits half a part at the end on average, and `begin`
-seconds at the start, in which it imports Gonio, loads the scene and takes the kernel from the cache: measured as what a
-worker's first picture takes longer than its second. For N parts
+The master submits parts and receives results one after the other. With W workers and parts of s seconds it keeps up as
+long as W / s parts per second do not exceed R, the rate of parts that do nothing. Parts are transferred while others
+are computed, so that only the first and the last cost time: a worker waits half a part at the end on average, and
+`begin` seconds at the start, while it imports Gonio, loads the scene and reads the kernel from the cache; `begin` is
+measured as the time by which a worker's first picture exceeds its second. For N parts of `size` bytes and `band` bytes
+per second
 
-    efficiency = T / (T + begin + s / 2),  T = max(N s / W, N / R) + what the bytes take,  relative to N s / W
+    efficiency = (N s / W) / (T + begin + s / 2),  T = max(N s / W, N / R, N size / band)
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ SCENE = Path(__file__).parent.parent / "examples/phong"
 
 
 def nothing(seconds: float, size: int) -> dict[str, np.ndarray]:
-    """A part of so many seconds that gives so many bytes back."""
+    """A part that takes `seconds` and returns `size` bytes."""
     time.sleep(seconds)
     return {"x": np.zeros(size // 8)}
 
 
 def timed(count: int, seconds: float, size: int = 1024) -> float:
-    """Seconds for so many parts."""
+    """Seconds for `count` parts."""
     begun = time.perf_counter()
     for _ in executor.each(nothing, [(seconds, size)] * count):
         pass
@@ -49,7 +50,7 @@ def timed(count: int, seconds: float, size: int = 1024) -> float:
 
 
 def predicted(parts: int, seconds: float, workers: int, rate: float, begin: float, size: float, band: float) -> float:
-    """The model's efficiency."""
+    """The efficiency by the model."""
     ideal = parts * seconds / workers
     return ideal / (max(ideal, parts / rate, parts * size / band) + begin + seconds / 2)
 
@@ -62,11 +63,11 @@ def main() -> None:
     )
     options = parser.parse_args()
     rates, bands = [], []
-    cluster.START_INTERVAL = 0.0  # all at once: the model is of workers that have joined
+    cluster.START_INTERVAL = 0.0  # start all at once, since the model assumes that all have joined
     print("workers  parts/s  MB/s   s/part: measured efficiency (model)")
     for workers in map(int, options.workers.split(",")):
         with Cluster(workers=workers) as one:
-            while len(one._alive()) < workers:  # everybody is there
+            while len(one._alive()) < workers:  # wait for all workers
                 timed(4 * workers, 0.1)
             rates.append(1000 / timed(1000, 0.0))
             bands.append(40 * 4e6 / timed(40, 0.0, 4 << 20))
@@ -88,7 +89,7 @@ def main() -> None:
 
     begin = beginning()
     print(f"a worker begins in {begin:.2f} s")
-    speed = 10e6 * (os.cpu_count() or 2) / 2  # samples a second of a worker, as of this machine with two cores
+    speed = 10e6 * (os.cpu_count() or 2) / 2  # samples per second of a worker, scaled from a machine with two cores
     print("workers  parts  s/part  efficiency of 3840 x 2160 at 4096 samples;  shortest part that keeps 90 %")
     total = 3840 * 2160 * 4096
     for workers in (10, 100, 1000):
@@ -108,7 +109,7 @@ def main() -> None:
 
 
 def beginning() -> float:
-    """Seconds that a worker which has just joined takes longer for a picture than one that has made it before."""
+    """Additional seconds that a worker which has just joined takes for a picture."""
     go.render(SCENE, spp=16)
     with Cluster(workers=2):
         timed(8, 0.1)
@@ -121,7 +122,7 @@ def beginning() -> float:
 
 
 def against_one(worker_counts: list[int]) -> None:
-    """A render of over a minute by each cluster, and before and after each by one process with two threads."""
+    """Time a render of over a minute on each cluster, and before and after each in one process with two threads."""
     go.render(SCENE, spp=16)
     spp = 4000
     spp = int(spp * 75 / cost(spp)[0])
@@ -142,7 +143,7 @@ def against_one(worker_counts: list[int]) -> None:
 
 
 def cost(spp: int, workers: int = 0) -> tuple[float, float, np.ndarray]:
-    """Seconds, seconds of the processor, and the picture; the cluster's start and end are in it."""
+    """Wall-clock seconds and CPU seconds, including the cluster's start and end, and the picture."""
     begun, before = time.perf_counter(), sum(os.times()[:4])
     with Cluster(workers=workers) if workers else contextlib.nullcontext():
         picture = go.render(SCENE, spp=spp)

@@ -1,10 +1,10 @@
-"""A coat against a random walk between its two interfaces: how far the albedo is off.
+"""A coat compared with a random walk between its two interfaces: the error of the albedo.
 
     python benchmarks/coat.py [--walks 1000000]
 
-The walk draws from the coat's surface as rough or smooth glass, both ways, from the base's own `sample`, and weighs
-what it crosses by Beer's law, until it leaves. Of rough glass the light that one facet loses is given back
-(KullaConty), as `coat` gives it. Furnaces: white bases, no absorption, at 12 angles.
+The walk samples the coat's surface as rough or smooth glass from either side, and the base by its own `sample`, and
+weights each crossing by Beer's law, until it leaves. Light lost by rough glass in single scattering is restored
+(KullaConty), as in `coat`. Furnaces: white bases, no absorption, at 12 angles.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 
 Coat, Eon = go.model("coat"), go.model("eon")
 MU = (0.1, 0.3, 0.6, 0.95)
-NEVER = 400  # bounces after which hardly any walk is left
+NEVER = 400  # bounces after which almost no walks are left
 
 
 def walked(coat: go.BSDF, mu: float, walks: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """(albedo, standard error) seen along mu, (3,) each."""
+    """(albedo, standard error) at the viewing cosine mu, (3,) each."""
     rng = np.random.default_rng(seed)
     glass = go.Dielectric(coat.index, coat.alpha, ndf=coat.ndf, masking=coat.masking)
     surface = glass if glass.delta == "always" else go.KullaConty(glass)
@@ -41,7 +41,7 @@ def walked(coat: go.BSDF, mu: float, walks: int, seed: int = 1) -> tuple[np.ndar
         weight = weight * np.where(hit.pdf > 0.0, 1.0, 0.0)[:, None] * hit.weight
         path = 1.0 / np.maximum(down[:, 2], 1e-6) + 1.0 / np.maximum(hit.wi[:, 2], 1e-6)
         weight = weight * np.exp(-absorption * path[:, None])
-        # roulette: walks of little weight end, the others stand for them
+        # Russian roulette: walks of small weight end, and the others compensate
         keep = np.minimum(weight.max(1) * 4.0, 1.0)
         alive = rng.random(len(keep)) < keep
         index, weight = index[alive], weight[alive] / keep[alive, None]

@@ -1,4 +1,4 @@
-"""The bars of compression: bytes and errors of each method, networks against the published ones, time in a render.
+"""Limits for compression: size and error of each method, networks compared with published ones, time in a render.
 
 python benchmarks/compression.py [curve|network|other|render ...]  --data FOLDER ($GONIO_SHARED/data)  --figure FILE.png
 
@@ -30,8 +30,8 @@ from gonio.measure.tables.network import SHAPES, Network
 
 DATA = Path(os.environ.get("GONIO_SHARED", ".")) / "data"
 FIGURE: Path | None = None
-SIZES = (16384, 4096, 65536)  # the bar's first
-GIVEN = (16384, 0.01)  # bytes a material and the error that the median is to keep below
+SIZES = (16384, 4096, 65536)  # bytes per material, the size of the limit first
+GIVEN = (16384, 0.01)  # bytes per material, and the limit of the median error
 
 
 def names() -> list[str]:
@@ -40,7 +40,7 @@ def names() -> list[str]:
 
 
 def networks() -> dict[str, Measurement]:
-    """The tables that the published networks are."""
+    """The published networks as tables."""
     return {name: read(f"{DATA / 'nbrdf' / 'merl.npz'}:{name}") for name in names()}
 
 
@@ -52,7 +52,7 @@ def published() -> dict[str, Network]:
 
 
 def rebuilt(name: str) -> Measurement:
-    """The table of Bagher's fit of a material."""
+    """The table of Bagher's fit to a material."""
     model = go.material(name)
     return sampled(lambda wo, wi: model.eval(wo, wi, precision="float64"), title=name)
 
@@ -132,7 +132,7 @@ def other() -> None:
 
 
 def against(pairs: dict[str, tuple[Measurement, Measurement]]) -> None:
-    """Train on tables, and print the errors beside those of others."""
+    """Train on tables, and print the errors next to those of other networks."""
     errors, seconds = [], []
     for name, (table, given) in pairs.items():
         start, spent = time.perf_counter(), time.process_time()

@@ -1,8 +1,8 @@
-"""The figures of docs/energy.md: tables, furnaces, the walk, the cost of compensation, the ten balls.
+"""The measured values in docs/energy.md: tables, furnaces, the random walk, the cost of compensation, the ten balls.
 
     python benchmarks/energy.py [--pairs 16] [--walks 10] [--spp 64] [--only tables,furnaces]
 
-Prints one line a figure, with the bar that it is held to. Times are the best of several, ratios of runs in turn.
+Prints one line per value, with its limit. Times are the minimum of several runs, ratios are of alternating runs.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ STEEP = np.array([0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9,
 
 
 def figure(what: str, value: float, bar: float | None = None, form: str = ".1e", at_least: bool = False) -> None:
-    """Print one figure, and whether its bar is met."""
+    """Print one value, and whether it is within its limit."""
     text = f"  {what:72} {value:{form}}"
     if bar is not None:
         met = value >= bar if at_least else value <= bar
@@ -44,14 +44,14 @@ def figure(what: str, value: float, bar: float | None = None, form: str = ".1e",
 
 
 def within(what: str, values: object, low: float | None = None, high: float = 0.0) -> None:
-    """Print the range of figures, and whether it lies inside its bar."""
+    """Print a range of values, and whether it is within its limits."""
     a, b = float(np.min(values)), float(np.max(values))  # type: ignore[arg-type]
     met = "" if low is None else f"   bar {low:g} .. {high:g}: {'met' if low <= a and b <= high else 'MISSED'}"
     print(f"  {what:60} {a:.5f} .. {b:.5f}{met}", flush=True)
 
 
 def best(job, rounds: int = 5) -> float:
-    """Seconds of the fastest of several runs, after one to compile."""
+    """Seconds of the fastest of several runs, after one that compiles."""
     job()
     times = []
     for _ in range(rounds):
@@ -62,16 +62,18 @@ def best(job, rounds: int = 5) -> float:
 
 
 def independent(ndf: str, masking: str, mu: float, alpha: float, nodes: tuple[int, int] = (240, 240)) -> float:
-    """E by other formulas in other variables: light about the mirrored viewer, angle gamma and azimuth beta, in NumPy.
+    """E by other formulas in other variables, in NumPy: angle gamma and azimuth beta of the light about the mirror
+    direction.
 
-    A great circle from the mirror direction r meets the horizon at tan(gamma) = -r_z / t_z, t its tangent; it leaps
-    where t_z = 0, toward which beta is graded, as gamma is toward the peak, whose width is about 2 alpha.
+    A great circle from the mirror direction r with tangent t meets the horizon at tan(gamma) = -r_z / t_z. This jumps
+    where t_z = 0, toward which the nodes of beta are graded; those of gamma are graded toward the peak, whose width is
+    about 2 alpha.
     """
     x, w = np.polynomial.legendre.leggauss(nodes[0])
     s, ds = 0.5 * (x + 1.0), 0.5 * w
     near, weight = 0.5 * np.pi * s**4, 0.5 * np.pi * 4.0 * s**3 * ds  # away from beta = 90 degrees
     beta = np.concatenate([0.5 * np.pi - near, 0.5 * np.pi + near])[:, None]
-    weight = 2.0 * np.concatenate([weight, weight])[:, None]  # both halves are alike
+    weight = 2.0 * np.concatenate([weight, weight])[:, None]  # the two halves are equal
     sin_o = np.sqrt(1.0 - mu * mu)
     o, r = np.array([sin_o, 0.0, mu]), np.array([-sin_o, 0.0, mu])
     t = np.cos(beta)[..., None] * np.array([mu, 0.0, sin_o]) + np.sin(beta)[..., None] * np.array([0.0, 1.0, 0.0])
@@ -109,7 +111,7 @@ def _smith(ndf: str, masking: str, cos: np.ndarray, alpha: float) -> np.ndarray:
 
 
 def tables() -> None:
-    """E and E_avg of every distribution and masking, against other nodes and other variables."""
+    """E and E_avg of every distribution and masking term, against other nodes and other variables."""
     rough = ROUGHNESS >= 0.05
     rng = np.random.default_rng(0)
     texels = [(int(rng.integers(7, 128)), int(128 * rng.random() ** 2)) for _ in range(40)]
@@ -125,7 +127,7 @@ def tables() -> None:
                 off = [abs(found.arrays["E"][at] - value) for at, value in zip(texels, other, strict=True)]
                 figure(f"{name} E in other variables, 40 texels", max(off), 2e-5)
             truth = np.abs(found.arrays["E"] - fine).max()
-            if truth > 1e-10:  # below, both are rounding
+            if truth > 1e-10:  # smaller values are rounding errors
                 factor = max(own["max"] / truth, truth / own["max"])
                 figure(f"{name} the manifest's error, factor to the truth", factor, 3, ".2f")
             exact = quadrature.average(ndf, masking, CENTRES**2, nodes=(90, 70), count=96)
@@ -142,11 +144,11 @@ def tables() -> None:
 
 
 def two_widths() -> None:
-    """E[phi, roughness, mu], 24 x 128 x 128, against (200, 120) nodes at a part of its nodes."""
+    """E[phi, roughness, mu], 24 x 128 x 128, against a quadrature of (200, 120) nodes at some of its entries."""
     for ndf, masking, aspect in (("ggx", "smith-correlated", 0.25), ("ggx", "smith-separable", 0.1)):
         found = bake.bake(ndf, ["E", "Eavg"], masking=masking, aspect=aspect, layout="stretched")
         axes = bake.Axes("stretched", ndf, masking, 128, aspect, 24)
-        part = np.ix_(np.arange(0, 24, 5), np.arange(29, 128, 14), np.arange(0, 128, 9))  # roughness >= .2
+        part = np.ix_(np.arange(0, 24, 5), np.arange(29, 128, 14), np.arange(0, 128, 9))  # roughness >= 0.2
         fine = quadrature.moments(ndf, masking, *axes.at(*part), nodes=(200, 120)).white
         name = f"{ndf}, {masking}, alpha_y / alpha_x = {aspect}:"
         figure(f"{name} E", np.abs(found.arrays["E"][part] - fine).max(), 2e-5)
@@ -154,7 +156,7 @@ def two_widths() -> None:
 
 
 def sampling() -> None:
-    """Quadrature against sampling, GGX, smith-correlated; then the homework's layout, before 8 bits."""
+    """Quadrature against sampling, GGX, smith-correlated; then the homework's layout, before rounding to 8 bits."""
     exact = quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2, nodes=(110, 90)).white
     ways = {
         "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).white,
@@ -205,7 +207,7 @@ def sampling() -> None:
 
 
 def furnaces() -> None:
-    """White furnaces, mu .05 to 1: metal of roughness .05 to 1, glass of alpha .05 to 1 from both sides, others."""
+    """White furnaces, mu 0.05 to 1: metal of roughness 0.05 to 1, glass of alpha 0.05 to 1 from both sides, others."""
     for masking in ("smith-correlated", "smith-separable"):
         for ndf in NDFS:
             values = [
@@ -242,7 +244,7 @@ def furnaces() -> None:
 
 
 def random_walk(millions: float) -> None:
-    """Gold of alpha .8 against the walk, over mu and in the mean; the walk's own furnace."""
+    """Gold of alpha 0.8 against the random walk, over mu and on average; the furnace of the walk itself."""
     gold = go.Conductor.preset("Au", alpha=0.8)
     count = int(millions * 1e6)
     x, w = quadrature.gauss(10)
@@ -269,7 +271,7 @@ def random_walk(millions: float) -> None:
 
 
 def costs(millions: float) -> None:
-    """Time of eval over that of the plain metal, in turns."""
+    """Time of eval relative to that of the plain metal, in alternating runs."""
     dr = backend.drjit()
     kind = backend.types("float32")
     count = int(millions * (1 << 20))
@@ -304,7 +306,7 @@ def costs(millions: float) -> None:
 
 
 def ten_balls(spp: int) -> None:
-    """The shading balls, 1024 x 512, path: all ten compensated over all ten plain, in turns."""
+    """The shading balls, 1024 x 512, path: ten compensated balls relative to ten plain ones, in alternating runs."""
     from gonio import scene
     from gonio.bridge import engine
     from gonio.transport import integrators

@@ -1,10 +1,10 @@
-"""The time of a fit to a table of MERL's size, against SciPy on NumPy.
+"""The time of a fit to a table of MERL's size, compared with SciPy on NumPy.
 
     python benchmarks/fit.py
 
-1.46 million cells of gold with 2 % noise: `go.fit`, warm, beside scipy.optimize.least_squares on the same cells and
-metric, its model in NumPy float64, its derivatives by finite differences, in one process. How often intervals hold the
-truth is a matter of `intervals.py`.
+1.46 million cells of gold with 2 % noise, in one process: `go.fit`, warm, and scipy.optimize.least_squares on the same
+cells and metric, with the model in NumPy float64 and derivatives by finite differences. `intervals.py` measures the
+coverage of the intervals.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MERL = (90, 90, 180)
 
 
 def straightforward(cells: data.Data, start: np.ndarray) -> np.ndarray:
-    """eta, k of three channels and alpha of a GGX conductor with height-correlated masking, by SciPy."""
+    """eta and k in three channels and alpha of a GGX conductor with height-correlated masking, fitted with SciPy."""
     wo, wi = cells.wo, cells.wi
     half = wo + wi
     half /= np.linalg.norm(half, axis=1, keepdims=True)
@@ -60,7 +60,7 @@ def straightforward(cells: data.Data, start: np.ndarray) -> np.ndarray:
 
 
 def speed() -> None:
-    """Seconds, and how far the parameters are off."""
+    """Print the seconds and the errors of the parameters."""
     measured = table(METAL, shape=MERL)
     fit(measured, "conductor")
     start = time.perf_counter()

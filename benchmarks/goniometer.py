@@ -1,11 +1,11 @@
-"""The virtual gonioreflectometer against theory, and what it takes.
+"""The virtual gonioreflectometer compared with theory, and its speed.
 
 python benchmarks/goniometer.py [gaussian|grooves|later|speed ...]      --pictures FOLDER also draws (docs/images)
 
 gaussian  a Gaussian surface of mirrors against Beckmann's D and Smith's G
-grooves   V-grooves of Lambertian facets against Oren and Nayar
-later     the second and later bounces of gold against what Kulla and Conty add
-speed     rays a second, and a table of MERL's size
+grooves   V-grooves of Lambertian facets against Oren-Nayar
+later     the second and later bounces in gold against the Kulla-Conty lobe
+speed     rays per second, and a table of MERL's size
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 LIGHTS = (0.0, 30.0, 60.0)
 VIEWS = np.arange(0.0, 88.0, 2.5)
 AZIMUTHS = np.arange(0.0, 181.0, 5.0)
-PLANE = (0.0, 180.0)  # of incidence: on the light's side, and across from it
+PLANE = (0.0, 180.0)  # azimuths of the plane of incidence: on the light's side, and opposite
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -55,18 +55,18 @@ def measured(surface: str, facet: str, rays: int, patches: int = 16, bounces: st
 
 
 def intensity(values: Floats) -> Floats:
-    """f cos theta_r, of values (theta_i, theta_r, phi, channel): what the detector receives."""
+    """f cos theta_r, which the detector receives, from values (theta_i, theta_r, phi, channel)."""
     return values * np.cos(np.radians(VIEWS))[None, :, None, None]
 
 
 def of_model(model: go.BSDF) -> Floats:
-    """A model's f at the same angles, seen by the same detector."""
+    """f of a model at the same angles, measured by the same detector."""
     axes = [np.radians(axis) for axis in (LIGHTS, VIEWS, AZIMUTHS)]
     return Model(model, DETECTOR).f(*pairs(*axes)).reshape(*map(len, axes), 3)
 
 
 def slices(values: Floats) -> tuple[Floats, Floats]:
-    """Angles of view from -87.5 to 87.5 degrees, positive across from the light, and (theta_i, view, channel)."""
+    """Viewing angles from -87.5 to 87.5 degrees, positive opposite the light, and values (theta_i, view, channel)."""
     back, ahead = values[:, ::-1, 0], values[:, :, -1]
     return np.concatenate([-VIEWS[::-1], VIEWS[1:]]), np.concatenate([back, ahead[:, 1:]], axis=1)
 
@@ -101,7 +101,7 @@ def lines(axis: object, x: Floats, theory: dict[str, Floats], points: Floats, er
     axis.grid(True)  # type: ignore[attr-defined]
 
 
-# ---------------------------------------------------------------------- the three proofs
+# ---------------------------------------------------------------------- the three comparisons
 
 
 def gaussian(folder: Path | None) -> None:
@@ -152,7 +152,7 @@ def gaussian(folder: Path | None) -> None:
 
 
 def oren_nayar(albedo: float, sigma: float) -> tuple[Floats, Floats]:
-    """Oren and Nayar's functional approximation, one bounce and two (OrenNayar1994, sec. 4.3), f at our angles."""
+    """f at our angles by the functional approximation of OrenNayar1994, sec. 4.3, for one bounce and for two."""
     i, r, phi = np.meshgrid(*(np.radians(axis) for axis in (LIGHTS, VIEWS, AZIMUTHS)), indexing="ij")
     a, b, c, s2 = np.maximum(i, r), np.minimum(i, r), np.cos(phi), sigma * sigma
     c1 = 1.0 - 0.5 * s2 / (s2 + 0.33)
@@ -209,7 +209,7 @@ def grooves(folder: Path | None) -> None:
 
 
 def energy(f: Floats) -> Floats:
-    """Shares of light by channel, (theta_i, 3): int f cos theta_r dw over the views that were measured."""
+    """Fractions of the light by channel, (theta_i, 3): int f cos theta_r dw over the measured views."""
     weight = (np.cos(np.radians(VIEWS)) * np.sin(np.radians(VIEWS)))[None, :, None, None]
     step = np.radians(VIEWS[1] - VIEWS[0])
     return 2.0 * np.pi * step * np.sum(np.mean(f, axis=2, keepdims=True) * weight, axis=(1, 2))
@@ -277,7 +277,7 @@ def later(folder: Path | None) -> None:
         last.set_ylabel("light of gold over that of mirrors")
         last.set_title("color of later bounces, light at 0", fontsize=11)
         handles, words_ = axes[0, 0].get_legend_handles_labels()
-        order = (0, 3, 1, 4, 2, 5)  # a column for each color
+        order = (0, 3, 1, 4, 2, 5)  # one column per color
         figure.legend(
             [handles[i] for i in order], [words_[i] for i in order], loc="outside lower center", ncols=3, fontsize=10
         )

@@ -1,16 +1,16 @@
-"""Derivatives of a picture along values of its materials: Gonio's `Gradients` against Mitsuba's `prb`.
+"""Derivatives of a picture with respect to material parameters: Gonio's `Gradients` against Mitsuba's `prb`.
 
     python benchmarks/gradients.py
 
-A gold ball on a coloured floor under a small lamp and a sky, 160 x 120. `prb` has Mitsuba's own materials
-(roughconductor, diffuse) and its best sampler. Two questions:
+A gold ball on a colored floor under a small lamp and a sky, 160 x 120. `prb` uses Mitsuba's own materials
+(roughconductor, diffuse) and its best sampler. Two comparisons:
 
-forward   the derivative picture along one value: variance (mean over pixels) x time; `prb` in forward mode
-reverse   the derivative of a loss, sum(adjoint x picture), along seven numbers at once: `prb` in reverse mode gives
-          them from one walk there and one back; Gonio sums its derivative pictures up
+forward   the derivative picture with respect to one value: variance (mean over pixels) x time; `prb` in forward mode
+reverse   the derivative of a loss, sum(adjoint x picture), with respect to seven numbers at once: `prb` in reverse mode
+          computes them by tracing paths forward and back once; Gonio sums its derivative pictures
 
-Time is that of the render alone, kernels cached; variances are those of runs with different seeds. The means of both
-have to agree within their errors (of `prb` with independent samples: ldsampler's runs are not).
+Time is that of the render only, with cached kernels; variances are among runs with different seeds. The two means must
+agree within their errors (for `prb` with independent samples, since runs of ldsampler are not independent).
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def measured(draw: Callable[[int], np.ndarray]) -> tuple[np.ndarray, float]:
 
 
 def sigmas(a: np.ndarray, b: np.ndarray) -> float:
-    """How far the means of whole pictures, or of sums, are apart."""
+    """The difference between the means of whole pictures, or of sums, in standard errors."""
     a, b = (x.reshape(RUNS, -1, 3).mean(1) if x.ndim > 2 else x for x in (a, b))
     error = np.sqrt(a.var(0, ddof=1) / RUNS + b.var(0, ddof=1) / RUNS)
     return float(np.abs((a.mean(0) - b.mean(0)) / error).max())

@@ -1,9 +1,9 @@
-"""The error of a material whose whole arithmetic is in half precision: why `gonio emit --half` leaves it in 32 bits.
+"""The error of a material computed entirely in half precision: why `gonio emit --half` keeps arithmetic in 32 bits.
 
 python benchmarks/half_precision.py [MATERIAL...]
 
-Every operation of the recorded `eval` is rounded to float16, over the pairs of `gonio.shaders.vectors`; directions are
-in half precision too. Printed are the shares of pairs whose error exceeds 1 % and 10 %, and of results that are not
+Every operation of the recorded `eval` is rounded to float16, for the pairs of `gonio.shaders.vectors`; directions are
+in half precision too. Prints the fractions of pairs whose error exceeds 1 % and 10 %, and of results that are not
 finite.
 """
 
@@ -25,18 +25,18 @@ DEFAULT = [f"conductor(preset=Au, alpha={alpha})" for alpha in (0.05, 0.3)] + ["
 
 
 def half(value: object) -> object:
-    """Numbers rounded to float16; masks as they are."""
+    """Numbers rounded to float16; masks unchanged."""
     array = np.asarray(value)
     return array if array.dtype == bool else array.astype(np.float16).astype(float)
 
 
 def rounding(op: str, static: object, args: list[object]) -> object:
-    """An operation in half precision."""
+    """The result of an operation in half precision."""
     return half(operate(op, static, [half(arg) for arg in args]))
 
 
 def main() -> None:
-    """Print a line per material."""
+    """Print one line per material."""
     for text in sys.argv[1:] or DEFAULT:
         model = go.material(text)
         wo, wi = pairs(np.random.default_rng(0), PAIRS, bool(model.transmits))

@@ -1,11 +1,11 @@
-"""Gonio's fits by the historic models against the parameters that papers printed, on tables rebuilt from Bagher's fits.
+"""Gonio's fits of the historic models compared with published parameters, on tables rebuilt from Bagher's fits.
 
-    python benchmarks/historic_fits.py               # all materials, all fits that Ngan and Low printed: half an hour
-    python benchmarks/historic_fits.py --every 10    # one material of ten
+    python benchmarks/historic_fits.py               # all materials, all fits printed by Ngan and Low: half an hour
+    python benchmarks/historic_fits.py --every 10    # every tenth material
 
-Each material's table is its fit of 2012 by Bagher, the closest to the measurement that is public. Both sets of numbers
-are judged by the paper's own metric: the root mean square of the difference of f cos (Ngan2005), of log(1 + f cos)
-(Low2012), over directions up to 80 degrees. A fit starts at the printed numbers too, so that it cannot be worse.
+The table of each material is its fit of 2012 by Bagher, the public one that is closest to the measurement. Both sets of
+parameters are judged by the paper's own metric: the root mean square difference of f cos (Ngan2005) or log(1 + f cos)
+(Low2012), over directions up to 80 degrees. Fits also start from the printed parameters, so that they cannot be worse.
 """
 
 from __future__ import annotations

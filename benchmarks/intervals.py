@@ -1,11 +1,12 @@
-"""How often the 95 % intervals of fits hold the truth: nine models at random parameters, with 1, 2 and 5 % noise.
+"""Coverage of the 95 % intervals of fits: nine models at random parameters, with 1, 2 and 5 % noise.
 
     python benchmarks/intervals.py [--seed-range 1:16] [--jobs 4] [--only conductor,ward] [-o fits.json]
 
-Each fit has a table of its own: 24 x 24 x 36 cells, random true values, independent noise proportional to each value.
-The file holds, per model, noise and parameter: the number of intervals, of those that hold the truth, of parameters
-without a finite interval, and the mean and root mean square of the error over its standard error, which are 0 and 1
-for unbiased values with right intervals. Rows of several files are summed by adding the counts.
+Each fit has its own table: 24 x 24 x 36 cells, random true values, independent noise proportional to each value. The
+file holds, per model, noise level and parameter: the number of intervals, the number of those that contain the true
+value, the number of parameters without a finite interval, and the mean and root mean square of the error divided by its
+standard error, which are 0 and 1 for unbiased values with correct intervals. Rows of several files are combined by
+adding the counts.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ Random = np.random.Generator
 class Outcome(NamedTuple):
     """One parameter of one fit.
 
-    z     error over standard error; nan for an infinite standard error
-    held  whether the interval holds the truth
+    z     error divided by its standard error; nan for an infinite standard error
+    held  whether the interval contains the true value
     off   relative error
     """
 
@@ -97,7 +98,7 @@ def one(job: tuple[str, float, int]) -> list[Outcome]:
 
 
 def summed(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
-    """A row per case and parameter."""
+    """One row per case and parameter."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault((outcome.case, outcome.name), []).append(outcome)
@@ -122,7 +123,7 @@ def summed(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
 
 
 def run(work: Callable[[Any], list[Outcome]], jobs: list[Any], processes: int) -> list[Outcome]:
-    """The outcomes of all jobs, by processes of one thread each."""
+    """The outcomes of all jobs, computed by processes of one thread each."""
     if processes < 2:
         return [outcome for job in jobs for outcome in _told(work(job))]
     os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -136,7 +137,7 @@ def _told(found: list[Outcome]) -> list[Outcome]:
 
 
 def _alone() -> None:
-    """Leave the other cores to the other processes."""
+    """Restrict this process to one thread, to leave the other cores to the other processes."""
     import drjit
 
     drjit.set_thread_count(1)
@@ -165,7 +166,7 @@ def report(outcomes: list[Outcome], seconds: float, path: Path | None) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser, seeds: str) -> None:
-    """Options of a benchmark that counts intervals."""
+    """Add the options of benchmarks that count intervals."""
     parser.add_argument("--seed-range", default=seeds, help="first seed and the one after the last")
     parser.add_argument("--jobs", type=int, default=1, help="processes of one thread each")
     parser.add_argument("-o", "--output", type=Path)

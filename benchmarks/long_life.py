@@ -1,9 +1,9 @@
-"""A night in one process: renders with changing values, renders with changing shapes, evaluations and bakes in a loop.
+"""A long-lived process: renders with changing values, renders with changing shapes, evaluations and bakes in a loop.
 
     python benchmarks/long_life.py [--values 10000] [--shapes 2000] [--evaluations 2000] [--bakes 500]
 
-Prints memory and time a step in ten stretches, and how far they drift after the first twentieth. The bars: memory
-within 2 %, time within 5 %.
+Prints memory and time per step in ten intervals, and their drift after the first twentieth. Limits: memory within 2 %,
+time within 5 %.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ SIZE = (64, 64)
 
 
 def memory() -> int:
-    """Bytes of this process in memory."""
+    """Resident memory of this process in bytes."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
 def values(step: int) -> None:
-    """A ball of another width and colour."""
+    """Render a ball with another alpha and color."""
     x = (step * 0.6180339887) % 1.0
     material = go.Conductor(eta=(0.2, 0.9, 1.1), k=(3.9, 2.4 + x, 2.2), alpha=0.05 + 0.5 * x)
     go.render(material, size=SIZE, spp=1, max_depth=3)
 
 
 def shapes(step: int) -> None:
-    """The same ball elsewhere, of another size, on a floor that has moved."""
+    """Render the same ball elsewhere, with another size, on a floor that has moved."""
     x = (step * 0.6180339887) % 1.0
     moved = {"shapes.0.radius": 0.5 + 0.5 * x, "shapes.0.center": [x, 1, 0], "shapes.1.base": [-3.6, 0.1 * x, -3.6]}
     go.render(go.Lambert(), size=SIZE, spp=1, max_depth=3, overrides=moved)
 
 
 def evaluations(step: int) -> None:
-    """A thousand values of a material."""
+    """Evaluate a thousand values of a material."""
     rng = np.random.default_rng(step)
     w = rng.normal(size=(2, 1000, 3))
     w /= np.linalg.norm(w, axis=-1, keepdims=True)
@@ -50,14 +50,14 @@ def evaluations(step: int) -> None:
 
 
 def bakes(step: int) -> None:
-    """A small table, computed anew."""
+    """Bake a small table."""
     from gonio.energy.tables import bake
 
     bake.bake("ggx", size=8 + step % 2, masking=("smith-correlated", "smith-separable")[step % 2])
 
 
 def drift(name: str, step: Callable[[int], None], count: int) -> bool:
-    """Whether memory and time stay flat over so many steps."""
+    """Whether memory and time remain constant over `count` steps."""
     if count == 0:
         return True
     times, used = [], []

@@ -1,13 +1,13 @@
-"""Linearly transformed cosines of GGX: Gonio's fit and the published one, by the same measures.
+"""Linearly transformed cosines of GGX: Gonio's fit and the published one, by the same metrics.
 
 python benchmarks/ltc.py web/node_modules/three/examples/jsm/lights/RectAreaLightTexturesLib.js
 
-The file holds the tables of Heitz2016a's authors, 64 x 64. Both fits are compared with sums over the lobe itself:
-L3, the measure that the paper minimizes; the share of light that goes elsewhere; integrals over 1,024 rectangles.
+The file holds the tables of the authors of Heitz2016a, 64 x 64. The two fits are compared with the lobe itself, by sums
+over it: L3, which the paper minimizes; the fraction of light in wrong directions; integrals over 1,024 rectangles.
 
     python benchmarks/ltc.py --anisotropic docs/images/ltc_anisotropic.png
 
-prints the errors of anisotropic GGX, for which no table is published, and draws the map of widths 4 : 1.
+prints the errors of anisotropic GGX, for which no table is published, and draws a map of them for alphas of 4 : 1.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def main(path: Path) -> None:
     numbers = re.search(r"LTC_MAT_1 = \[(.*?)\]", path.read_text(), re.S)
     assert numbers is not None, f"no LTC_MAT_1 in {path}"
     theirs = np.array([float(x.replace(" ", "")) for x in numbers[1].split(",") if x.strip()]).reshape(SIZE, SIZE, 4)
-    theirs = theirs.transpose(1, 0, 2)  # x is the roughness
+    theirs = theirs.transpose(1, 0, 2)  # there, x is the roughness
     tables = {"gonio": own, "published": theirs[..., (0, 2, 1, 3)]}
     print(
         f"{'fit':10} {'L3 mean':>9} {'elsewhere mean':>15} {'max':>7} {'rectangles':>16} {'max':>7}   roughness > 0.1"
@@ -46,7 +46,7 @@ def main(path: Path) -> None:
 
 
 def anisotropic(picture: Path) -> None:
-    """Print one line per quotient of the widths, and draw the first."""
+    """Print one line per ratio of alphas, and draw the first."""
     for first, widths in enumerate([(0.4, 0.1), (0.4, 0.2)]):
         baked = ltc_anisotropic.bake(go.Conductor(alpha=widths).lossless())
         lobe, quads = (baked.manifest["error"][name] for name in ("ltc_inverse", "ltc_norm"))
@@ -60,7 +60,7 @@ def anisotropic(picture: Path) -> None:
 
 
 def _draw(baked: Baked, picture: Path) -> None:
-    """The share of the light elsewhere over azimuth and angle, at two roughnesses."""
+    """Draw the fraction of light in wrong directions over azimuth and angle, at two roughnesses."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -84,7 +84,7 @@ def _draw(baked: Baked, picture: Path) -> None:
 
 
 def _lobes(model: go.BSDF, roughness: np.ndarray, mu: np.ndarray, inverse: np.ndarray) -> list[tuple]:
-    """(L3, share elsewhere) of each cell by row."""
+    """(L3, fraction of light in wrong directions) of each cell, row by row."""
     rows = []
     for row, value in enumerate(roughness):
         points = ltc.points_of(ltc.at(model, "alpha", value), mu, 4 * ltc.LOBE, 4 * ltc.SPHERE)

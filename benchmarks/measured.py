@@ -1,12 +1,12 @@
-"""The bars of measured materials: against Mitsuba, round trips, conversions, time in a render, sampling.
+"""Limits for measured materials: comparison with Mitsuba, round trips, conversions, time in a render, sampling.
 
 python benchmarks/measured.py [rgl|merl|convert|render|sampling ...]      --data FOLDER ($GONIO_SHARED/data)
 
-`rgl`: Mitsuba's plugin computes in float32 throughout, and no variant of it in float64. Where it and Gonio's float64
-are further apart than 1e-4, they are compared with what float32 does there: with how far values go when the directions
-are rounded once, and when besides the half vector's point in the square, and the place in the table, are off by up to 8
-roundings of 1. Where a lobe ends a place is near 1 and values go to 0 with 1 - place; where D is 0 at a node and not at
-the next, values go to 0 with the distance from it.
+`rgl`: Mitsuba's plugin computes in float32 throughout; no variant uses float64. Where it differs from Gonio's float64
+by more than 1e-4, the difference is compared with the effect of float32: with the range of the values when the
+directions are rounded once, and when in addition the half vector's point in the unit square, and the position in the
+table, are off by up to 8 float32 ulps of 1. Such ranges are large where a lobe ends, since the position is near 1 and
+values vanish with 1 - position, and next to a node at which D is 0, since values vanish with the distance from it.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from gonio.ops import Direction, Spectrum, backend, vec3
 DATA = Path(os.environ.get("GONIO_SHARED", ".")) / "data"
 COUNT = 100_000
 ROUNDING = 2.0**-24
-PLACES = 8.0  # roundings of 1 that a place may be off by, after two sums and their quotient
-TRIES = 400  # of roundings
-TURNS = 24  # of a render that is timed
+PLACES = 8.0  # float32 ulps of 1 by which a position may be off, after two sums and their quotient
+TRIES = 400  # random choices of rounding errors
+TURNS = 24  # repetitions of a timed render
 VIEWS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
 
 
 def files() -> list[str]:
-    """Every shared file of measurements."""
+    """Every shared measurement file."""
     networks = DATA / "nbrdf" / "merl.npz"
     names = Format.family.get("networks").items(networks.read_bytes(), str(networks))
     plain = [str(path) for path in (*sorted((DATA / "rgl").glob("*.bsdf")), *sorted((DATA / "cornell").glob("*.brdf")))]
@@ -46,7 +46,7 @@ def files() -> list[str]:
 
 
 def directions(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Directions above the surface that float32 holds."""
+    """Directions above the surface that float32 represents exactly."""
     z, phi = rng.uniform(0.0, 1.0, count), rng.uniform(0.0, 2.0 * np.pi, count)
     sin = np.sqrt(1.0 - z * z)
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], -1).astype(np.float32).astype(float)
@@ -98,18 +98,18 @@ def _relative(difference: np.ndarray, value: np.ndarray) -> np.ndarray:
     return np.divide(np.abs(difference), np.abs(value), out=np.zeros(value.shape), where=value != 0.0)
 
 
-Ranges = list[tuple[np.ndarray, np.ndarray]]  # lowest and highest, of eval and of pdf
+Ranges = list[tuple[np.ndarray, np.ndarray]]  # (lowest, highest) of eval, then of pdf
 
 
 def rounded(model: go.BSDF, wo: np.ndarray, wi: np.ndarray, rng: np.random.Generator) -> tuple[Ranges, Ranges]:
-    """Between which values eval and pdf go when the directions are rounded, and when the places are too."""
+    """The ranges of eval and pdf with rounded directions, and with rounded directions and positions in the table."""
     table, types = model.table, backend.types("float64")
     found: list[tuple[Ranges, float]] = [([], 0.0), ([], PLACES)]
     for ranges, reach in found:
         low: list[np.ndarray] = []
         high: list[np.ndarray] = []
         for turn in range(TRIES):
-            # at most half a unit in the last place of 1 each; at first nothing
+            # at most half a unit in the last place of 1 each; none in the first try
             shake = 0.0 if turn == 0 else ROUNDING
             o, i = (backend.vector_of(w + shake * rng.choice([-1.0, 0.0, 1.0], w.shape), 3, types) for w in (wo, wi))
             u, s = (
@@ -131,7 +131,7 @@ def rounded(model: go.BSDF, wo: np.ndarray, wi: np.ndarray, rng: np.random.Gener
 
 
 class Stand(Measurement):
-    """A material in the place of a measurement, to be tabulated."""
+    """A material that takes the place of a measurement, to be tabulated."""
 
     def __init__(self, model: go.BSDF) -> None:
         super().__init__()

@@ -2,9 +2,9 @@
 
     python benchmarks/mutations.py [--count 200] [--seed 1]
 
-Each mutation changes an operator, a constant, two arguments or a term in one place of the text of a material in GLSL,
-HLSL or WGSL. One that the law accepts is compared again on a hundred times as many pairs: if no value there differs it
-is counted as without effect (`max(x, 1e-30)` with another constant), otherwise it was missed.
+Each mutation changes an operator, a constant, two arguments or a term in one place of a material's text in GLSL, HLSL
+or WGSL. A mutation that the law accepts is compared again on a hundred times as many pairs: if no value differs, it
+counts as having no effect (`max(x, 1e-30)` with another constant), otherwise as missed.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ MATERIALS = {
     "eon": go.model("eon")(0.5, 0.6),
     "turquin": go.Turquin(go.Conductor.preset("Au", alpha=0.3)),
 }
-CLOSER = 100  # times the law's pairs
+CLOSER = 100  # multiple of the law's number of pairs
 
 
 def main(count: int, seed: int) -> None:
-    """Print what was caught, without effect and missed, and the processor time of the law."""
+    """Print the numbers of mutations caught, without effect and missed, and the CPU time of the law."""
     found: collections.Counter[str] = collections.Counter()
     spent = 0.0
     cases = [(name, language) for name in MATERIALS for language in LANGUAGES]
@@ -64,7 +64,7 @@ def main(count: int, seed: int) -> None:
 
 
 def _seconds() -> float:
-    """Processor time of this process and of the compilers that it started: other programs do not count."""
+    """CPU time of this process and of the compilers that it started, which excludes other programs."""
     used = os.times()
     return used.user + used.system + used.children_user + used.children_system
 

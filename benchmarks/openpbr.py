@@ -1,13 +1,13 @@
-"""OpenPBR against the reference implementation of its authors, and the furnaces that its specification lists.
+"""OpenPBR compared with its authors' reference implementation, and the furnaces that its specification lists.
 
     python benchmarks/openpbr.py --reference DIR --glm DIR [--sets 100] [--directions 10000]
     python benchmarks/openpbr.py --furnace
 
-The comparison needs two things that are no part of Gonio: DIR of the first is a checkout of
-github.com/adobe/openpbr-bsdf, of the second the folder that holds `glm/glm.hpp`; and `g++`. They are compiled into a
-temporary folder. Sets of parameters are drawn by kind; differences are those of f |cos theta_i| without the
-(eta_o/eta_i)^2 of radiance, over what the reference gives where that is above 1. `albedo` is Gonio's with the layering
-of the specification and separable masking, which the reference has; `reciprocal` is Gonio's as it comes.
+The comparison needs `g++` and two things that are not part of Gonio: a checkout of github.com/adobe/openpbr-bsdf
+(--reference), and the folder that contains `glm/glm.hpp` (--glm). They are compiled in a temporary folder. Sets of
+parameters are drawn by kind. Differences are those of f |cos theta_i| without the factor (eta_o/eta_i)^2 of radiance,
+divided by the reference value where that is above 1. `albedo` is Gonio's material with the specification's layering and
+separable masking, as in the reference; `reciprocal` is Gonio's default.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ COLOURS = {name for name in NAMES if name.endswith("color")}
 
 
 class Separable(go.OpenPBR):
-    """OpenPBR with the masking of the reference."""
+    """OpenPBR with the masking term of the reference."""
 
     name: ClassVar[str] = "openpbr-separable"
     _masking: ClassVar[str] = "smith-separable"
 
 
 def source() -> str:
-    """The reference behind a plain function of C."""
+    """C++ source that wraps the reference in a plain C function."""
     lines, place = [], 0
     for name in NAMES:
         if name in COLOURS:
@@ -76,7 +76,7 @@ def compiled(reference: Path, glm: Path, folder: Path) -> ctypes.CDLL:
 
 
 def kinds(rng: np.random.Generator) -> dict[str, tuple[int, object]]:
-    """Kinds of sets: of a hundred so many, and what draws one."""
+    """Kinds of parameter sets: their number in a hundred, and a function that draws one."""
 
     def colour(low: float = 0.05) -> tuple[float, ...]:
         return tuple(rng.uniform(low, 1.0, 3))
@@ -138,8 +138,8 @@ def kinds(rng: np.random.Generator) -> dict[str, tuple[int, object]]:
 
 
 def directions(rng: np.random.Generator, count: int, below: bool, alpha: float) -> tuple[np.ndarray, np.ndarray]:
-    """wo over the upper hemisphere (both where light passes), wi half of all over and half near the mirror's and the
-    refracted direction."""
+    """wo over the upper hemisphere, or the sphere if light is transmitted; wi half near the mirror and refracted
+    directions, half anywhere."""
     wo = rng.normal(size=(count, 3))
     wi = rng.normal(size=(count, 3))
     half = count // 2
@@ -184,7 +184,7 @@ FURNACE_MU = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
 
 
 def furnaces() -> dict[str, dict[str, object]]:
-    """White materials of the specification's list, at a roughness each."""
+    """White materials from the specification's list, each at one roughness."""
     sub = {"subsurface_weight": 1.0, "subsurface_color": 1.0, "subsurface_radius": 0.0}
     bases: dict[str, dict[str, object]] = {
         "metal": {"base_metalness": 1.0},

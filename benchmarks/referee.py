@@ -1,9 +1,9 @@
-"""What the verifier catches of wrong materials by people who had not read the laws, and what it says of sound ones.
+"""The verifier on materials written without knowledge of the laws: detection of wrong ones, false alarms on sound ones.
 
     python benchmarks/referee.py [--only first.smooth,second.delta,...] [--quick] [--seeds 1]
 
-Wrong ones: the law that failed first, its grade, the cause that is named beside the one that the author wrote down.
-Sound ones, for each seed: any law that fails is a false alarm.
+For wrong materials: the law that failed first, its grade, and the named cause next to the one that the author recorded.
+For sound ones, with each seed: any law that fails is a false alarm.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FOLDERS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh")
 
 
 class Case(NamedTuple):
-    """A material, or the name of a plugin in a file, and what its author says of it."""
+    """A material, or the name of a plugin in a file, and its author's description."""
 
     name: str
     target: object
@@ -33,7 +33,7 @@ class Case(NamedTuple):
 
 
 def cases(only: str = "") -> list[Case]:
-    """All of them, in the order of the files."""
+    """All cases, in the order of the files."""
     sys.path.insert(0, str(TESTS))
     found = []
     for folder in FOLDERS:

@@ -1,12 +1,12 @@
 """Time to equal error: Gonio's integrators against Mitsuba's own, in one process, on five GGX conductors.
 
-    python benchmarks/render.py                      # Gonio's integrators over Mitsuba's roughconductor
-    python benchmarks/render.py --bsdf gonio         # ... over gonio_conductor, and the plugin inside Mitsuba
+    python benchmarks/render.py                      # Gonio's integrators with Mitsuba's roughconductor
+    python benchmarks/render.py --bsdf gonio         # ... with gonio_conductor, and the plugin inside Mitsuba
     python benchmarks/render.py --denoise            # ... and a path at 16 samples with Open Image Denoise
 
 Efficiency is 1 / (relMSE x time), relMSE = mean((x - r)^2 / (r^2 + 0.01)) against a converged picture r. All
-contenders of a table take turns, so that a busy machine is busy for all; times are the least of the rounds. On a
-machine with other work, compare `--clock cpu`: processor time of this process over its threads.
+contenders in a table alternate, so that a busy machine affects all alike; times are the minimum over the rounds. On a
+machine with other work, use `--clock cpu`: CPU time of this process, divided by its number of threads.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def plugin(alpha: float) -> dict[str, Any]:
 
 
 def scene(bsdf: Callable[[float], dict[str, Any]], sampler: str = "independent") -> Any:
-    """Five balls of rising roughness on a grey floor under a square lamp."""
+    """Five balls of increasing roughness on a gray floor under a square lamp."""
     to = mi.ScalarTransform4f
     description: dict[str, Any] = {
         "type": "scene",
@@ -149,7 +149,7 @@ def compete(contenders: list[Contender], rounds: int, clock: Callable[[], float]
 
 
 def converged(integrator: str, spp: int) -> np.ndarray:
-    """The reference picture, kept in the cache folder for the next run."""
+    """The reference picture, stored in the cache folder for the next run."""
     folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
     file = folder / f"benchmark-{integrator}-{spp}.npy"
     if file.exists():
@@ -211,11 +211,11 @@ def verdict(what: str, ratio: float, bar: float, at_most: bool = False) -> None:
     console.print(f"{'met ' if met else 'MISSED'} {what}: {ratio:.2f} x (bar: {'<=' if at_most else '>='} {bar} x)")
 
 
-BY_EMBREE = "rays, by Embree"  # as Mitsuba traces them, and as Gonio did before it met simple shapes in the kernel
+BY_EMBREE = "rays, by Embree"  # as Mitsuba traces them, and as Gonio did before kernels intersected simple shapes
 
 
 class _Stage(LightTransport):
-    """directSampleLight cut short, to see where its time goes. The stages keep the rays and add work."""
+    """directSampleLight ended early, to see where its time goes. Later stages trace the same rays and add work."""
 
     stage = "rays"
 
@@ -224,7 +224,7 @@ class _Stage(LightTransport):
         if self.stage == "camera rays":
             return [dr.select(hit.is_valid(), hit.t, 0), mi.Float(0), mi.Float(0)]
         u = mi.Point2f(*self.pair(key, index, 3))
-        if self.stage == "rays":  # shadow rays to points uniform on the lamp's area, from the bare point of the ray
+        if self.stage == "rays":  # shadow rays to uniform points on the lamp, from the bare hit point
             lamp = self.lights.lamps.rectangle
             point = lamp.corner + lamp.axis0 * (u.x * lamp.length0) + lamp.axis1 * (u.y * lamp.length1)
             origin = ray(hit.t * (1 - 1e-4))

@@ -1,4 +1,4 @@
-"""Errors of fits to a folder of measured files, and how much worse each is than the best of 20 random starts.
+"""Errors of fits to a folder of measured files, and the excess of each relative to the best of 20 random starts.
 
     python benchmarks/rgl_fits.py FOLDER [--models conductor,lambert+ggx] [--starts 20] [--values 6000] -o fits.json
 
@@ -27,18 +27,18 @@ from gonio.fitting.solver import Problem, solve
 from gonio.fitting.starts import random_starts
 from gonio.measure import names_table, read
 
-# of these the random starts are solved: one of each kind of lobe, and sums
+# models that are also solved from random starts: one of each kind of lobe, and sums
 JUDGED = (
     "lambert", "oren-nayar", "conductor", "metal", "ward", "cook-torrance", "ashikhmin-shirley", "modified-phong",
     "disney", "lambert+ggx", "lambert+beckmann", "lambert+ggx+ggx",
 )  # fmt: skip
-# the others that have no material within them and whose fit to a sample takes under 10 s
+# the other models that contain no material and whose fit to a sample takes under 10 s
 OTHERS = (
     "blinn-phong", "dielectric", "eon", "lafortune", "low-microfacet", "low-smooth", "phong", "sheen", "sheen-charlie",
     "ward-duer", "oren-nayar+ggx", "lambert+ward", "lambert+sheen",
 )  # fmt: skip
 STARTS, STEPS = 20, 40
-SEED = 101  # other random starts than the fit's own
+SEED = 101  # for random starts other than the fit's own
 
 
 def of_random_starts(cells: Data, model: str, count: int) -> float:
@@ -46,13 +46,13 @@ def of_random_starts(cells: Data, model: str, count: int) -> float:
     material, moving = moving_of(model)
     problem = Problem(material, moving, cells, "relative")
     starts = random_starts(start_of(material, moving), moving, count, SEED)
-    with np.errstate(over="ignore", invalid="ignore"):  # a random start may be far outside of what float32 holds
+    with np.errstate(over="ignore", invalid="ignore"):  # a random start may be far outside the range of float32
         ends = [solve(problem, start, steps=STEPS, tolerance=1e-5).cost for start in starts]
     return float(np.sqrt(min(ends) / (3 * len(cells))))
 
 
 def row_of(file: Path, model: str, cells: Data, starts: int) -> dict[str, Any]:
-    """The figures of one fit; `random` is None without random starts."""
+    """The results of one fit; `random` is None without random starts."""
     started = time.process_time()
     found: Fit = fit(cells, model)
     seconds = time.process_time() - started
@@ -76,7 +76,7 @@ def files_in(folder: Path) -> list[Path]:
 def rows_of(
     files: Sequence[Path], models: Sequence[str], known: Sequence[dict[str, Any]], values: int, starts: int
 ) -> Iterator[dict[str, Any]]:
-    """A row per file and model; `known` ones are not fitted again."""
+    """One row per file and model; `known` ones are not fitted again."""
     rows = {(row["file"], row["model"]): row for row in known}
     for file in files:
         cells: Data | None = None
@@ -114,7 +114,7 @@ def main() -> None:
 
 
 def write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """The rows as JSON, one a line; the file is whole at any time."""
+    """Write the rows as JSON, one per line; the file is complete at any time."""
     part = path.with_suffix(".part")
     part.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
     os.replace(part, path)

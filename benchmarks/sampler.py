@@ -1,12 +1,13 @@
-"""A guide found from `eval` against sampling by hand: variance at equal samples, in a furnace and on a lit ball.
+"""A sampling guide learned from `eval` compared with hand-written sampling: variance at equal sample counts.
 
     python benchmarks/sampler.py [--samples 32] [--pictures 12] [--only conductor,mix]
 
-Our own materials with their `pdf` and `sample` hidden. For each, PICTURES pictures of SAMPLES samples by independent
-numbers: the variance of a pixel over the pictures, averaged over the ball, guided over by hand. "furnace": a ball in a
-white sky, whose light is found by the BSDF's samples alone; "lit": the shading ball, two lamps and a sky, path tracing.
-In brackets the relative variance by hand. A variance below FLOOR counts as FLOOR: at one sample a pixel such noise is
-less than a step of an 8-bit picture.
+The materials are Gonio's own, with `pdf` and `sample` hidden. For each, PICTURES pictures of SAMPLES samples are
+rendered with independent random numbers. Printed is the variance of a pixel among the pictures, averaged over the ball:
+guided, relative to hand-written sampling. "furnace" is a ball under a white sky, lit by BSDF sampling only; "lit" is
+the shading ball with two lamps and a sky, by path tracing. Parentheses give the relative variance of hand-written
+sampling. A variance below FLOOR counts as FLOOR: at one sample per pixel, such noise is less than a step of an 8-bit
+picture.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import gonio as go
 import numpy as np
 from gonio.material import guide_search
 
-FLOOR = 1e-4  # relative, of one sample: 1 % of the light, as much as an 8-bit step
+FLOOR = 1e-4  # relative variance of one sample: a deviation of 1 %, about one 8-bit step
 SIZE = 96
 
 
@@ -35,7 +36,7 @@ def hidden(material: go.BSDF) -> go.BSDF:
 
 
 def materials() -> dict[str, go.BSDF]:
-    """What the comparison is made for."""
+    """The materials of the comparison."""
     gold = go.Conductor.preset
     return {
         **{f"conductor {alpha:g}": gold("Au", alpha=alpha) for alpha in (0.05, 0.1, 0.2, 0.5, 1.0)},
@@ -50,7 +51,7 @@ def materials() -> dict[str, go.BSDF]:
 
 
 def furnace(material: go.BSDF, seed: int, samples: int, folder: Path) -> np.ndarray:
-    """A ball in a white sky, seen so that it fills the picture."""
+    """A ball under a white sky that fills the picture."""
     scene = {
         "output": {"filename": "furnace.exr"},
         "sampler": {"type": "independent", "samples": samples},
@@ -78,9 +79,9 @@ def lit(material: go.BSDF, seed: int, samples: int, folder: Path) -> np.ndarray:
 
 
 def variance(material: go.BSDF, picture: object, pictures: int, samples: int, folder: Path) -> float:
-    """Of one sample, over the squared mean of the ball's disc."""
+    """Variance of one sample divided by the squared mean, over the ball's disk."""
     y, x = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
-    disc = x * x + y * y < (0.33 * SIZE) ** 2  # inside the silhouette, where there is nothing but the ball
+    disc = x * x + y * y < (0.33 * SIZE) ** 2  # inside the silhouette, where only the ball is visible
     made = np.array([picture(material, seed, samples, folder)[disc].mean(-1) for seed in range(1, pictures + 1)])  # type: ignore[operator]
     return float(made.var(0, ddof=1).mean() * samples / made.mean() ** 2)
 

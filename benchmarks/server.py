@@ -1,16 +1,16 @@
-"""The page's server under attack: how many of its frames a good page keeps, and how much memory that takes.
+"""The page's server under attack: the frame rate that a legitimate page retains, and the memory of the server.
 
     python benchmarks/server.py [--minutes 10] [--json]
 
-The server, the good page and the others run in a process each. The good page turns a knob four times a second and takes
-every frame; first alone, then while others do this, for as long as is asked:
+The server, the legitimate page and the attackers run in three processes. The legitimate page changes a value four times
+per second and receives every frame, first alone and then for --minutes while the attackers do this:
 
-    200 connections say nothing, or half a request, and come again when they are ended
-     50 pages with the right token want to connect; those that may show pictures and change them every few seconds
-      3 of them take no frame, 2 send rubbish, 2 send scenes, as fast as they are read
+    200 connections send nothing, or half a request, and reconnect when they are closed
+     50 pages with a valid token connect; those that are accepted show pictures and change them every few seconds
+      3 of them receive no frames, 2 send garbage and 2 send scenes as fast as they are read
 
-Bars: the good page keeps 80 % of the frames a second that it had alone; the server's memory after the first minute is
-flat. Exits with 1 where one is missed.
+Limits: the legitimate page retains 80 % of its frame rate without attackers; the server's memory is constant after the
+first minute. Exits with 1 if a limit is missed.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from typing import Any
 import websockets
 
 ALONE, STRETCH = 30.0, 30.0  # seconds
-TURNS = 4.0  # of the knob, a second
+TURNS = 4.0  # changes of the value per second
 MOST = (0.8, 1.02)
 
 
 def serve() -> None:
-    """The server's process: says where it is, and serves until its input ends."""
+    """The server's process: print the address, and serve until standard input ends."""
     import threading
 
     import gonio as go
@@ -58,7 +58,7 @@ def serve() -> None:
 
 
 class Target:
-    """The server as its clients see it."""
+    """The server as seen by its clients."""
 
     def __init__(self, port: int, token: str, pid: int = 0) -> None:
         self.port, self.token, self.pid = port, token, pid
@@ -68,7 +68,7 @@ class Target:
         return websockets.connect(address, origin=f"http://127.0.0.1:{self.port}", compression=None, max_size=None)
 
     def memory(self) -> int:
-        """Bytes of the server in memory."""
+        """Resident memory of the server in bytes."""
         return int(Path(f"/proc/{self.pid}/statm").read_text().split()[1]) * 4096
 
 
@@ -82,7 +82,7 @@ def scene(number: int, alpha: float, spp: int, size: tuple[int, int]) -> str:
 
 
 def header(message: str | bytes) -> dict[str, Any]:
-    """What a message says, without its pixels."""
+    """The JSON of a message, without its pixels."""
     if isinstance(message, str):
         return dict(json.loads(message))
     (length,) = struct.unpack_from("<I", message)
@@ -90,7 +90,7 @@ def header(message: str | bytes) -> dict[str, Any]:
 
 
 async def good(target: Target, seconds: float) -> list[float]:
-    """Times at which a page that turns a knob got its frames."""
+    """Times at which the legitimate page, which keeps changing a value, received its frames."""
     times: list[float] = []
     async with target.connect() as socket:
 
@@ -114,7 +114,7 @@ async def good(target: Target, seconds: float) -> list[float]:
 
 
 async def again(what: Coroutine[Any, Any, None] | Any) -> None:
-    """Come again whenever the server ends it."""
+    """Reconnect whenever the server closes the connection."""
     while True:
         with contextlib.suppress(OSError, websockets.WebSocketException, EOFError):
             await what()
@@ -163,7 +163,7 @@ async def attack(target: Target) -> None:
 
 
 async def measure(target: Target, minutes: float) -> dict[str, Any]:
-    await good(target, 10.0)  # kernels are there
+    await good(target, 10.0)  # compiles the kernels
     alone = len(await good(target, ALONE)) / ALONE
     memory: list[int] = []
 
@@ -176,7 +176,7 @@ async def measure(target: Target, minutes: float) -> dict[str, Any]:
     command = [sys.executable, __file__, "--attack", str(target.port), target.token]
     started = time.monotonic()
     page = asyncio.create_task(good(target, 60 * minutes))
-    await asyncio.sleep(1.0)  # it has its place, as whoever opened the page first
+    await asyncio.sleep(1.0)  # now it has a session, like a user who opened the page first
     with subprocess.Popen(command) as others:
         times = await page
         others.kill()

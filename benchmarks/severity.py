@@ -1,14 +1,15 @@
-"""Stated bias against rendered bias: what `gonio verify` says a mistake does to a picture, and what it does.
+"""Stated bias compared with rendered bias: the effect of a mistake on a picture, as `gonio verify` states it and as
+rendered.
 
     python benchmarks/severity.py [--size 64] [--spp 256]
 
-For each wrong material a ball is rendered under an orthographic camera: its disk holds the hemisphere of wo with the
-cosine, as the stated average does. Three pictures, each against one from an estimator that is right:
+For each wrong material, a ball is rendered with an orthographic camera: its disk covers the hemisphere of wo weighted
+by the cosine, as in the stated average. Three pictures are each compared with one by a correct estimator:
 
-    furnace   a constant environment of radiance 1, BSDF samples alone; also with light samples (multiple importance)
-    lit       a lamp of half a steradian, or 24 distant ones where values are compared that differ by sign
+    furnace   a constant environment of radiance 1, by BSDF sampling only, and with light sampling (MIS)
+    lit       a lamp of half a steradian, or 24 distant ones if the compared values differ in sign
 
-Prints stated and rendered bias with their ratio; the bar is a factor of 1.5.
+Prints the stated and the rendered bias and their ratio; the limit is a factor of 1.5.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ from broken import facets, surfaces  # noqa: E402
 
 BAR = 1.5
 _names: dict[type, str] = {}
-_z = 1.0 - 2.0 * (np.arange(24) + 0.5) / 24  # evenly over the sphere, by the golden angle
+_z = 1.0 - 2.0 * (np.arange(24) + 0.5) / 24  # evenly distributed over the sphere, by the golden angle
 _phi = 2.39996 * np.arange(24)
 _suns = np.stack([np.sqrt(1.0 - _z**2) * np.cos(_phi), np.sqrt(1.0 - _z**2) * np.sin(_phi), _z], -1)
 
 
 def plugin(cls: type[BSDF], **values: Any) -> dict[str, Any]:
-    """The material as Mitsuba's plugin."""
+    """The material as a Mitsuba plugin."""
     if cls not in _names:
         _names[cls] = go.register(cls).name
     return {"type": f"gonio_{_names[cls].replace('-', '_')}", **values}
@@ -51,7 +52,7 @@ def plugin(cls: type[BSDF], **values: Any) -> dict[str, Any]:
 def ball(
     bsdf: dict[str, Any], light: dict[str, Any], how: str, size: int, spp: int, turn: float = 0.0, seed: int = 5
 ) -> np.ndarray:
-    """The ball's pixels (N, 3), ring by ring. how: "bsdf", "light" or "both" samples."""
+    """The ball's pixels (N, 3), ring by ring. how: sampling by "bsdf", "light" or "both"."""
     T = mi.ScalarTransform4f
     integrator = {"type": "direct", "emitter_samples": int(how != "bsdf"), "bsdf_samples": int(how != "light")}
     if how == "light" and light["lamp"]["type"] != "directional":
@@ -83,7 +84,7 @@ FURNACE = {"lamp": {"type": "constant"}}
 
 
 def lamp() -> dict[str, Any]:
-    """A disk at 45 degrees that fills half a steradian."""
+    """A disk at 45 degrees that subtends half a steradian."""
     T = mi.ScalarTransform4f
     place = T().look_at(origin=[3, 3, 4], target=[0, 0, 0], up=[0, 1, 0]) @ T().scale([2.3, 2.3, 1.0])
     emitter = {"type": "area", "radiance": {"type": "rgb", "value": [10.0] * 3}}
@@ -95,23 +96,23 @@ def sun(direction: np.ndarray) -> dict[str, Any]:
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean |a - b| over mean b, of pictures."""
+    """Mean |a - b| divided by mean b, of two pictures."""
     return float(np.nanmean(np.abs(a - b)) / np.nanmean(b))
 
 
 def patches(a: np.ndarray) -> np.ndarray:
-    """Means over neighbouring pixels, in which noise cancels."""
+    """Means over neighboring pixels, in which noise cancels."""
     return np.array([part.mean() for part in np.array_split(a.mean(1), max(len(a) // 64, 1))])
 
 
 def blurred(a: np.ndarray, b: np.ndarray, noise: float = 0.0) -> float:
-    """The same of noisy pictures, over patches; what two pictures of one scene differ by is noise."""
+    """As `apart`, for noisy pictures, by patches; `noise` is the difference between two pictures of the same scene."""
     off = float(np.mean(np.abs(patches(a) - patches(b))) / np.mean(patches(b)))
     return float(np.sqrt(off**2 - noise**2)) if off > 1.5 * noise else 0.0
 
 
 def lit_otherwise(cls: type[BSDF], other: dict[str, Any], size: int, turn: float = 0.0) -> float:
-    """Two materials under 24 distant lamps, one by one."""
+    """The difference between two materials under 24 distant lamps, one at a time."""
     off, light = 0.0, 0.0
     for direction in _suns:
         a = ball(plugin(cls), sun(direction), "light", size, 4)
@@ -121,7 +122,7 @@ def lit_otherwise(cls: type[BSDF], other: dict[str, Any], size: int, turn: float
 
 
 def exchanged(cls: type[BSDF]) -> type[BSDF]:
-    """The material whose light goes the other way: f(wi, wo)."""
+    """The material with directions swapped: f(wi, wo)."""
 
     def eval(self: Any, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         return cls.eval(self, wi, wo, mode) * go.ops.safe_div(go.ops.abs(wi.z), go.ops.abs(wo.z))
@@ -130,7 +131,7 @@ def exchanged(cls: type[BSDF]) -> type[BSDF]:
 
 
 def of_samples(cls: type[BSDF], size: int, spp: int) -> dict[str, float]:
-    """What BSDF sampling does to the picture that light samples give."""
+    """The bias of pictures with BSDF sampling, compared with light sampling."""
     found = {}
     for name, light, how, more in (
         ("furnace", FURNACE, "bsdf", 1),
@@ -145,7 +146,7 @@ def of_samples(cls: type[BSDF], size: int, spp: int) -> dict[str, float]:
 
 
 def of_gain(cls: type[BSDF], size: int, spp: int) -> dict[str, float]:
-    """What comes out of a furnace of radiance 1 above it, pixel by pixel."""
+    """The excess above 1 in a furnace of radiance 1, pixel by pixel."""
     picture = ball(plugin(cls), FURNACE, "light", size, 4 * spp)
     return {"furnace": float(np.maximum(patches(picture) - 1.0, 0.0).mean())}
 
@@ -190,7 +191,7 @@ MISTAKES: list[tuple[type[BSDF], str, Render]] = [
 
 
 def stated(cls: type[BSDF], law: str) -> Bias:
-    """At the material's own values, as the renders are."""
+    """The stated bias at the material's own values, as used in the renders."""
     from gonio.verify.effort import EFFORTS
     from gonio.verify.laws import laws
     from gonio.verify.subject import of
@@ -221,7 +222,7 @@ def main() -> None:
             said = bias.average
             if name.startswith("furnace") and bias.furnace is not None and bias.both is not None:
                 said = bias.both if name.endswith("both") else bias.furnace
-            small = max(said, rendered) < 5e-3  # below a render's noise both say: nothing
+            small = max(said, rendered) < 5e-3  # both are below the noise of a render
             ratio = 1.0 if small else said / max(rendered, 1e-9)
             good = 1.0 / BAR <= ratio <= BAR
             met, told = met + good, told + 1

@@ -1,10 +1,10 @@
-"""The time of a render with a shader as material, against the same material native to Gonio, in one process.
+"""Render time with a shader as the material, compared with the same native material, in one process.
 
     python benchmarks/shader_render.py [--rounds 7] [--spp 64] [--language wgsl]
 
-Each material is written by `gonio emit` with eval, pdf and sample, read again and rendered on a ball beside the
-original; both take turns, after a first render of each that compiles. Times are processor time of this process, since
-other programs may run beside it; the ratio is the median over the rounds.
+Each material is written by `gonio emit` with eval, pdf and sample, read again and rendered on a ball next to the
+original. The two alternate, after a first render of each that compiles. Times are CPU times of this process, since
+other programs may be running; the ratio is the median over the rounds.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MATERIALS = {
 
 
 def main(rounds: int, spp: int, language: str) -> None:
-    """Print a line per material."""
+    """Print one line per material."""
     print(f"{'material':20} {'native, s':>10} {'shader, s':>10} {'ratio':>7} {'range':>15} {'pictures differ by':>19}")
     for name, native in MATERIALS.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -45,14 +45,14 @@ def main(rounds: int, spp: int, language: str) -> None:
 
 
 def _rendered(material: go.BSDF, spp: int) -> tuple[float, np.ndarray]:
-    """(processor time, picture)."""
+    """(CPU time, picture)."""
     began = time.process_time()
     picture = go.render(material, spp=spp, size=(512, 512), integrator="path")
     return time.process_time() - began, np.asarray(picture)
 
 
 def _values(native: go.BSDF) -> dict[str, object]:
-    """The values of the shader's parameters: of vectors, component by component."""
+    """The values of the shader's parameters; vectors are given component by component."""
     from gonio.shaders import bundle
 
     values: dict[str, object] = {}

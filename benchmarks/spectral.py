@@ -1,11 +1,12 @@
-"""Light held against closed forms, and its price by wavelength: python benchmarks/spectral.py [prism bow cusp ...]
+"""Renders compared with closed forms, and the cost of spectral rendering: python benchmarks/spectral.py [prism bow ...]
 
-prism    where lines of a slit's light are seen through the prism of examples/prism, and how far that turned them,
-         against Snell's law with Sellmeier's index (SchottBK7)
-window   the bright disc in examples/snells-window against asin(1/n)
-bow      the bows of examples/rainbow against Descartes' angles
-cusp     where the caustic in examples/ring-caustic has its cusp, by --integrator caustics, against 1/a + 1/b = 2/R
-time     a spectral render against one in RGB, same scene and samples, alternating in two processes
+prism    deviation of spectral lines of a slit seen through the prism of examples/prism, compared with Snell's law and
+         Sellmeier's index (Schott2017)
+window   the bright disk in examples/snells-window compared with asin(1/n)
+bow      the bows of examples/rainbow compared with Descartes' angles
+cusp     the caustic next to its cusp in examples/ring-caustic, with --integrator caustics, compared with
+         1/a + 1/b = 2 / (R cos i)
+time     a spectral render compared with one in RGB, same scene and samples, alternating in two processes
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import gonio as go
 import numpy as np
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-WIDTH, HEIGHT, FOV = 1536, 4, 0.045  # pixels; degrees of the height
+WIDTH, HEIGHT, FOV = 1536, 4, 0.045  # pixels; vertical field of view in degrees
 SLIT = 8.0  # distance of the slit from the prism
 LINES = (467.8, 486.1, 546.1, 589.3, 656.3)  # nm: cadmium, hydrogen F, mercury e, sodium D, hydrogen C
 TIMED = """
@@ -40,20 +41,20 @@ for _ in sys.stdin:
 
 
 def corners() -> np.ndarray:
-    """The corners of the prism, seen from above: (x, z) of apex, left and right end of the base."""
+    """The corners of the prism in plan view: (x, z) of the apex and of the left and right end of the base."""
     lines = (EXAMPLES / "prism/prism.obj").read_text().splitlines()
     found = np.array([[float(x) for x in line.split()[1:]] for line in lines if line.startswith("v ")])
     return found[found[:, 1] == 0.0][:, [0, 2]]
 
 
 def refracted(way: np.ndarray, normal: np.ndarray, eta: float) -> np.ndarray:
-    """A unit vector after a surface; the normal faces it, eta is the index behind over that before (Snell)."""
+    """A unit vector refracted at a surface (Snell's law). The normal faces it, eta is the index behind / in front."""
     cos = -way @ normal
     return way / eta + (cos / eta - np.sqrt(1.0 - (1.0 - cos**2) / eta**2)) * normal
 
 
 def through(place: np.ndarray, way: np.ndarray, eta: float) -> tuple[np.ndarray, np.ndarray]:
-    """A ray after the prism's two sloping faces: where it leaves and where to."""
+    """A ray refracted by the two sides of the prism: the point where it leaves, and its direction."""
     apex, left, right = corners()
     for side, index in ((left, eta), (right, 1.0 / eta)):
         along = side - apex
@@ -65,7 +66,10 @@ def through(place: np.ndarray, way: np.ndarray, eta: float) -> tuple[np.ndarray,
 
 
 def prism(lines: tuple[float, ...] = LINES) -> list[float]:
-    """Render a slit through the prism, in lines; the camera is the slit's counterpart. Degrees by which each is off."""
+    """Errors in degrees of the deviation of each line, from renders of a slit through the prism.
+
+    The slit is where a ray from the camera arrives at the middle wavelength.
+    """
     errors = []
     print(f"{'nm':>6}  {'deviation':>10}  {'rendered':>10}  {'apart':>9}")
     eye, ahead = np.array([-6.0, 0.2576]), np.array([1.0, 0.0])
@@ -112,11 +116,11 @@ def prism(lines: tuple[float, ...] = LINES) -> list[float]:
             path = Path(folder) / "scene.json"
             path.write_text(json.dumps(scene))
             seen = np.abs(np.asarray(go.render(path, spp=2048, spectral=True), float)).sum((0, 2))
-        seen[:470] = 0.0  # there another image stands, of light that was reflected inside
+        seen[:470] = 0.0  # here is another image, of light reflected inside the prism
         near = np.abs(np.arange(WIDTH) - np.argmax(seen)) < 12
         column = (np.arange(WIDTH) + 0.5)[near] @ seen[near] / seen[near].sum()
         scale = 2.0 * np.tan(np.radians(FOV / 2.0)) / HEIGHT
-        # the picture's right is the camera's forward x up: +z here
+        # right in the picture is the cross product of the camera's forward and up directions, here +z
         view = np.array([1.0, (column - WIDTH / 2.0) * scale])
         view /= np.linalg.norm(view)
         eta = float(go.refractive_index("sf11", line).eta)
@@ -129,9 +133,10 @@ def prism(lines: tuple[float, ...] = LINES) -> list[float]:
 
 
 def window(spp: int = 256) -> float:
-    """Pixels by which the radius of the bright disc is off: where the light begins, in 72 directions from its middle.
+    """Error in pixels of the radius of the bright disk, measured in 72 directions from its center.
 
-    Towards its rim it fades as Fresnel has it, from half to 10 % within two pixels: half would lie inside.
+    Toward its edge, the disk fades by Fresnel's law, from 50 % to 10 % within two pixels. The edge is taken at 10 %,
+    since the radius of 50 % would be too small.
     """
     size = 480
     picture = np.asarray(go.render(EXAMPLES / "snells-window", size=(size, size), spp=spp), float)
@@ -153,7 +158,7 @@ def window(spp: int = 256) -> float:
 
 
 def bow(rays: int = 400_000) -> list[float]:
-    """Degrees by which the bows are off."""
+    """Errors in degrees of the bows."""
     spec = importlib.util.spec_from_file_location("rainbow", EXAMPLES / "rainbow/rainbow.py")
     assert spec is not None and spec.loader is not None
     program = importlib.util.module_from_spec(spec)
@@ -162,9 +167,10 @@ def bow(rays: int = 400_000) -> list[float]:
 
 
 def cusp(spp: int = 128) -> float:
-    """Pixels by which the caustic is off next to its cusp, seen from above, from a lamp that is all but a point.
+    """Error in pixels of the caustic next to its cusp, viewed from above, for a lamp that is almost a point.
 
-    A ray that meets the wall under the angle i has its focus at the distance b: 1/a + 1/b = 2 / (R cos i).
+    A ray that meets the wall at an angle of incidence i after a distance a has its focus at the distance b:
+    1/a + 1/b = 2 / (R cos i).
     """
     size, fov, height = 400, 12.0, 6.0
     camera = {"position": [0.47, height, 0], "lookAt": [0.47, 0, 0], "up": [0, 0, 1]}
@@ -177,7 +183,7 @@ def cusp(spp: int = 128) -> float:
         path.write_text(json.dumps(scene))
         picture = np.asarray(go.render(path, spp=spp, integrator="caustics"), float).mean(2)
     pixel = 2.0 * height * np.tan(np.radians(fov / 2.0)) / size
-    right = -1.0  # forward x up is -x here
+    right = -1.0  # the cross product of forward and up is -x here
     x = 0.47 + right * (np.arange(size) + 0.5 - size / 2.0) * pixel
     angle = np.linspace(0.0, 0.6, 2001)
     wall = np.stack([np.cos(angle), np.sin(angle)], 1)
@@ -187,7 +193,7 @@ def cusp(spp: int = 128) -> float:
     away = ray / a[:, None] - 2.0 * cosine[:, None] * wall
     line = wall + away / (2.0 / cosine - 1.0 / a)[:, None]
     columns = np.flatnonzero((x > line[0, 0] + pixel) & (x < line[0, 0] + 21.0 * pixel))
-    folded = picture[size // 2 :] + picture[: size // 2][::-1]  # both branches
+    folded = picture[size // 2 :] + picture[: size // 2][::-1]  # sum of the two symmetric branches
     found = np.argmax(folded[:60], axis=0)[columns] + 0.5
     expected = np.interp(x[columns], line[:, 0], line[:, 1]) / pixel
     apart = found - expected
@@ -196,7 +202,7 @@ def cusp(spp: int = 128) -> float:
 
 
 def time() -> None:
-    """Medians of 7, the two taking turns: seconds on the wall, and of processors, which other work disturbs less."""
+    """Medians of 7 alternating runs: wall-clock seconds, and CPU seconds, which other programs affect less."""
     for name in ("conductor-ggx", "rough-dielectric", "glass-caustic"):
         kinds = ("rgb", "spectral")
         command = [sys.executable, "-W", "ignore", "-c", TIMED, str(EXAMPLES / name)]

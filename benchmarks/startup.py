@@ -1,8 +1,8 @@
-"""How long the command takes to start: `gonio --help`, and a small render with and without compiled kernels.
+"""Startup time of the command: `gonio --help`, and a small render with and without compiled kernels.
 
     python benchmarks/startup.py [--runs 7]
 
-Prints a table and the machine. The cold render gets an empty kernel cache by a home folder of its own.
+Prints a table and the machine. The cold render has an empty kernel cache, since it runs with a new home folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-# The bars: what a person waits for without wondering.
+# Limits in seconds: delays that do not make a user wonder.
 BARS = {"gonio --help": 0.25, "render, cold": 10.0, "render, warm": 6.0}
 
 
@@ -77,7 +77,7 @@ def main() -> None:
         for _ in range(runs):
             times["gonio --help"].append(seconds([*command, "--help"], folder, dict(os.environ)))
         for run in range(min(runs, 3)):
-            home = folder / f"home{run}"  # Dr.Jit keeps its kernels in ~/.drjit
+            home = folder / f"home{run}"  # Dr.Jit stores its kernels in ~/.drjit
             home.mkdir()
             environment = {**os.environ, "HOME": str(home)}
             times["render, cold"].append(seconds(render, folder, environment))

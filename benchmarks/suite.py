@@ -1,22 +1,22 @@
 """Every scene of `benchmarks/scenes`: Gonio's integrators against Mitsuba's with its best sampler, in one process.
 
-    python benchmarks/suite.py                              # all scenes, some minutes
-    python benchmarks/suite.py sun-environment many         # some
+    python benchmarks/suite.py                              # all scenes, several minutes
+    python benchmarks/suite.py sun-environment many         # some scenes
     python benchmarks/suite.py --quick                      # a quarter of the samples, references of 4 s
     python benchmarks/suite.py --figure suite.png           # and a figure of the pictures and ratios
-    python benchmarks/suite.py --until-error .002           # is what `--until-error` promises true?
-    python benchmarks/suite.py --bias                       # 2^28 samples of five scenes: is any block off?
+    python benchmarks/suite.py --until-error .002           # does `--until-error` achieve the requested error?
+    python benchmarks/suite.py --bias                       # 2^28 samples of five scenes: is any block biased?
 
-Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)) with the floor at 1 % of the squared mean of
-the picture. Time is that of a whole new render of a loaded scene file, from its dictionary to the picture, kernels
-cached: what a user waits for. The rate leaves the start out.
+Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)), where the floor is 1 % of the squared mean
+of the picture. Time is that of a complete new render from the scene's dictionary to the picture, with cached kernels,
+as a user experiences it. The rate excludes the start.
 
-References are kept in the cache folder by what the scenes are. Without caustics it is the mean of Gonio's and Mitsuba's
-path tracers' pictures of many samples, which have to agree within their noise in blocks of 10 x 10 pixels.
-With caustics (`--integrator caustics` against Mitsuba's `path`, beside Gonio's `path`) it is Gonio's with a smaller
-radius, held against Mitsuba's `ptracer` in blocks that show no mirror or glass, and where there are none against
-Gonio's `path` on the mean of the picture. `ptracer` sees neither mirrors nor glass, so that it has no error of a whole
-picture; it is compared on the pixels that it reaches.
+References are stored in the cache folder under a hash of the scenes. Without caustics, a reference is the mean of
+pictures with many samples by Gonio's and Mitsuba's path tracers, which must agree within their noise in blocks of
+10 x 10 pixels. With caustics (`--integrator caustics` against Mitsuba's `path`, and Gonio's `path`), it is Gonio's
+picture with a smaller radius, compared with Mitsuba's `ptracer` in blocks that show no mirror or glass or, if there are
+none, with Gonio's `path` by the mean of the picture. `ptracer` renders neither mirrors nor glass, so it has no error
+for a whole picture; it is compared on the pixels that it reaches.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ from gonio.transport.integrators import Render, Settings  # noqa: E402
 from scenes import SCENES, Scene  # noqa: E402
 
 SAMPLERS = ("independent", "stratified", "multijitter", "ldsampler")
-ROUNDS = 3  # of a comparison, at least; more until the ratio is known to KNOWN or TIRED seconds have passed
+ROUNDS = 3  # least rounds of a comparison; it ends when the ratio is accurate to KNOWN, or after TIRED seconds
 KNOWN, TIRED = 0.05, 180.0
-EACH = 16  # samples of a part of the reference
-ROUNDING = 1e-6  # of a mean, that Mitsuba's sums in 32 bits are off by: blocks of an even sky have no noise at all
+EACH = 16  # samples per pixel of a part of the reference
+ROUNDING = 1e-6  # relative error of a mean by Mitsuba's float32 sums, since blocks of a uniform sky have no noise
 console = Console(width=None if os.isatty(1) else 130)
 
 
 @dataclass
 class Contender:
     name: str
-    start: Callable[[], Callable[[int], np.ndarray]]  # loads the scene, and gives what renders it with a seed
-    first: list[float] = field(default_factory=list)  # seconds to a picture of one sample
+    start: Callable[[], Callable[[int], np.ndarray]]  # loads the scene; returns a function that renders it with a seed
+    first: list[float] = field(default_factory=list)  # seconds for a picture with one sample per pixel
     whole: list[float] = field(default_factory=list)
     steady: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
@@ -105,7 +105,7 @@ def theirs(scene: Scene, sampler: str, spp: int, integrator: str = "path") -> Ca
 
 
 def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    """A converged picture, and how far apart the two methods are that made it: worst block of 10 x 10, in sigma."""
+    """A converged picture, and the difference between the two methods that made it: the worst 10 x 10 block, in sigma."""
     folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
     content = (Path(__file__).with_name("scenes") / "__init__.py").read_bytes()
     facts = f"{scene.name} {scene.size} {seconds:g} {mi.__version__}".encode()
@@ -121,7 +121,7 @@ def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
 
 
 def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np.ndarray]:
-    """Pictures of each, by turns, for so long, eight at least: (number, height, width, 3)."""
+    """Alternating pictures of each for `seconds`, at least eight: (number, height, width, 3)."""
     parts: list[list[np.ndarray]] = [[] for _ in draws]
     begin, seed = time.perf_counter(), 1000
     while time.perf_counter() - begin < seconds or len(parts[0]) < 8:
@@ -132,7 +132,7 @@ def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np
 
 
 def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How far apart the means of two stacks of blocks are: Student's t, as sigmas that are as rare."""
+    """The difference between the means of two stacks of blocks: Student's t, as a normal deviate of equal probability."""
     squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
     t = np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + (ROUNDING * np.mean(b, 0)) ** 2 + 1e-20)
     return np.asarray(stats.norm.isf(stats.t.sf(t, min(len(a), len(b)) - 1)))
@@ -161,10 +161,10 @@ def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
 
 
 def reached(scene: Scene) -> np.ndarray:
-    """Pixels that show a surface which is neither mirror nor glass: those that particles reach."""
+    """Pixels that particle tracing reaches: those that show a surface which is neither mirror nor glass."""
     loaded = scene.load(mi)
     width, height = scene.size
-    n = 4  # points a side, in each pixel
+    n = 4  # points along each side of a pixel
     index = dr.arange(mi.UInt32, width * height * n * n)
     x = (mi.Float(index % (width * n)) + 0.5) / (width * n)
     y = (mi.Float(index // (width * n)) + 0.5) / (height * n)
@@ -176,7 +176,7 @@ def reached(scene: Scene) -> np.ndarray:
 
 
 def blocks(pictures: np.ndarray) -> np.ndarray:
-    """Means of blocks of 10 x 10, of grey."""
+    """Means of gray values over blocks of 10 x 10 pixels."""
     height, width = (10 * (n // 10) for n in pictures.shape[1:3])
     grey = pictures[:, :height, :width].mean(-1)
     return grey.reshape(len(grey), height // 10, 10, width // 10, 10).mean((2, 4))
@@ -187,11 +187,11 @@ def relmse(x: np.ndarray, r: np.ndarray, where: np.ndarray | slice = slice(None)
 
 
 def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
-    """Gonio first, then Mitsuba's path tracer, then for caustics Gonio's path tracer and Mitsuba's `ptracer`; all take
-    turns, so that a busy machine is busy for all.
+    """Gonio, then Mitsuba's path tracer, then for caustics Gonio's path tracer and Mitsuba's `ptracer`. They alternate,
+    so that a busy machine affects all alike.
 
-    Where a hundredth of the pixels holds most of the error, a few pictures tell little of it, and the best of four
-    peers is the luckiest: so there are more rounds there.
+    If a hundredth of the pixels has most of the error, it is not known accurately from a few pictures, and the best of
+    four peers is the luckiest; such scenes therefore get more rounds.
     """
     starts = [("Gonio", lambda n: ours(scene, n, "caustics" if scene.caustic else "path"))]
     starts += [(s, lambda n, s=s: theirs(scene, s, n)) for s in SAMPLERS]
@@ -202,7 +202,7 @@ def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
     singles = [make(1) for _, make in starts]
     where = reached(scene) if scene.caustic else slice(None)
     begun = time.perf_counter()
-    for round_number in itertools.count():  # the first compiles
+    for round_number in itertools.count():  # the first round compiles
         if round_number > ROUNDS and (spread(field) < KNOWN or time.perf_counter() - begun > TIRED):
             return field
         for contender, single in zip(field, singles, strict=True):
@@ -231,18 +231,18 @@ def best_peer(field: list[Contender]) -> Contender:
 
 
 def spread(field: list[Contender]) -> float:
-    """One standard error of the ratio of the errors of Gonio and its best peer, relative to it."""
+    """The relative standard error of the ratio between the errors of Gonio and its best peer."""
     errors = [np.array(c.errors) for c in (field[0], best_peer(field))]
     return float(np.sqrt(sum(np.var(e, ddof=1) / len(e) / np.mean(e) ** 2 for e in errors)))
 
 
-SMALLER = 4  # than the scene says, a side: pictures of `promises`
+SMALLER = 4  # factor by which each side of the pictures of `promises` is reduced
 RUNS, MORE, LONGEST = 4, 24, 60
-SHARPER = 0.5  # of the radius that a picture came to, where it is blurred
+SHARPER = 0.5  # radius of the reference relative to the final radius of a picture, for caustics
 
 
 def promises(names: list[str], error: float) -> None:
-    """Renders until an error, and what the error then is, against pictures of MORE times as many samples."""
+    """Render until an estimated error, and print the actual error, from pictures with MORE times as many samples."""
     titles = ("scene", "samples", "error over promised", "over estimated", "without shares, of as many samples")
     table = Table(*titles, title=f"relMSE after --until-error {error:g}: of {RUNS} seeds, the median (lowest, highest)")
     judged = kept = 0
@@ -283,16 +283,16 @@ def promises(names: list[str], error: float) -> None:
     console.print(f"within a factor 1.3 of what was promised: {kept} of {judged}")
 
 
-BIASED = ("five-metals", "sun-environment", "textured", "rough-glass", "room")  # scenes whose light differs in kind
-SIDE, PARTS = 128, 64  # pixels a side of those pictures, and independent pictures that the samples are cut into
+BIASED = ("five-metals", "sun-environment", "textured", "rough-glass", "room")  # scenes with different kinds of light
+SIDE, PARTS = 128, 64  # width and height of those pictures, and number of pictures that the samples are divided into
 
 
 def bias(names: list[str], log2_samples: int) -> None:
-    """So many samples of Gonio's `path`, and of Mitsuba's: how far apart the means of blocks of 10 x 10 pixels are.
+    """Compare 2^log2_samples samples of Gonio's `path` and of Mitsuba's, by the means of blocks of 10 x 10 pixels.
 
-    Both draw the same scene of Mitsuba's, and share nothing but its shapes, materials and lamps. The spread of PARTS
-    pictures, each of its own seed, is the noise of a block's mean; Student's t says how rare a difference is. Of n
-    blocks the worst is as rare as its chance times n (Bonferroni).
+    Both render the same Mitsuba scene, and share only its shapes, materials and lamps. The spread of PARTS pictures
+    with different seeds gives the noise of a block's mean, and Student's t the significance of a difference. The
+    p-value of the worst of n blocks is multiplied by n (Bonferroni).
     """
     spp = 2**log2_samples // (SIDE * SIDE * PARTS)
     if spp < 1:
@@ -306,7 +306,7 @@ def bias(names: list[str], log2_samples: int) -> None:
         mine, other = (np.stack([draw(seed) for seed in range(PARTS)]) for draw in draws)
         a, b = blocks(mine), blocks(other)
         apart = sigmas(a, b)
-        lit = (a.mean(0) > 0) | (b.mean(0) > 0)  # nothing arrives at the others, of which there is nothing to tell
+        lit = (a.mean(0) > 0) | (b.mean(0) > 0)  # the other blocks receive no light
         chance = min(2.0 * float(stats.norm.sf(apart[lit].max())) * int(lit.sum()), 1.0)
         means = [x.mean((1, 2)) for x in (a, b)]
         ratio = float(means[0].mean() / means[1].mean())

@@ -1,13 +1,13 @@
-"""The time of an emitted PyTorch file against Dr.Jit on the same material, in one process on all cores.
+"""The time of an emitted PyTorch file compared with Dr.Jit on the same material, in one process on all cores.
 
     python benchmarks/torch_file.py [--count 10000000] [--rounds 5]
 
-The file's `eval` is traced to one graph and compiled (`make_fx`, then `torch.compile`, which needs a C++ compiler); the
-directions lie component by component in memory, as Dr.Jit's do. Both take turns; processor time of this process.
+The file's `eval` is traced to one graph and compiled (`make_fx`, then `torch.compile`, which needs a C++ compiler). The
+directions are stored component by component, as in Dr.Jit. The two alternate; times are CPU times of this process.
 
-Dr.Jit keeps the memory of freed arrays and uses it again. glibc returns large blocks to the system, and clearing their
-pages anew takes as long as the evaluation itself; it is told to keep them here, as the allocators do that PyTorch's
-tuning guide recommends. `--fresh` leaves glibc as it is.
+Dr.Jit reuses the memory of freed arrays. glibc returns large blocks to the system, and clearing their pages again takes
+as long as the evaluation itself; here it is told to retain them, as do the allocators that PyTorch's tuning guide
+recommends. `--fresh` leaves glibc's defaults.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from torch.fx.experimental.proxy_tensor import make_fx
 GOLD = go.Conductor.preset("Au", alpha=0.3)
 
 
-M_TRIM_THRESHOLD, M_MMAP_MAX = -1, -4  # of glibc's malloc.h
+M_TRIM_THRESHOLD, M_MMAP_MAX = -1, -4  # from glibc's malloc.h
 
 
 def main(count: int, rounds: int, fresh: bool) -> None:
-    """Print the median time of both, and their ratio."""
+    """Print the median times of the two, and their ratio."""
     if not fresh:
         malloc = ctypes.CDLL(None).mallopt
         kept = malloc(M_MMAP_MAX, 0) and malloc(M_TRIM_THRESHOLD, 2**31 - 1)

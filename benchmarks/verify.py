@@ -1,12 +1,12 @@
-"""What the verifier costs and how far it can be trusted, one table a question.
+"""The cost and the reliability of the verifier, in one table per question.
 
     python benchmarks/verify.py [--only time,speed,controls,alarms,uniform] [--seeds 20] [--uniform-seeds 100]
 
 time      `gonio verify conductor` as a whole process, default and --quick, after one run that fills the kernel cache
-speed     samples a second of the chi-square test, sampling, binning and counting, GGX conductor
-controls  each deliberately wrong BSDF of tests/broken and the law that caught it
-alarms    every correct model, many seeds, all laws at --quick: failed verdicts
-uniform   p-values of the chi-square test of a correct model over many seeds, by Kolmogorov and Smirnov
+speed     samples per second of the chi-square test (sampling, binning, counting) for a GGX conductor
+controls  each deliberately wrong BSDF in tests/broken, and the law that caught it
+alarms    failed verdicts of all laws with --quick, for every correct model and many seeds
+uniform   p-values of the chi-square test of a correct model over many seeds, by a Kolmogorov-Smirnov test
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def correct() -> dict[str, go.BSDF]:
-    """Every model, and the choices that change what its laws see."""
+    """Every model, and variants with choices that matter to the laws."""
     found = {
         "lambert": go.Lambert((0.2, 0.5, 0.9)),
         "oren-nayar": go.OrenNayar(0.8, 0.4),
@@ -145,7 +145,7 @@ def uniform(seeds: int) -> None:
         p = stats.kstest(found[kind], "uniform").pvalue
         print(f"p-values of {kind} cells, {len(found[kind])} tests: Kolmogorov-Smirnov p = {p:.3f}")
     values = np.array(found["others"])
-    # this test allows for the error of its integral, so its p-values lie above a uniform law's, never below
+    # this test allows for the error of its integral, so its p-values lie above a uniform distribution's, never below
     print(f"p-values of the share outside, {len(values)} tests: below .05 in {np.mean(values < 0.05):.1%}")
 
 

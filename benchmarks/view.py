@@ -1,10 +1,10 @@
-"""What `gonio view` costs: the page's size, its first picture, the live reference, how far the two pictures are apart,
-and how long a saved file takes to be seen.
+"""The cost of `gonio view`: the size of the page, its first picture, the live reference, the difference between the two
+pictures, and the delay until a saved file is visible.
 
     python benchmarks/view.py [--json]
 
-Needs a Chromium (see tests/browser.py); draws in software (SwiftShader), so that figures of two machines differ by
-their processors alone. Prints each figure beside its bar and exits with 1 where one is missed.
+Needs a Chromium (see tests/browser.py). It draws in software (SwiftShader), so that results of two machines differ only
+by their processors. Prints each value next to its limit, and exits with 1 if a limit is exceeded.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SIZE = (640, 360)
 
 @dataclass
 class Figure:
-    """A measured figure and the most it may be; None for one that has no bar."""
+    """A measured value and its upper limit; None if it has no limit."""
 
     what: str
     value: float
@@ -52,7 +52,7 @@ class Figure:
 
 
 def scene(what: stage.Stage, number: int, spp: int, shift: float = 0.0, size: tuple[int, int] = SIZE) -> messages.Scene:
-    """The stage as the page asks for it, its widths moved by `shift`."""
+    """The stage as requested by the page, with its alphas changed by `shift`."""
     rows = [
         {
             "material": row.material,
@@ -70,7 +70,7 @@ def scene(what: stage.Stage, number: int, spp: int, shift: float = 0.0, size: tu
 
 
 def reference_figures(what: stage.Stage) -> Iterator[Figure]:
-    """The reference by itself, without server and page."""
+    """Values of the reference by itself, without server and page."""
     reference = Reference(what)
 
     def first(number: int) -> float:
@@ -93,7 +93,7 @@ def reference_figures(what: stage.Stage) -> Iterator[Figure]:
 
 @contextlib.contextmanager
 def serving(what: stage.Stage) -> Iterator[str]:
-    """The address of a server in a thread."""
+    """Run a server in a thread; yields its address."""
     one = server.Server(server.Application(what, server.AccessControl("127.0.0.1")), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
     thread.start()
@@ -106,13 +106,13 @@ def serving(what: stage.Stage) -> Iterator[str]:
         thread.join()
 
 
-# The time of the first frame by the page's own clock, which starts with the navigation.
+# The time of the first frame by the page's own clock, which starts at navigation.
 FIRST_PICTURE = """
 const look = () => window.gonio?.frames > 0 ? (window.firstPicture = performance.now()) : requestAnimationFrame(look);
 requestAnimationFrame(look);
 """
 
-# From a value's change until the drawn pixels can be read back, so that what the GPU still has to do counts too.
+# From the change of a value until the drawn pixels can be read back, so that pending GPU work is included.
 SLIDER = """async (alpha) => {
   const started = performance.now();
   const frames = gonio.frames;
@@ -133,7 +133,7 @@ PICTURE = f"async () => {{ {_TEXT} return text(await gonio.converge()); }}"
 PICTURES = f"async () => {{ {_TEXT} return [text(await gonio.converge()), text(gonio.app.referencePicture())]; }}"
 
 
-# Milliseconds of drawing one row alone, many samples of it, by turns; the readback waits for the GPU.
+# Milliseconds to draw only one row, in many samples, alternating between rows; the readback waits for the GPU.
 COST = """async () => {
   const least = [Infinity, Infinity];
   for (let round = 0; round < 20; round++) for (const solo of [0, 1]) {
@@ -157,7 +157,7 @@ FURNACE = """() => gonio.setState((state) => {
 
 
 def wait(tab: Any, condition: str, seconds: float = 300.0) -> None:
-    """Until a condition holds; asked from outside, since the page's policy forbids to evaluate text within it."""
+    """Wait until a condition holds, polling from outside, since the page's policy forbids evaluating text inside it."""
     end = time.monotonic() + seconds
     while not tab.evaluate(condition):
         if time.monotonic() > end:
@@ -166,13 +166,13 @@ def wait(tab: Any, condition: str, seconds: float = 300.0) -> None:
 
 
 def pixels(picture: list[Any]) -> np.ndarray:
-    """(height, width, 4) of a picture from the page."""
+    """The pixels of a picture from the page, (height, width, 4)."""
     width, height, data = picture
     return np.frombuffer(base64.b64decode(data), "<f4").reshape(height, width, 4)
 
 
 def relmse(test: np.ndarray, reference: np.ndarray) -> tuple[float, int]:
-    """Over pixels that balls cover wholly and whose neighbours they cover too; and the number of them."""
+    """relMSE over pixels that are fully covered by balls, as are their neighbors; and the number of these pixels."""
     factor = test.shape[0] // reference.shape[0]
     height, width = reference.shape[:2]
     test = test.reshape(height, factor, width, factor, 4).mean((1, 3))
@@ -186,7 +186,7 @@ def relmse(test: np.ndarray, reference: np.ndarray) -> tuple[float, int]:
 
 
 def fit(tab: Any) -> dict[str, int]:
-    """The window's size at which the picture has SIZE, which the tab has then; it is 1280 x 720 before."""
+    """Resize the window, initially 1280 x 720, so that the picture has SIZE; returns the size of the window."""
     wanted = {"width": 1280 - tab.evaluate("gonio.app.canvas.clientWidth") + SIZE[0],
               "height": 720 - tab.evaluate("gonio.app.canvas.clientHeight") + SIZE[1]}  # fmt: skip
     tab.set_viewport_size(wanted)
@@ -195,7 +195,7 @@ def fit(tab: Any) -> dict[str, int]:
 
 
 def page_figures(what: stage.Stage) -> Iterator[Figure]:
-    """The exported file, and the live page."""
+    """Values of the exported file and of the live page."""
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
         path = page.export(what, Path(folder) / "page.html")
         yield Figure("page, exported", path.stat().st_size / 1e6, "MB", 1.5)
@@ -237,7 +237,7 @@ def page_figures(what: stage.Stage) -> Iterator[Figure]:
             tab.close()
 
 
-# A material of the user's own: Ward's gloss, whose factor of 4 each save changes.
+# A user-defined material: a Ward lobe, whose factor of 4 each save changes.
 WARD = """import gonio as go
 from gonio import ops
 from gonio.ops import inv_pi, safe_div, sqr, where
@@ -259,7 +259,7 @@ class Ward(go.BSDF):
 """
 SAVES = 20
 
-# When a save came and was drawn, by the clock that Python reads too. The readback waits for what the GPU still does.
+# The times at which a save arrived and was drawn, by the clock that Python reads too. The readback waits for the GPU.
 WATCH = """() => {
   const { app } = gonio;
   const [renew, refresh] = [app.renew.bind(app), app.onRefresh];
@@ -280,7 +280,7 @@ WATCH = """() => {
 
 
 def saving_figures() -> Iterator[Figure]:
-    """From saving a user's file to the new picture on the page, and where the time goes."""
+    """The time from saving a user's file to the new picture on the page, and its components."""
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
         path = Path(folder) / "ward.py"
         path.write_text(WARD)

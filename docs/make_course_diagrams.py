@@ -1,8 +1,8 @@
-"""Draw the diagrams of docs/course: directions, angles and surfaces, as the lecture draws them.
+"""Draw the diagrams of docs/course: directions, angles and surfaces, as drawn in the lecture.
 
 python docs/make_course_diagrams.py [NAME ...]
 
-Labels are symbols, which every language shares.
+Labels are symbols, so that the diagrams suit every language.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, FancyArrowPatch, Polygon, Rectangle, Wedge
 
-matplotlib.rcParams["svg.hashsalt"] = "gonio"  # the same file from the same program
+matplotlib.rcParams["svg.hashsalt"] = "gonio"  # so that the files are reproducible
 
 PICTURES = Path(__file__).parent / "course" / "pictures"
 VALUES = PICTURES.parent / "values"
@@ -26,7 +26,7 @@ Point = Sequence[float]
 
 
 def canvas(columns: int, width: float, height: float) -> tuple[Figure, list[Any]]:
-    """A figure with panels without axes, one unit as long in x as in y."""
+    """A figure with panels that have no axes and an equal aspect ratio."""
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = list(np.atleast_1d(figure.subplots(1, columns)))
     for axis in axes:
@@ -46,7 +46,7 @@ def toward(degrees: float, length: float = 1.0) -> tuple[float, float]:
 
 
 def arrow(axis: Any, start: Point, end: Point, color: str = INK, label: str = "", at: Point = (0.0, 0.0)) -> None:
-    """An arrow with a label beyond its end, moved by `at`."""
+    """Draw an arrow with a label beyond its end, offset by `at`."""
     axis.add_patch(
         FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=color, lw=1.6, shrinkA=0, shrinkB=0)
     )
@@ -56,14 +56,14 @@ def arrow(axis: Any, start: Point, end: Point, color: str = INK, label: str = ""
 
 
 def angle(axis: Any, low: float, high: float, radius: float, label: str, color: str = INK) -> None:
-    """An arc between two directions, degrees clockwise from up, with its symbol."""
+    """Draw a labeled arc between two directions, in degrees clockwise from up."""
     axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=90 - high, theta2=90 - low, color=color, lw=1))
     x, y = toward((low + high) / 2, radius + 0.13)
     axis.text(x, y, label, color=color, ha="center", va="center", fontsize=11)
 
 
 def ground(axis: Any, half: float = 1.25, depth: float = 0.1) -> None:
-    """The surface, with matter below."""
+    """Draw the surface, with matter below."""
     axis.add_patch(Rectangle((-half, -depth), 2 * half, depth, color=PALE, lw=0))
     axis.plot([-half, half], [0, 0], color=INK, lw=1.6)
 
@@ -74,7 +74,7 @@ def limits(axis: Any, x: Point, y: Point) -> None:
 
 
 def frames() -> None:
-    """The framework's frame, Gonio's frame, and how the homework's table lies."""
+    """The framework's frame, Gonio's frame, and the layout of the homework's table."""
     figure, (left, right, table) = canvas(3, 9.2, 3.0)
     for axis, up, side, front, title in (
         (left, "y", "x", "z", "framework: y up"),
@@ -134,7 +134,7 @@ def grooves() -> None:
 
 
 def half_vector() -> None:
-    """h halves the angle between i and o."""
+    """h bisects the angle between i and o."""
     figure, (axis,) = canvas(1, 4.4, 2.5)
     ground(axis)
     for degrees, label, color in ((-30, "$i$", GOLD), (0, "$n$", INK), (70, "$o$", BLUE), (20, "$h$", RED)):
@@ -170,7 +170,7 @@ def reflection() -> None:
 
 
 def refraction() -> None:
-    """Snell's law, and total reflection from below."""
+    """Snell's law, and total internal reflection from below."""
     figure, (snell, window) = canvas(2, 7.4, 3.0)
     for axis in (snell, window):
         axis.add_patch(Rectangle((-1.4, -1.2), 2.8, 1.2, color="#dcebf5", lw=0))
@@ -200,7 +200,7 @@ def refraction() -> None:
 
 
 def facets() -> None:
-    """What D, G and F count: facets along h, those hidden from the light or the eye, and light that goes on."""
+    """What D, G and F measure: facets along h, facets hidden from light or eye, and the light that is transmitted."""
     figure, panels = canvas(3, 9.4, 2.2)
     rng = np.random.default_rng(4)
     x = np.linspace(0, 4, 9)
@@ -248,7 +248,7 @@ def lobes() -> None:
 
 
 def brushing() -> None:
-    """Grooves along x, seen from above; the facets of each cut."""
+    """Grooves along x, seen from above; the facets in two cross sections."""
     figure, (top, cuts) = canvas(2, 7.0, 2.5)
     rng = np.random.default_rng(2)
     for _ in range(70):
@@ -273,7 +273,7 @@ def brushing() -> None:
 
 
 def gonioreflectometer() -> None:
-    """A lamp and a detector on arcs about the sample, and a ball that has all normals at once."""
+    """A lamp and a detector on arcs around the sample, and a ball, which has all normals at once."""
     figure, (arcs, ball) = canvas(2, 7.4, 2.7)
     arcs.add_patch(Arc((0, 0), 2.2, 2.2, theta1=0, theta2=180, color="#9aa4b0", lw=1.2))
     arcs.add_patch(Rectangle((-0.35, -0.08), 0.7, 0.08, color=INK))
@@ -299,7 +299,7 @@ def gonioreflectometer() -> None:
 
 
 def compensation() -> None:
-    """The power of a beam: E leaves at once, 1 - E is given back by the added lobe."""
+    """The power of a beam: E leaves after single scattering, 1 - E is restored by the added lobe."""
     figure, (axis,) = canvas(1, 7.0, 2.0)
     for y, parts in ((1.0, ((0.62, BLUE, r"$E(\mu_o)$"), (0.38, PALE, r"$1 - E(\mu_o)$"))),):
         left = 0.0
@@ -348,7 +348,7 @@ DIAGRAMS = (
 
 
 def main() -> int:
-    """Draw those that are named, or all."""
+    """Draw the named diagrams, or all."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     for draw in DIAGRAMS:
         if len(sys.argv) == 1 or draw.__name__ in sys.argv:

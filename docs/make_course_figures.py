@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-matplotlib.rcParams["svg.hashsalt"] = "gonio"  # the same file from the same program
+matplotlib.rcParams["svg.hashsalt"] = "gonio"  # so that the files are reproducible
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "course" / "pictures"
 RED, GOLD, GREEN, BLUE = "#b3403a", "#c98a2b", "#3f7d4f", "#2b5d8a"
@@ -32,7 +32,7 @@ def canvas(columns: int, width: float, height: float, **options: Any) -> tuple[F
 
 
 def save(figure: Figure, name: str) -> None:
-    """A .svg of curves, a .png of tables, a .jpg of renders."""
+    """Save curves as .svg, tables as .png and renders as .jpg."""
     options = {"metadata": {"Date": None}} if name.endswith(".svg") else {"dpi": 120}
     figure.savefig(PICTURES / name, **options)
 
@@ -45,13 +45,13 @@ def label(axis: Any, x: str, y: str, legend: bool = True) -> None:
 
 
 def encoded(linear: np.ndarray) -> np.ndarray:
-    """Linear sRGB as a screen shows it."""
+    """Linear values encoded as sRGB."""
     c = np.clip(linear, 0.0, 1.0)
     return np.where(c < 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 1e-9) ** (1 / 2.4) - 0.055)
 
 
 def balls(name: str, materials: Sequence[tuple[str, go.BSDF]]) -> None:
-    """Five balls in a dark studio, each with its words above."""
+    """Five balls in a dark studio, each with its title above."""
     overrides = {f"shapes.{i}.material": material for i, (_, material) in enumerate(materials)}
     scene = str(ROOT / "examples" / "conductor-ggx" / "print.json")
     picture = encoded(go.render(scene, overrides=overrides, size=(1000, 260), spp=96, denoise=True))
@@ -73,7 +73,7 @@ def direction(degrees: Any, azimuth: float = 0.0) -> np.ndarray:
 
 
 def distributions() -> None:
-    """D of three distributions over the angle, and its projected area."""
+    """D of three distributions as a function of angle, and its projected area."""
     figure, (linear, log) = canvas(2, 8.6, 3.0)
     t = np.radians(np.linspace(0.0, 89.5, 400))
     a2, tan2, cos4 = 0.3**2, np.tan(t) ** 2, np.cos(t) ** 4
@@ -94,7 +94,7 @@ def distributions() -> None:
 
 
 def sampling() -> None:
-    """Copper at 16 samples per pixel, by four ways to sample."""
+    """Copper at 16 samples per pixel, with four sampling methods."""
     scene = str(ROOT / "examples" / "conductor-ggx" / "print.json")
     figure = Figure(figsize=(10.0, 3.7), layout="constrained")
     metal = {"ndf": "ggx", "masking": "smith-separable", "fresnel": "schlick"}
@@ -122,7 +122,7 @@ def diffuse() -> None:
 
 
 def indices() -> None:
-    """n over the wavelength."""
+    """n as a function of wavelength."""
     figure, (axis,) = canvas(1, 6.4, 3.2)
     wavelength = np.linspace(400.0, 700.0, 151)
     for name, color in zip(("diamond", "sf10", "bk7", "water"), COLORS, strict=False):
@@ -136,7 +136,7 @@ def indices() -> None:
     save(figure, "indices.svg")
 
 
-# red, green and blue of the band that marks the wavelengths; for orientation, not colorimetry
+# RGB colors of the band that marks the wavelengths; a guide to the eye, not colorimetric
 HUES = (
     ([400, 440, 490, 510, 580, 645, 700], [0.5, 0.2, 0.0, 0.0, 1.0, 1.0, 0.7]),
     ([400, 440, 490, 510, 580, 645, 700], [0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
@@ -145,7 +145,7 @@ HUES = (
 
 
 def fresnel() -> None:
-    """Reflectance of glass and of gold: both polarizations, their mean, Schlick."""
+    """Reflectance of glass and of gold: the two polarizations, their mean, Schlick."""
     figure, axes = canvas(3, 10.2, 3.0)
     degrees = np.linspace(0.0, 90.0, 361)
     n, k = (float(np.squeeze(value)) for value in go.refractive_index("Al", 650.0))
@@ -168,7 +168,7 @@ def fresnel() -> None:
 
 
 def anisotropy() -> None:
-    """The same pair of widths, turned about the normal."""
+    """The same pair of alphas, rotated about the normal."""
 
     def steel(alpha: tuple[float, float], degrees: float = 0.0) -> go.BSDF:
         return go.Conductor.preset("Cr", alpha=alpha, rotation=np.radians(degrees))
@@ -184,7 +184,7 @@ def anisotropy() -> None:
 
 
 def reciprocity() -> None:
-    """f(o, i) against f(i, o) at random pairs, of Phong and of a metal."""
+    """f(o, i) against f(i, o) at random pairs, for Phong and for a metal."""
     figure, axes = canvas(2, 7.0, 3.2)
     rng = np.random.default_rng(3)
     z = rng.uniform(0.1, 1.0, (2, 3000))
@@ -210,14 +210,14 @@ def reciprocity() -> None:
 
 
 def storing() -> None:
-    """A highlight in a regular table of angles, and in one of half and difference angles, of as many cells."""
+    """A highlight in a regular table of angles, and in one of half and difference angles with as many cells."""
     figure, axes = canvas(2, 8.6, 3.2)
     gold = go.Conductor.preset("Au", alpha=0.02)
     view, light = np.linspace(0.0, 80.0, 1601), 31.5  # between two cells of the regular table
     grid = np.linspace(0.0, 87.0, 30)
     rows = [_plane(gold, grid, angle) for angle in (light - 1.5, light + 1.5)]
     regular = np.interp(view, grid, np.mean(rows, axis=0))
-    # of the plane of incidence: theta_h = |theta_o - theta_i| / 2, stored at equal steps of its root
+    # in the plane of incidence: theta_h = |theta_o - theta_i| / 2, stored at equal steps of its square root
     root, differences = np.linspace(0.0, np.sqrt(90.0), 31), np.linspace(0.0, 80.0, 31)
     cells = np.array([_value(gold, root**2, angle) for angle in differences])
     column = np.abs(differences[:, None] - (view + light) / 2.0).argmin(0)
@@ -236,7 +236,7 @@ def storing() -> None:
 
 
 def _plane(model: go.BSDF, view: np.ndarray, light: float) -> np.ndarray:
-    """f in the plane of incidence, at views opposite the light."""
+    """f in the plane of incidence, for views opposite the light."""
     wi = np.repeat(direction(light), len(view), 0)
     return np.asarray(model.f(direction(view, 180.0), wi, precision="float64"))[:, 0]
 
@@ -252,7 +252,7 @@ def _value(model: go.BSDF, half: np.ndarray, difference: float) -> np.ndarray:
 
 
 def draw(figures: Sequence[Callable[[], None]]) -> int:
-    """Draw those that the command names, or all."""
+    """Draw the figures that the command names, or all."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     for one in figures:
         if len(sys.argv) == 1 or one.__name__ in sys.argv:

@@ -15,7 +15,7 @@ from make_course_figures import BLUE, GOLD, GREEN, RED, ROOT, canvas, draw, enco
 
 
 def tables(name: str, panels: Sequence[tuple[str, np.ndarray]], height: float = 3.0) -> None:
-    """Tables [roughness, mu], as gray values, lowest roughness at the bottom."""
+    """Draw tables [roughness, mu] as gray values, lowest roughness at the bottom."""
     figure, axes = canvas(len(panels), 2.75 * len(panels), height)
     for axis, (title, values) in zip(axes, panels, strict=True):
         axis.imshow(
@@ -27,12 +27,12 @@ def tables(name: str, panels: Sequence[tuple[str, np.ndarray]], height: float = 
 
 
 def table(masking: str, **options: Any) -> np.ndarray:
-    """E of GGX at F = 1, 64 x 64."""
+    """E of GGX with F = 1, 64 x 64."""
     return np.asarray(go.bake("ggx", masking=masking, resolution=64, lut=["E"], **options).arrays["E"])
 
 
 def cosine_sampling() -> None:
-    """E by cosine-weighted directions, as the homework's picture has it, and without noise."""
+    """E by cosine-weighted sampling, as in the homework's picture, and without noise."""
     noisy = table("schlick-ibl", method="cosine", sampler="stratified", samples=1024, floor=1e-4)
     tables(
         "cosine-sampling.png",
@@ -46,7 +46,7 @@ def cosine_sampling() -> None:
 
 
 def importance_sampling() -> None:
-    """E of 64 directions each: cosine-weighted, of the GGX normal; and their errors against the number of samples."""
+    """E from 64 directions per texel, cosine-weighted or by GGX normals; and the errors over the number of samples."""
     figure, axes = canvas(3, 9.4, 3.1)
     for axis, (title, method) in zip(
         axes, (("cosine, N = 64", "cosine"), ("GGX normals, N = 64", "ggx")), strict=False
@@ -96,7 +96,7 @@ def average() -> None:
 
 
 def split_sum() -> None:
-    """The two factors of Schlick's R0 and of 1."""
+    """The two factors of the split sum: the one that multiplies Schlick's R0, and the constant one."""
     baked = go.bake("ggx", masking="smith-correlated", resolution=64, lut=["dfg"])
     dfg = np.asarray(baked.arrays["dfg"])
     scale, bias = dfg[..., 0], dfg[..., 1]
@@ -106,7 +106,7 @@ def split_sum() -> None:
 
 
 def masking() -> None:
-    """G1 of both k and of Smith, and the lobes that follow."""
+    """G1 with the two forms of k and by Smith, and the resulting lobes."""
     figure, axes = canvas(3, 10.0, 3.0)
     mu = np.linspace(0.0, 1.0, 201)
     for axis, roughness in zip(axes, (0.1, 0.5, 1.0), strict=True):
@@ -125,7 +125,7 @@ def masking() -> None:
 
 
 def kulla_conty() -> None:
-    """The albedo of both terms at F = 1, and F_avg's series of gold."""
+    """The albedo of the two terms with F = 1, and f_add as a function of F_avg."""
     figure, (left, right) = canvas(2, 8.4, 3.2)
     mu = np.linspace(0.05, 1.0, 20)
     plain = go.Conductor(alpha=0.8, fresnel="one")
@@ -148,7 +148,7 @@ def kulla_conty() -> None:
 
 
 def two_rows() -> None:
-    """Silver by the homework's terms under one directional light: compensated above, plain below."""
+    """Silver with the homework's terms under one directional light: compensated above, plain below."""
     figure, axes = canvas(2, 11.0, 2.9)
     panels = (
         ("$k = (r+1)^2/8$ (text): a false rim at the right", "schlick-direct"),
@@ -164,7 +164,7 @@ def two_rows() -> None:
 
 
 def _rows(masking: str) -> dict[str, object]:
-    """Materials of the ten balls, roughness rising to the left, and the light."""
+    """Materials of the ten balls, roughness increasing to the left, and the light."""
     changes: dict[str, object] = {
         "lights.0.radiance": [0.0, 0.0, 0.0],
         "lights.1": {"type": "directionalLight", "direction": [0.5, -0.55, -1.0], "energy": [3.0, 3.0, 3.0]},

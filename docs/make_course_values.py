@@ -1,8 +1,8 @@
-"""Write docs/course/values: right values of f, E and E_avg, to check a program of one's own against.
+"""Write docs/course/values: reference values of f, E and E_avg for checking one's own program.
 
-python docs/make_course_values.py            # or --check: exit code 1 if a file is not what the code gives
+python docs/make_course_values.py            # or --check: exit code 1 if a file is out of date
 
-Nine digits are stored: more than float32 has, and half the size of all.
+Nine digits are stored: more than float32 has, at half the size of full precision.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def rows(text: str) -> np.ndarray:
 
 
 def made() -> dict[str, str]:
-    """Name of each file -> its text."""
+    """The text of each file, by name."""
     files = {}
     with tempfile.TemporaryDirectory() as folder:
         for path in reference.write(folder):
@@ -37,7 +37,7 @@ def made() -> dict[str, str]:
 
 
 def stale(files: dict[str, str]) -> list[str]:
-    """Files that are missing, superfluous, or differ from `files` by more than another machine's rounding."""
+    """Files that are missing, superfluous, or differ from `files` by more than rounding errors of another machine."""
     stored = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.csv")}
     return [name for name in sorted({*files, *stored}) if not _same(files.get(name), stored.get(name))]
 

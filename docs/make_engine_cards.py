@@ -1,8 +1,8 @@
-"""Write docs/report-cards/engines/: the verdicts on the shaders of engines, from packages of npm that the user has.
+"""Write docs/report-cards/engines/: the verdicts on the shaders of engines, from npm packages that the user provides.
 
     python docs/make_engine_cards.py PACKAGES [--only three,...]     measure, store cards.json, write pages and pictures
-    python docs/make_engine_cards.py [--check]                       the pages again from cards.json; --check: compare
-    python docs/make_engine_cards.py --pictures                      the pictures too
+    python docs/make_engine_cards.py [--check]                       write pages from cards.json, or compare them
+    python docs/make_engine_cards.py --pictures                      draw the pictures too
     python docs/make_engine_cards.py PACKAGES --programs             run the programs without Gonio; store their output
 
 PACKAGES is a folder with one folder per release, each with its package.json, such as three-0.185.1 and three-0.187.0:
@@ -12,7 +12,7 @@ PACKAGES is a folder with one folder per release, each with its package.json, su
 An engine that is not on npm has a folder PAGE-VERSION: bevy-0.19.0, a checkout; materialx-1.39.5, the shaders that
 programs/materialx_generate.py wrote.
 
-What is measured of an engine, and the causes: docs/engine_cases.
+docs/engine_cases declares what is measured of each engine, and the causes of failures.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _order(version: str) -> list[int]:
 
 
 def measured(engine: Engine, package: shaders.Package) -> dict[str, Any]:
-    """All figures of a release."""
+    """All measured values of a release."""
     with tempfile.TemporaryDirectory(prefix="gonio-engine-") as place:
         folder = Path(place)
         if engine.made:
@@ -112,7 +112,7 @@ def _judged(folder: Path, name: str, laws: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _settings(why: list[str]) -> list[tuple[str, str]]:
-    """The parameter values in a verdict's words, "at rough = 0, metal = 0: ..."."""
+    """The parameter values in the text of a verdict, "at rough = 0, metal = 0: ..."."""
     match = re.match(r"at ((?:\w+ = [\d.e+-]+(?:, )?)+):", why[0]) if why else None
     return re.findall(r"(\w+) = ([\d.e+-]+)", match[1]) if match else []
 
@@ -139,13 +139,13 @@ def run_programs(packages: list[shaders.Package]) -> None:
 
 
 def cause(engine: Engine, name: str, law: str, version: str, figures: dict[str, float]) -> str:
-    """The cause of a failure, with figures of the trials, or "unexplained"."""
+    """The cause of a failure, with measured values of the trials, or "unexplained"."""
     text = engine.causes.get((name, law, version)) or engine.causes.get((name, law))
     return text.format_map(figures) if text else "unexplained"
 
 
 def page(engine: Engine, results: dict[str, Any]) -> str:
-    """The page of an engine, from stored figures alone."""
+    """The page of an engine, from stored values only."""
     versions = list(results)
     last = results[versions[-1]]
     shown = " and ".join(versions)
@@ -277,7 +277,7 @@ def overview(stored: dict[str, Any]) -> str:
 
 
 def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
-    """All furnaces of an engine: a row per furnace, a column per release; blue loses light, red gains it."""
+    """Draw all furnaces of an engine: a row per furnace, a column per release; blue loses light, red gains it."""
     columns, rows = len(results), len(engine.furnaces)
     figure, axes = plt.subplots(rows, columns, figsize=(5.2 * columns + 0.8, 3.2 * rows + 0.4), squeeze=False,
                                 constrained_layout=True)  # fmt: skip
@@ -304,7 +304,7 @@ def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
     figure.savefig(path, dpi=114, metadata={"Software": None})
     plt.close(figure)
     with Image.open(path) as drawn:
-        drawn.convert("RGB").quantize(256).save(path, optimize=True)  # a third of the bytes
+        drawn.convert("RGB").quantize(256).save(path, optimize=True)  # a third of the size
 
 
 def written(stored: dict[str, Any]) -> dict[Path, str]:

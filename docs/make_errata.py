@@ -1,6 +1,6 @@
-"""Write docs/errata.md: public threads that doubt a material, each with figures that answer it, computed here.
+"""Write docs/errata.md: public threads that question a material, each with values that answer it, computed here.
 
-python docs/make_errata.py [--check]      --check writes nothing and fails where a figure is not the page's
+python docs/make_errata.py [--check]      --check writes nothing and fails if a value differs from the page's
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SEED = 1
 
 
 def white(roughness: float, **parameters: object) -> go.Metal:
-    """A metal that reflects everything, by the perceptual roughness of shaders."""
+    """A metal that reflects everything, given the perceptual roughness of shaders."""
     return go.Metal(r0=1.0, edge=1.0, alpha=roughness * roughness, **parameters)
 
 
@@ -78,7 +78,7 @@ def blended_metalness() -> str:
         a, b = dfg[row, column]
 
         def lobe(f0: float, a: float = a, b: float = b) -> float:
-            """Single scattering plus the multiple scattering of Fdez-Aguera, for a white light from everywhere."""
+            """Single scattering plus the multiple scattering of Fdez-Aguera, under uniform white light."""
             single, lost, average = f0 * a + b, 1.0 - a - b, f0 + (1.0 - f0) / 21.0
             return single + single * average / (1.0 - lost * average) * lost
 
@@ -165,7 +165,7 @@ def film_in_transmission() -> str:
         sample = film.sample(wo, u)
         weight, up = np.asarray(sample.weight), np.asarray(sample.wi)[:, 2:] > 0
         reflected = np.mean(weight * up, axis=0)
-        transmitted = np.mean(weight * ~up, axis=0) * 1.5**2  # the power: radiance is compressed in the glass
+        transmitted = np.mean(weight * ~up, axis=0) * 1.5**2  # power: in the glass, radiance is higher by eta^2
         show = [" ".join(f"{value:.2f}" for value in one) for one in (reflected, transmitted, reflected + transmitted)]
         rows.append([f"{thickness:g} nm", *show])
     return f"""A thin film must also color the transmitted light, because what is not reflected is transmitted.
@@ -198,7 +198,7 @@ def _hemisphere(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _below(value: float) -> str:
-    """A bound that does not depend on the last bits."""
+    """An upper bound that does not depend on the last bits."""
     return next(f"{bound:g}" for bound in (1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0) if value <= bound)
 
 

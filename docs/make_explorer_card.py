@@ -1,9 +1,9 @@
 """Write docs/report-cards/engines/brdf-explorer.md: the verdicts on the models of the BRDF Explorer.
 
     python docs/make_explorer_card.py BRDFS    measure; BRDFS is the folder src/brdfs of a clone of wdas/brdf
-    python docs/make_explorer_card.py          the page again from explorer.json
+    python docs/make_explorer_card.py          write the page from explorer.json
 
-The files are read where they are; none is part of Gonio.
+The files are read in place; none is part of Gonio.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def page(stored: dict[str, Any]) -> str:
 
 
 def _follows(one: dict[str, str]) -> str:
-    """The words for a failure that another law's explains, such as NaN."""
+    """The explanation of a failure that follows from that of another law, such as NaN."""
     return one["cause"].lower() + "." if one["cause"].startswith("follows from") else ""
 
 

@@ -1,4 +1,4 @@
-"""Makes docs/images/capture.png and fit-to-picture.png: the figures that `gonio capture` and `gonio fit` write.
+"""Draw docs/images/capture.png and fit-to-picture.png: the figures that `gonio capture` and `gonio fit` write.
 
 python docs/make_fit_figures.py [capture] [picture]
 
@@ -31,7 +31,7 @@ def capture(folder: Path) -> None:
 
 
 def picture(folder: Path) -> None:
-    """A picture of a gold ball, and the fit of its width and of the floor's color."""
+    """A picture of a gold ball, and the fit of its alpha and of the floor's color."""
     scene = json.loads(json.dumps(SCENE))
     scene["camera"]["film"]["size"] = [160, 120]
     (folder / "scene.json").write_text(json.dumps(scene))

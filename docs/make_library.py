@@ -1,10 +1,10 @@
-"""Write the figures of the published fits as the package ships them: src/gonio/models/published/*.json.
+"""Write the parameters of the published fits as the package ships them: src/gonio/models/published/*.json.
 
     python docs/make_library.py FOLDER      # with bagher2012.json, low2012.json and ngan2005.json
 
-The files in FOLDER hold what three papers print, as the collection of the BSDF benchmark bsdfbenchmark/bbm transcribed
-it: {fit: {"model": ..., "materials": {name: {parameter: number or list}}}}. Nothing is converted here, only written
-shorter: a list of numbers a material, in the order of `parameters`.
+The files in FOLDER hold the values printed in three papers, as transcribed by the BSDF benchmark bsdfbenchmark/bbm:
+{fit: {"model": ..., "materials": {name: {parameter: number or list}}}}. Nothing is converted; the values are only
+written more compactly, as one list of numbers per material, in the order of `parameters`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SOURCES = {"ngan2005": "Ngan2005", "low2012": "Low2012", "bagher2012": "Bagher20
 
 
 def shipped(fits: dict[str, dict], source: str) -> dict[str, object]:
-    """The figures of one paper in the package's layout."""
+    """The parameters of one paper in the package's layout."""
     found = {}
     for fit, one in fits.items():
         materials = dict(sorted(one["materials"].items()))

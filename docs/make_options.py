@@ -1,6 +1,6 @@
 """Write docs/options.md: every argument and option of every verb, read from the command line itself.
 
-python docs/make_options.py [--check]      --check writes nothing and fails where the page is out of date
+python docs/make_options.py [--check]      --check writes nothing and fails if the page is out of date
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Row(NamedTuple):
     """One argument or option of a verb, as text."""
 
     name: str  # "-o, --output", or the name of an argument
-    value: str  # what it takes; "" for a flag
+    value: str  # its value; "" for a flag
     default: str
     help: str
     is_option: bool
@@ -54,7 +54,7 @@ def commands() -> Iterator[tuple[str, Any]]:
 
 
 def rows(command: Any) -> Iterator[Row]:
-    """The arguments and options of a command, without those that the help leaves out."""
+    """The arguments and options of a command, without those that the help omits."""
     for parameter in command.params:
         if not getattr(parameter, "hidden", False):
             if parameter.param_type_name == "argument":
@@ -94,7 +94,7 @@ def _by_option(verbs: dict[str, list[Row]]) -> Iterator[str]:
 
 
 def _by_verb(verbs: dict[str, list[Row]]) -> Iterator[str]:
-    """A table for each verb."""
+    """One table per verb."""
     yield "\n## By verb"
     for verb, found in verbs.items():
         yield f"\n### gonio {verb}\n"

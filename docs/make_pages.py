@@ -1,7 +1,7 @@
 """Write docs/models/NAME.md for every model, the page that `gonio explain` prints, and the tables of README files.
 
-python docs/make_pages.py [--check] [--tables]   --check writes nothing and fails where a page is out of date
-                                                 --tables leaves out docs/models, which take a minute
+python docs/make_pages.py [--check] [--tables]   --check writes nothing and fails if a page is out of date
+                                                 --tables omits docs/models, which takes a minute
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ GROUPS = {  # folder of gonio.materials -> title, in English and Chinese
     "layered": ("layered", "多层材质"),
     "sheen": ("cloth", "织物"),
     "historic": ("models of published fits", "文献拟合所用模型"),
-    "combined": ("composed of materials", "由材质组合的材质"),
+    "combined": ("composed of other materials", "由材质组合的材质"),
     "measured": ("measured", "测量 BRDF"),
 }
 
@@ -66,7 +66,7 @@ def _told(stale: list[Path]) -> int:
 
 
 def _tables(check: bool) -> list[Path]:
-    """Write the tables between the marks of the pages that have them; the files in which they were out of date."""
+    """Write the tables between the marks of the pages that have them; returns the files that were out of date."""
     tables = {
         "README.md": {"models": _models(0), "gallery": _gallery()},
         "README.zh.md": {"models": _models(1), "gallery": _gallery()},
@@ -98,7 +98,7 @@ def _models(language: int) -> str:
 
 
 def _examples() -> Iterator[tuple[str, str, str, str]]:
-    """Folder, title, file of the picture and caption of every example that shows a picture."""
+    """Folder, title, picture file and caption of every example that shows a picture."""
     for page in sorted((ROOT / "examples").glob("*/README.md")):
         text = page.read_text(encoding="utf-8")
         if picture := PICTURE.search(text):
@@ -115,7 +115,7 @@ def _gallery() -> str:
 
 
 def _index() -> str:
-    """A row for every example: thumbnail, title with a link, and caption."""
+    """One row per example: thumbnail, title with a link, and caption."""
     lines = ["| picture | example | what it shows |", "|---|---|---|"]
     for folder, title, file, caption in _examples():
         thumbnail = f'<a href="{folder}"><img src="{folder}/{file}" width="240" alt="{title}"></a>'
@@ -124,7 +124,7 @@ def _index() -> str:
 
 
 def _alike(old: str, new: str) -> bool:
-    """Whether two pages are the same, up to 10 % in the figures of sampling, which vary with the processor."""
+    """Whether two pages are equal, up to 10 % in the values of sampling quality, which vary with the processor."""
     *lines, last = old.splitlines()
     *new_lines, new_last = new.splitlines()
     figures = [float(number) for number in NUMBER.findall(last)]
@@ -140,7 +140,10 @@ def _sampling(title: str, found: quality.Quality | None) -> str:
     """A paragraph on how well a material samples itself."""
     if found is None:
         return ""
-    return f"\nSampling of `{title}`: {found.words.removeprefix('sampling: ')} ([what that is](../verify.md)).\n"
+    return (
+        f"\nSampling of `{title}`: {found.words.removeprefix('sampling: ')} "
+        "([how these are measured](../verify.md#sampling-quality)).\n"
+    )
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ COLORS = ("#b3403a", "#c98a2b", "#3f7d4f", "#2b5d8a")
 
 
 class EvenPower(go.Phong):
-    """Phong as it is often typed in: pow(dot(v, r), 4), without max(0, ...)."""
+    """Phong as it is often written: pow(dot(v, r), 4), without max(0, ...)."""
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         above = (wo.z > 0.0) & (wi.z > 0.0)
@@ -32,7 +32,7 @@ class EvenPower(go.Phong):
 
 
 class NoHorizon(go.Phong):
-    """Phong without asking on which side the light is: n.l may be negative, and the highlight shines through."""
+    """Phong without a check for the side of the light: n.l may be negative, and the highlight shines through."""
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         base = dot(wo, mirror(wi))
@@ -106,7 +106,7 @@ def below() -> str:
 
 
 def reflected_power(model: go.BSDF, theta: np.ndarray) -> np.ndarray:
-    """Power that leaves in all directions, over the power that a parallel beam at theta brings."""
+    """Power that leaves in all directions, divided by the incident power of a parallel beam at theta."""
     one = subject.of(model)
 
     def leaving(light: np.ndarray, view: np.ndarray) -> np.ndarray:
@@ -172,7 +172,7 @@ def edge() -> list[str]:
         value = slice_of(model, -70.0, theta)
         axes[0].plot(theta, value, color=color, label=f"p = {p:g}")
         zoom = slice_of(model, -20.0, np.linspace(-75.0, -60.0, 400))
-        # the two large powers are 0 here but for less than a line's width, and would hide one another
+        # here the two large powers are 0 to within a line's width, and would hide each other
         axes[1].plot(np.linspace(-75.0, -60.0, 400), zoom, color=color, lw=3.5 if p == 4.0 else 1.5)
         rows.append(f"| {p:g} | {float(slice_of(model, -70.0, np.array([89.99]))[0]) / 0.5:.3f} |")
     axes[0].axvline(90.0, color="#888", lw=0.8, ls=":")

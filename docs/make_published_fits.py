@@ -1,10 +1,10 @@
-"""Write docs/published-fits.md, its pictures and cards.json: what the published fits of the MERL materials are worth.
+"""Write docs/published-fits.md, its pictures and cards.json: how accurate the published fits of the MERL materials are.
 
     python docs/make_published_fits.py [--networks merl.npz] [--only FILE/FIT,...]
 
 merl.npz holds networks of 675 weights for 13 of the materials (Sztrajman2021): `NAME/kernel0..2`, `NAME/bias0..2`.
-Without it, or with --only, nothing is written but the table on the terminal. Nothing here judges by chance: all points
-are the same for every fit.
+Without it, or with --only, only the table on the terminal is written. Nothing is random: all fits are evaluated at the
+same points.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ FOLDER = HERE / "published-fits"
 Array = NDArray[np.float64]
 BRDF = Callable[[Array, Array], Array]
 
-THETA = np.array([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 88.0, 89.5])  # of the view, degrees
-POINTS = 4096  # of a rank-1 lattice, for each view: albedos to about a thousandth
-SIZE = 96  # pixels of a sphere whose differences are stated
+THETA = np.array([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 88.0, 89.5])  # viewing angles, degrees
+POINTS = 4096  # points of a rank-1 lattice per view, for albedos accurate to about a thousandth
+SIZE = 96  # pixels of a sphere whose differences are reported
 BALL, OVERSAMPLING = 136, 3  # pixels of a sphere on a sheet, and samples along each side of one
-SHEETS = 2  # of spheres, each with a share of the materials
+SHEETS = 2  # number of sheets of spheres, among which the materials are divided
 LIGHTS = np.array([[-0.45, 0.55, 0.7], [0.9, 0.35, 0.25], [0.3, -0.75, -0.15]])  # key, rim, and from behind
 
 
 class Card(NamedTuple):
     """One fit of one material.
 
-    gain      largest albedo of a channel over the views, less 1; `at`, in degrees
-    mean      what it gains on average over all views, weighed by their cosine, in its worst channel
-    negative  share of the light that is negative, at the view where it is largest
-    recip     |f(o, i) - f(i, o)| relative to the larger, at worst
-    cosine    variance of cosine sampling over that of its own
+    gain      largest albedo of a channel over the views, minus 1; `at` is that view, in degrees
+    mean      energy gain averaged over all views, weighted by their cosine, in the worst channel
+    negative  fraction of the light that is negative, at the view where it is largest
+    recip     maximum of |f(o, i) - f(i, o)| relative to the larger value
+    cosine    variance of cosine sampling divided by that of the material's own sampling
     """
 
     material: str
@@ -58,7 +58,7 @@ class Card(NamedTuple):
 
     @property
     def severity(self) -> float:
-        """What a picture is wrong by: gained or negative light, on average; the worst view counts a tenth."""
+        """Average error of a picture: gained light and negative light, plus a tenth of the gain at the worst view."""
         return self.mean + self.negative + 0.1 * max(self.gain, 0.0)
 
 
@@ -76,8 +76,8 @@ def polar(theta: Array, phi: Array | float) -> Array:
 
 
 def rusinkiewicz() -> tuple[Array, Array]:
-    """(wo, wi) on the coordinates of MERL's tables, every few of them: theta_h by its square root, theta_d and phi_d
-    evenly; pairs below the surface are left out."""
+    """(wo, wi) on a coarse grid in the coordinates of the MERL tables: theta_h at steps of its square root, theta_d and
+    phi_d evenly spaced; pairs below the surface are omitted."""
     half = (np.arange(24) + 0.5) ** 2 / 24**2 * np.pi / 2
     difference = (np.arange(12) + 0.5) / 12 * np.pi / 2
     turn = (np.arange(12) + 0.5) / 12 * np.pi
@@ -92,7 +92,7 @@ def rusinkiewicz() -> tuple[Array, Array]:
 
 
 def sphere(size: int) -> tuple[Array, Array, Array]:
-    """(mask of the ball's pixels, wo and wi of each and each light in the surface's frame)."""
+    """(mask of the ball's pixels, wo of each pixel, wi of each pixel and light), in the frames of the surface."""
     at = (np.arange(size) + 0.5) / size * 2.1 - 1.05
     x, y = np.meshgrid(at, -at)
     inside = x**2 + y**2 < 1.0
@@ -105,7 +105,7 @@ def sphere(size: int) -> tuple[Array, Array, Array]:
 
 
 def network(weights: dict[str, Array], name: str) -> BRDF:
-    """The network of a material: half and difference vector in, exp(x) - 1 out, ReLU between (Sztrajman2021)."""
+    """The network of a material: input half and difference vector, output exp(x) - 1, ReLU layers (Sztrajman2021)."""
     layers = [(weights[f"{name}/kernel{i}"], weights[f"{name}/bias{i}"]) for i in range(3)]
 
     def f(wo: Array, wi: Array) -> Array:
@@ -134,7 +134,7 @@ _, EYE, TO_LIGHTS = sphere(SIZE)
 
 
 def card(name: str, fit: str) -> Card:
-    """The figures of one fit."""
+    """The measured values of one fit."""
     material = go.material(name, fit)
     wo = np.repeat(polar(np.radians(THETA), 0.35), POINTS, axis=0)
     i = np.arange(POINTS)[:, None]
@@ -143,7 +143,7 @@ def card(name: str, fit: str) -> Card:
     weight = np.where(drawn.pdf[:, None] > 0.0, drawn.weight, 0.0).reshape(len(THETA), POINTS, 3)
     albedo = weight.mean(1)
     row, _ = np.unravel_index(np.argmax(albedo), albedo.shape)
-    # a trapezoid over sin^2, as 2 cos sin dtheta is its step
+    # trapezoidal rule in sin^2, whose differential is 2 cos sin dtheta
     views = np.concatenate([[0.0], np.sin(np.radians(THETA)) ** 2, [1.0]])
     excess = np.maximum(albedo - 1.0, 0.0)
     excess = np.concatenate([excess[:1], excess, excess[-1:]])
@@ -165,7 +165,7 @@ def card(name: str, fit: str) -> Card:
 
 
 def mapped(brdf: BRDF) -> Array:
-    """Cube root of f cos theta_i over MERL's coordinates, flat: in it errors count about as the eye counts them."""
+    """Cube root of f cos theta_i on the grid, flattened; differences of it are roughly perceptually uniform."""
     wo, wi = GRID
     return np.cbrt(brdf(wo, wi) * wi[:, 2:]).ravel()
 
@@ -176,7 +176,7 @@ def picture(brdf: BRDF) -> Array:
 
 
 def radiance(brdf: BRDF, eye: Array, to_lights: Array) -> Array:
-    """Of the points of a sphere, by directions in their frames."""
+    """Radiance of the points of a sphere, from directions in their frames."""
     total = np.zeros((len(eye), 3))
     for wi in to_lights:
         lit = wi[:, 2] > 0.0
@@ -185,13 +185,13 @@ def radiance(brdf: BRDF, eye: Array, to_lights: Array) -> Array:
 
 
 def encoded(total: Array) -> Array:
-    """Linear sRGB as a screen wants it, 0 to 1."""
+    """Linear values encoded as sRGB, 0 to 1."""
     total = np.clip(total, 0.0, 1.0)
     return np.where(total <= 0.0031308, 12.92 * total, 1.055 * total ** (1 / 2.4) - 0.055)
 
 
 def apart(a: Array, b: Array) -> float:
-    """|a - b| over the mean of |a| and |b|."""
+    """|a - b| divided by the mean of |a| and |b|."""
     return float(2.0 * np.linalg.norm(a - b) / (np.linalg.norm(a) + np.linalg.norm(b)))
 
 
@@ -261,7 +261,7 @@ def worst(cards: list[Card], count: int) -> str:
 
 
 class Material(NamedTuple):
-    """A material's fits side by side: cube roots and pictures by fit, the network's under "network"."""
+    """All fits of a material: cube roots and pictures by fit, those of the network under "network"."""
 
     name: str
     values: dict[str, Array]
@@ -272,7 +272,7 @@ class Material(NamedTuple):
 
     @property
     def spread(self) -> float:
-        """Median distance of two of its fits."""
+        """Median distance between two of its fits."""
         fits = [fit for fit in self.values if fit != "network"]
         return float(np.median([self.distance(a, b) for i, a in enumerate(fits) for b in fits[:i]]))
 
@@ -297,7 +297,7 @@ def figure_energy(cards: list[Card]) -> None:
         mine = [c for c in cards if c.fit == fit]
         color = {"b": "#2b5d8a", "l": "#3f7d4f", "n": "#b3403a"}[fit[0]]
         axes[0].plot([1.0 + c.gain for c in mine], [row + 0.0] * len(mine), "|", color=color, markersize=9)
-        ratios = [c.cosine for c in mine if c.cosine is not None]  # None where there is nothing to compare
+        ratios = [c.cosine for c in mine if c.cosine is not None]  # None if there is nothing to compare
         axes[1].plot(ratios, [row] * len(ratios), "|", color=color, markersize=9)
     axes[0].axvline(1.0, color="0.5", lw=0.8)
     axes[1].axvline(1.0, color="0.5", lw=0.8)
@@ -320,7 +320,7 @@ def smooth_sphere(brdf: BRDF) -> Array:
 
 
 def figure_spheres(path: Path, names: list[str], weights: dict[str, Array]) -> None:
-    """A sheet: a column for each material, the network's row above those of the fits."""
+    """Draw a sheet with one column per material, the network's row above those of the fits."""
     fits = ["network", *library.published()]
     dpi, width, label, head = 100, 1280, 320, 112  # pixels
     height = head + len(fits) * BALL + 4
@@ -344,7 +344,7 @@ def figure_spheres(path: Path, names: list[str], weights: dict[str, Array]) -> N
 
 
 def scales() -> str:
-    """Medians, over the materials that are not black, of diffuse parts of Ngan's fits over those of Low's."""
+    """Medians of the ratio of diffuse colors in Ngan's fits to those in Low's, over all non-black materials."""
     fits = library.published()
     low = fits["low2012/cooktorrance_E1"].materials
     rows = []
@@ -362,7 +362,7 @@ def scales() -> str:
 
 
 def rescaled(materials: list[Material]) -> tuple[float, float]:
-    """Median distance of Ngan's fits from the others of the same material: as printed, and with MERL's factors."""
+    """Median distance of Ngan's fits from other fits of the same material: as printed, and with MERL's factors."""
     factor = np.cbrt(np.array([1.0, 1.15, 1.66]))
     plain, mended = [], []
     for m in materials:
@@ -375,7 +375,7 @@ def rescaled(materials: list[Material]) -> tuple[float, float]:
 
 
 def strangers(materials: list[Material]) -> float:
-    """Median distance of two different materials by the same fit, Bagher's."""
+    """Median distance between two different materials, both in Bagher's fit."""
     values = [m.values[library.DEFAULT] for m in materials]
     return float(np.median([apart(a, b) for i, a in enumerate(values) for b in values[:i]]))
 

@@ -1,13 +1,13 @@
-"""Write docs/record.json: the figures that pages state and the pictures that they show, as they were last reviewed.
+"""Write docs/record.json: the numbers that pages state and the pictures that they show, as they were last reviewed.
 
-    python docs/make_record.py --check       what is not as recorded; exit code 1 if there is anything
-    python docs/make_record.py PATH ...      after a review: record these pages and pictures, or a folder's
+    python docs/make_record.py --check       print what differs from the record; exit code 1 if anything does
+    python docs/make_record.py PATH ...      after a review: record these pages and pictures, or those of a folder
 
-Most figures of the documentation take minutes, a GPU or another program to measure, and most pictures take a renderer,
-so no test can make them again. The record holds, by page and section, every number that the page states, and for each
-picture a digest of it and of the scene that it shows. A number, a picture or a scene that has changed fails the tests
-until somebody has measured or rendered again and says so here; in a review, the line that changes shows which figure
-it was. Pages that a test computes anew, or compares with what computes them, are not in the record.
+Most numbers in the documentation take minutes, a GPU or another program to measure, and most pictures need a renderer,
+so that no test can reproduce them. The record holds, by page and section, every number that the page states, and for
+each picture a digest of it and of the scene that it shows. If a number, picture or scene changes, tests fail until
+somebody has measured or rendered again and has recorded it here; the changed line then shows in a review which number
+it was. Pages that a test recomputes, or compares with the program that computes them, are not in the record.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from book import formulas
 ROOT = Path(__file__).parents[1]
 RECORD = ROOT / "docs/record.json"
 
-# made anew and compared by tests: make_options.py, make_scenes.py, make_pages.py, make_engine_cards.py, make_errata.py
+# recomputed and compared by tests: make_options.py, make_scenes.py, make_pages.py, make_engine_cards.py, make_errata.py
 COMPUTED = ("docs/options.md", "docs/scenes.md", "docs/models/", "docs/report-cards/engines/", "docs/errata.md")
-# copies that building the book makes; translations, which a test compares with the English pages
+# copies made when the book is built, and translations, which a test compares with the English pages
 COPIES = ("docs/reference/", "docs/gallery/", "docs/project/")
 # README's tables of pictures and models are made by make_pages.py
 TABLES = re.compile(r"<!-- (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
@@ -38,7 +38,7 @@ WORDS += " nineteen twenty thirty forty fifty hundred thousand million billion h
 NUMBER = re.compile(
     rf"(?<![A-Za-z_\d])-?\.?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?|\b(?:{'|'.join(WORDS.split())})\b", re.IGNORECASE
 )
-# written by programs that take minutes or need files of others: recorded whole
+# written by programs that take minutes or need third-party files; recorded as a whole
 WRITTEN = (
     "docs/phong-limits.md",  # make_phong_limits.py
     "docs/published-fits.md",  # make_published_fits.py
@@ -54,12 +54,12 @@ SOURCES = (".json", ".ply", ".obj", ".hdr", ".glsl", ".toml", ".gonio")
 
 
 def written() -> list[Path]:
-    """The files that are recorded whole."""
+    """The files that are recorded as a whole."""
     return sorted(path for pattern in WRITTEN for path in ROOT.glob(pattern))
 
 
 def pages() -> Iterator[Path]:
-    """The pages that somebody writes, whose figures nothing computes again within a test."""
+    """The pages written by hand, whose numbers no test recomputes."""
     whole = {*written()}
     for page in sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*/*.md")]):
         if page not in whole and not _name(page).startswith(COMPUTED + COPIES) and not page.name.endswith(".zh.md"):
@@ -67,7 +67,7 @@ def pages() -> Iterator[Path]:
 
 
 def pictures() -> Iterator[Path]:
-    """The pictures of the pages and of the gallery, and what its scenes read."""
+    """The pictures of the pages and of the gallery, and the files that the gallery's scenes read."""
     for folder in ("docs", "examples"):
         for path in sorted((ROOT / folder).rglob("*")):
             if path.suffix in PICTURES and not _name(path).startswith(COMPUTED + COPIES):
@@ -75,7 +75,7 @@ def pictures() -> Iterator[Path]:
 
 
 def figures(page: Path) -> dict[str, str]:
-    """The numbers of each section, in digits or words, in their order; those of listings and tables too."""
+    """The numbers of each section in order, in digits or words, including those of listings and tables."""
     found: dict[str, list[str]] = {}
     heading, fenced = "", False
     for line in TABLES.sub("", page.read_text(encoding="utf-8")).splitlines():
@@ -87,7 +87,7 @@ def figures(page: Path) -> dict[str, str]:
 
 
 def digests(file: Path) -> dict[str, str]:
-    """Of the file and, in the gallery, of those of its folder that it shows; JSON by value, whatever its layout."""
+    """Digests of the file and, in the gallery, of the files in its folder that it shows; JSON is compared by value."""
     shown = [file]
     if file.is_relative_to(ROOT / "examples"):
         shown += [path for path in sorted(file.parent.iterdir()) if path.suffix in SOURCES]
@@ -95,7 +95,7 @@ def digests(file: Path) -> dict[str, str]:
 
 
 def set_formulas() -> dict[str, str]:
-    """Of each model's formulas as the book sets them: a test evaluates some of the expressions, and no LaTeX."""
+    """Digests of each model's formulas as the book typesets them: tests evaluate some expressions, but no LaTeX."""
     names = sorted(formulas.RUN.keys() | formulas.SET.keys())
     return {name: _short("\n".join(formulas.of_model(name)).encode()) for name in names}
 
@@ -118,13 +118,13 @@ def _name(path: Path) -> str:
 
 
 def current() -> dict[str, dict[str, str]]:
-    """The record of what is there now, by page or picture."""
+    """The record of the current state, by page or picture."""
     whole = {_name(one): digests(one) for one in [*pictures(), *written()]}
     return {_name(page): figures(page) for page in pages()} | whole | {"docs/book/formulas.py": set_formulas()}
 
 
 def differences(stored: dict[str, dict[str, str]], now: dict[str, dict[str, str]]) -> list[str]:
-    """A line for each section or file that is not as recorded."""
+    """One line per section or file that differs from the record."""
     lines = []
     for name in sorted(stored.keys() | now.keys()):
         old, new = stored.get(name, {}), now.get(name, {})
@@ -135,7 +135,7 @@ def differences(stored: dict[str, dict[str, str]], now: dict[str, dict[str, str]
 
 
 def _change(old: str, new: str) -> str:
-    """The first number that differs, with what it was."""
+    """The first number that differs, with its recorded value."""
     before, after = old.split(), new.split()
     at = next((i for i, pair in enumerate(zip(before, after, strict=False)) if pair[0] != pair[1]), None)
     if at is None:

@@ -2,8 +2,8 @@
 
     python docs/make_report_cards.py [--effort quick|default] [--only NAME,...] [--seed 1]
 
-One page per material, README.md with all failures in order of severity, cards.json with every figure, and in programs/
-a program that needs Mitsuba alone for each failure of its plugins.
+One page per material, README.md with all failures in order of severity, cards.json with all measured values, and in
+programs/, for each failure of a Mitsuba plugin, a program that needs only Mitsuba.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ PROGRAMS = FOLDER / "programs"
 MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
 SHORT = [name for name, law in laws().items() if not law.on_request]
 
-# settings besides the defaults that the verifier itself would not try
+# settings that the verifier would not try by itself, in addition to the defaults
 SETTINGS = {
     "mitsuba:roughconductor": [["distribution=ggx"]],
     "mitsuba:roughdielectric": [["distribution=ggx"]],
     "mitsuba:roughplastic": [["distribution=ggx"]],
 }
 
-# worst first; grades that bias no picture after those that do, those of other materials last
+# worst first: grades that bias pictures, then those that bias none, then those of other materials
 ORDER = [
     *(Grade.BROKEN, Grade.VISIBLE, Grade.SMALL, Grade.INVISIBLE, Grade.NAN),
     *(Grade.NOISE, Grade.FITTING, Grade.INTERFACE, Grade.INNER, Grade.BY_NATURE),
 ]
 
-# issues and pull requests of its authors about the failure or a related one
+# issues and pull requests in Mitsuba's repositories about the failure or a related one
 UPSTREAM = {
     ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
     ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
@@ -86,7 +86,7 @@ def targets() -> list[str]:
 
 
 def trials(target: str) -> list[Any]:
-    """The subjects of a target: its defaults, and other settings."""
+    """The subjects of a target: its defaults and other settings."""
     return [one for settings in ([], *SETTINGS.get(target, [])) for one in resolve(target, settings)]
 
 
@@ -98,7 +98,7 @@ def losses(report: Report) -> dict[str, str]:
 
 
 def summary(report: Report, law: str) -> str:
-    """One cell: the worst of a law over all settings."""
+    """One cell: the worst verdict of a law over all settings."""
     verdicts = [card[law] for card in report.cards]
     failed = sorted((v for v in verdicts if v.failed), key=_rank)
     if failed:
@@ -191,7 +191,7 @@ def _clean(text: str) -> str:
 
 
 def main() -> int:
-    """Write all pages; returns the exit code, 0 whatever the laws say."""
+    """Write all pages; returns the exit code, 0 regardless of the verdicts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--effort", default="default", choices=("quick", "default"))
     parser.add_argument("--only", default="")
@@ -231,7 +231,7 @@ def main() -> int:
 
 
 def overview(results: dict[str, Any], effort: str, seed: int) -> str:
-    """All failures, the worst first, and the tables of all targets."""
+    """All failures, worst first, and the tables of all targets."""
     renderers = f"Gonio {go.__version__} and Mitsuba {version('mitsuba')} (llvm_ad_rgb), {datetime.date.today()}"
     ordered = sorted(results.items(), key=lambda item: (":" in item[0], item[0]))
     lines = [

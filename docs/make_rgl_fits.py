@@ -30,7 +30,7 @@ import rgl_fits as errors  # noqa: E402
 SHOWN = (
     "lambert", "conductor", "cook-torrance", "disney", "lambert+ggx", "lambert+ggx+ggx",
 )  # fmt: skip
-VALUES = 6000  # of each file, for the errors of all models
+VALUES = 6000  # values of each file, for the errors of all models
 BRIGHT = 0.9  # linear value that the brightest pixels of a measured ball get, except the highlight's
 MARGIN, HEAD, LABEL = 6, 30, 84  # pixels
 
@@ -105,7 +105,7 @@ def draw(file: File, path: Path, size: int = BALL) -> None:
 
 
 def of_data(files: Sequence[File]) -> str:
-    """The values that each file offers, and those that count for nothing or are left out."""
+    """The number of values in each file, and of those that have no weight or are left out."""
     rows = []
     for file in files:
         data = file.data
@@ -116,7 +116,7 @@ def of_data(files: Sequence[File]) -> str:
 
 
 def of_errors(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
-    """Errors of all models, a row each, the best of a file in bold."""
+    """Errors of all models, one row per model, the best of each file in bold."""
     found = {(row["model"], row["file"]): row["error"] for row in rows}
     medians = {m: float(np.median([found[m, name] for name in names])) for m in {row["model"] for row in rows}}
     models = sorted(medians, key=lambda m: (medians[m], m))
@@ -131,7 +131,7 @@ def of_errors(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
 
 
 def of_starts(rows: Sequence[dict[str, Any]]) -> str:
-    """How much worse fits are than the best of the random starts, at most, per model."""
+    """The largest excess error of fits relative to the best of the random starts, per model."""
     models = list(dict.fromkeys(row["model"] for row in rows if row["excess"] is not None))
     lines = []
     for model in models:
@@ -145,7 +145,7 @@ def of_starts(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def fitted(path: Path, models: Sequence[str], values: int = VALUES) -> File:
-    """The fits of the models that are shown, to a sample of so many values."""
+    """The fits of the given models to a sample of `values` values."""
     cells = data_of(read(path), where=str(path))
     fits = {model: go.fit(cells.some(values), model) for model in models}
     return File(path.stem, go.Measured(str(path)), cells, fits)

@@ -1,4 +1,4 @@
-"""Write src/gonio/measure/sample.gonio: a small table of a satin paint, half metal of alpha .35, half Lambert's.
+"""Write src/gonio/measure/sample.gonio: a small table of a satin paint, half metal of alpha 0.35, half Lambertian.
 
 python docs/make_sample_table.py
 """
@@ -17,7 +17,7 @@ CELLS = (24, 12, 8)  # theta_h, theta_d, phi_d
 
 
 def main() -> None:
-    """Write it."""
+    """Write the table."""
     paint = go.mix(go.Conductor.preset("Cu", alpha=0.35), go.Lambert((0.10, 0.16, 0.42)), 0.5)
     table = sampled(lambda wo, wi: paint.eval(wo, wi, precision="float64"), CELLS)
     kept = HalfDifference(
@@ -25,7 +25,7 @@ def main() -> None:
         title="satin paint, computed: copper of alpha .35 and a blue Lambert in equal parts",
         source={"format": "gonio", "made": "docs/make_sample_table.py"},
     )
-    kept.values = table.values.astype(np.float32)  # half the bytes; readers make float64 of it
+    kept.values = table.values.astype(np.float32)  # half the size; readers convert it to float64
     TARGET.write_bytes(Own().write(kept))
     print(f"{TARGET.name}: {TARGET.stat().st_size} bytes")
 

@@ -20,11 +20,11 @@ IMAGE = Path(__file__).parent / "images" / "samplers.png"
 WIDTHS = (0.05, 0.2, 0.5, 1.0)
 ANGLES = np.array([0.0, 15.0, 30.0, 45.0, 55.0, 65.0, 72.0, 78.0, 82.0, 85.0, 87.0, 89.0])
 CHOICES = {"normals": "tab:red", "visible": "tab:blue", "bounded": "tab:green"}
-LEAST = 1e-7  # what is less is drawn there
+LEAST = 1e-7  # lower limit of the axis; smaller values are drawn there
 
 
 def variance(material: go.BSDF, degrees: float, points: int) -> tuple[float, float]:
-    """(variance of the weight over its mean squared, share of samples that fail) at an angle."""
+    """(variance of the weight divided by its squared mean, fraction of failed samples) at an angle."""
     count = 1 << points
     u = np.arange(1, count + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) % 1.0
     t = np.radians(degrees)
@@ -48,7 +48,7 @@ def main() -> None:
             panel = axes[row, column]
             for sampling, colour in CHOICES.items():
                 if ndf != "ggx" and sampling == "bounded":
-                    continue  # there it is the same as visible
+                    continue  # there it is identical to `visible`
                 found = [variance(metal(ndf, alpha, sampling), max(a, 0.1), points)[0] for a in ANGLES]
                 panel.plot(ANGLES, np.maximum(found, LEAST), color=colour, label=sampling, marker=".", ms=4)
             panel.set_yscale("log")

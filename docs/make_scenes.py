@@ -1,6 +1,6 @@
 """Write docs/scenes.md: the keys of a scene, read from its JSON Schema.
 
-python docs/make_scenes.py [--check]      --check writes nothing and fails where the page is out of date
+python docs/make_scenes.py [--check]      --check writes nothing and fails if the page is out of date
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ TITLES = {
     "gonio__scene__values__NormalMap": "normalmap",
 }  # fmt: skip
 EVERY = "Every material accepts these keys in addition to its parameters."
-# what a union of objects is called where a key takes any of them
+# names of unions, for keys that accept any of several objects
 UNIONS = {
     "a shape": SECTIONS["Shapes"][:7],
     "a light": SECTIONS["Lights"],
@@ -85,7 +85,7 @@ def main() -> int:
 
 
 def page(schema: dict[str, Any]) -> str:
-    """The page, in Markdown. Raises AssertionError for an object of the format that no section shows."""
+    """The page in Markdown. Raises AssertionError for an object of the format that no section shows."""
     parts = schema["$defs"]
     materials = {one["$ref"].rpartition("/")[2] for one in parts["AnyMaterial"]["oneOf"] if "$ref" in one}
     shown = {name for names in SECTIONS.values() for name in names}
@@ -135,7 +135,7 @@ def _object(title: str, part: dict[str, Any]) -> list[str]:
 
 
 def _allowed(about: dict[str, Any]) -> str:
-    """The values of a key, in words."""
+    """The allowed values of a key, in words."""
     if "$ref" in about:
         name = about["$ref"].rpartition("/")[2]
         union = next((union for union, members in UNIONS.items() if name in members), "")

@@ -1,4 +1,4 @@
-"""Write docs/thin-film.md and its picture: how far the colours of both thin films are from an exact multilayer.
+"""Write docs/thin-film.md and its picture: how far the colors of the two thin films are from an exact multilayer.
 
 python docs/make_thin_film.py          takes a minute; needs `tmm` (in the extra `dev`)
 """
@@ -26,7 +26,7 @@ import sheets  # noqa: E402
 Floats = NDArray[np.float64]
 
 NM = np.arange(380.0, 781.0, 5.0)
-SYMBOLS = ("Ag", "Al", "Au", "Cr", "Cu", "Hg", "Ni", "W")  # those whose whole spectrum Mitsuba ships
+SYMBOLS = ("Ag", "Al", "Au", "Cr", "Cu", "Hg", "Ni", "W")  # metals whose full spectrum Mitsuba ships
 FORMS = {"belcour-barla": "Belcour-Barla", "local": "local"}
 THICKNESSES = np.array([50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800, 1000, 1200, 1400, 1600, 2000], float)
 ANGLES = np.array([0.0, 30.0, 45.0, 60.0, 75.0, 85.0])
@@ -46,7 +46,7 @@ def index_of(symbol: str) -> NDArray[np.complex128]:
 
 
 def exact(n: NDArray[np.complex128], film: float, thickness: float, degrees: float) -> Floats:
-    """XYZ of the reflected daylight by the transfer matrices of all layers, white being Y = 1."""
+    """XYZ of reflected daylight by the transfer-matrix method, with Y = 1 for white."""
     reflected = [
         np.mean(
             [tmm.coh_tmm(p, [1, film, at], [np.inf, thickness, np.inf], np.radians(degrees), nm)["R"] for p in "sp"]
@@ -58,7 +58,7 @@ def exact(n: NDArray[np.complex128], film: float, thickness: float, degrees: flo
 
 
 def modelled(form: str, n: NDArray[np.complex128], film: float) -> Floats:
-    """XYZ by a material of three colours, (thickness, angle, 3), which has the metal's index at 650, 550 and 450 nm."""
+    """XYZ by an RGB material, (thickness, angle, 3), with the metal's index at 650, 550 and 450 nm."""
     three = np.interp(RGB_WAVELENGTHS, NM, n)
     rows, columns = np.meshgrid(THICKNESSES, np.radians(ANGLES), indexing="ij")
     wo = np.stack([np.sin(columns), 0.0 * columns, np.cos(columns)], -1).reshape(-1, 3)
@@ -67,7 +67,7 @@ def modelled(form: str, n: NDArray[np.complex128], film: float) -> Floats:
     return np.asarray(rgb @ np.linalg.inv(colour.XYZ_TO_RGB).T).reshape(*rows.shape, 3)
 
 
-# ---------------------------------------------------------------------- colour differences
+# ---------------------------------------------------------------------- color differences
 
 
 def lab(xyz: Floats) -> Floats:
@@ -78,7 +78,7 @@ def lab(xyz: Floats) -> Floats:
 
 
 def delta_e(one: Floats, other: Floats) -> Floats:
-    """CIE Delta E 2000 of two colours in L*a*b* (Sharma2005)."""
+    """CIE Delta E 2000 of two colors in L*a*b* (Sharma2005)."""
     (l1, a1, b1), (l2, a2, b2) = np.moveaxis(one, -1, 0), np.moveaxis(other, -1, 0)
     mean7 = (0.5 * (np.hypot(a1, b1) + np.hypot(a2, b2))) ** 7
     g = 1 + 0.5 * (1 - np.sqrt(mean7 / (mean7 + 25.0**7)))
@@ -100,7 +100,7 @@ def delta_e(one: Floats, other: Floats) -> Floats:
 
 
 def check() -> None:
-    """Pairs that Sharma2005 prints."""
+    """Check `delta_e` against pairs printed in Sharma2005."""
     for one, other, right in (
         ((50, 2.6772, -79.7751), (50, 0, -82.7485), 2.0425),
         ((50, -1.3802, -84.2814), (50, 0, -82.7485), 1.0),
@@ -114,7 +114,7 @@ def check() -> None:
 
 
 def table(head: str, rows: list[tuple[str, Callable[[Floats], Floats]]], found: dict[str, Floats]) -> str:
-    """Mean and worst of each form, of what each row picks."""
+    """Mean and maximum of each form, one row per selection."""
     lines = [f"| {head} | " + " | ".join(f"{name}, mean | {name}, worst" for name in FORMS.values()) + " |"]
     lines.append("|---|" + "---|" * (2 * len(FORMS)))
     for label, pick in rows:
@@ -124,7 +124,7 @@ def table(head: str, rows: list[tuple[str, Callable[[Floats], Floats]]], found: 
 
 
 def picture(truth: Floats, models: dict[str, Floats]) -> None:
-    """Strips of colour over the thickness, of three metals from above."""
+    """Color strips over film thickness, for three metals at normal incidence."""
     shown = ("Au", "Cr", "Cu")
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     axes = figure.subplots(len(shown), 1)
@@ -140,7 +140,7 @@ def picture(truth: Floats, models: dict[str, Floats]) -> None:
 
 
 def balls(size: int = 300, spp: int = 64) -> None:
-    """Titanium under its oxide, and the skin of a bubble, over the thickness, in the dark studio of all models."""
+    """Balls of oxidized titanium and soap bubbles of increasing film thickness, in the dark studio of all models."""
     cells = []
     for nm in (0, 25, 50, 100, 160, 220, 300, 450):
         cells.append((nm, go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))))
@@ -148,7 +148,7 @@ def balls(size: int = 300, spp: int = 64) -> None:
         cells.append((nm, go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=float(nm))))
 
     def ball(material: go.BSDF) -> Floats:
-        # a bubble is seen through, which takes a path of several segments
+        # light passes through a bubble, so its paths have several segments
         values = {"shapes.0.material": material}
         return go.render(
             EXAMPLES / "all-models", overrides=values, size=(size, size), spp=spp, integrator="path", max_depth=8,
@@ -161,7 +161,7 @@ def balls(size: int = 300, spp: int = 64) -> None:
 
 
 def encoded(linear: Floats) -> Floats:
-    """Linear sRGB as a screen wants it."""
+    """Linear values encoded as sRGB."""
     held = np.clip(linear, 0.0, 1.0)
     return np.asarray(np.where(held < 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055))
 
@@ -245,7 +245,7 @@ def main() -> None:
 
 
 def words(found: dict[str, Floats]) -> str:
-    """What the tables say, in figures."""
+    """The text that states the results of the tables."""
     share = {form: np.mean(e < 2.0) for form, e in found.items()}
     thin = THICKNESSES <= 800
     near = {form: e[:, :, thin].mean() for form, e in found.items()}

@@ -1,4 +1,4 @@
-"""Makes docs/images/three.png: the page of docs/guides/three.html in Chromium, with the bundle that the guide emits.
+"""Take docs/images/three.png: the page of docs/guides/three.html in Chromium, with the bundle that the guide emits.
 
 python docs/make_three_picture.py          needs three.js (`npm ci` in web/)
 """

@@ -1,4 +1,4 @@
-"""Makes docs/images/viewer.webp: the page of `gonio view`, the studio turning about the balls, then a furnace.
+"""Record docs/images/viewer.webp: the page of `gonio view`, with the studio rotating around the balls, then a furnace.
 
 python docs/make_viewer_animation.py
 """
@@ -20,11 +20,11 @@ sys.path.insert(0, str(ROOT / "tests"))
 import browser  # noqa: E402
 
 OUTPUT = ROOT / "docs" / "images" / "viewer.webp"
-SIZE = {"width": 1280, "height": 560}  # so wide that the bar of terms is whole
-TURNS, STILLS = 32, 10  # frames of the turning studio, and of the furnace
+SIZE = {"width": 1280, "height": 560}  # wide enough for the whole bar of terms
+TURNS, STILLS = 32, 10  # frames of the rotating studio, and of the furnace
 MILLISECONDS = 110
-SAMPLES = 16  # per pixel, for smooth silhouettes; the split sum itself has no noise
-QUALITY = 95  # lower ones show blocks on the rough balls
+SAMPLES = 16  # samples per pixel, for smooth silhouettes; the split sum itself has no noise
+QUALITY = 95  # lower values show blocks on the rough balls
 MAX_BYTES = 2_000_000
 
 
@@ -33,20 +33,20 @@ def main() -> None:
 
 
 def frames() -> list[Image.Image]:
-    """The page at each turn of the studio, then in the furnace."""
+    """The page at each rotation of the studio, then in the furnace."""
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
         path = page.export(stage.opening(), Path(folder) / "page.html")
         tab = chromium.new_page(viewport=SIZE)
         tab.goto(path.as_uri())
         tab.wait_for_function("() => window.gonio?.frames > 0")
         tab.evaluate("() => gonio.setState((state) => { state.environment = 'split-sum'; })")
-        tab.wait_for_function(f"() => gonio.app.picture().samples >= {4 * SAMPLES}", timeout=300_000)  # its maps too
+        tab.wait_for_function(f"() => gonio.app.picture().samples >= {4 * SAMPLES}", timeout=300_000)  # maps too
         turning = [_frame(tab, f"state.lights[0].rotation = {2 * math.pi * turn / TURNS}") for turn in range(TURNS)]
         return turning + [_frame(tab, "state.furnace = true")] * STILLS
 
 
 def save(shown: list[Image.Image]) -> None:
-    """Write the animation; an error where it is too large for a page."""
+    """Write the animation. Raises an error if it is too large for a page."""
     first, *others = shown
     first.save(OUTPUT, save_all=True, append_images=others, duration=MILLISECONDS, loop=0, quality=QUALITY, method=6)
     size = OUTPUT.stat().st_size

@@ -1,4 +1,5 @@
-"""Makes docs/images/viewer.png: the page of `gonio view` in Chromium, shader on the left of the wipe, reference right.
+"""Take docs/images/viewer.png: the page of `gonio view` in Chromium, with the shader left and the reference right of
+the wipe.
 
 python docs/make_viewer_picture.py
 """
@@ -28,7 +29,7 @@ SETTINGS = """() => gonio.setState((state) => {
 
 
 def main() -> None:
-    engine.load()  # first of all: with an LLVM that works
+    engine.load()  # first, so that an LLVM that works is used
     access = server.AccessControl("127.0.0.1")
     one = server.Server(server.Application(stage.opening(), access), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)

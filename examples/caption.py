@@ -2,9 +2,9 @@
 
     python examples/caption.py examples/conductor-ggx/print.json conductor-ggx.png 0.01 0.25 0.5 0.75 0.99
 
-takes one text for each sphere of the scene, in its order ("" for none), and draws it below the sphere as the camera
-sees it. `--rows` names rows of balls along the left edge, from the top; `--outlines` draws the outline of each ball,
-dashed, for balls that cannot be seen. The picture is replaced; `-o` names another.
+takes one text for each sphere of the scene, in order ("" for none), and draws it below the sphere in the picture.
+`--rows` labels rows of balls along the left edge, from the top; `--outlines` draws a dashed outline of each ball, for
+balls that cannot be seen. The picture is replaced unless `-o` names another.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-TEXT_HEIGHT = 0.024  # of the picture's width: 31 pixels of 1,280
+TEXT_HEIGHT = 0.024  # relative to the picture's width: 31 pixels for 1,280
 LIGHT, DARK = (235, 235, 235), (40, 40, 40)
 
 
@@ -45,7 +45,7 @@ def font(size: float) -> ImageFont.FreeTypeFont:
 
 
 def write(picture: Image.Image, at: tuple[float, float], text: str, size: float, anchor: str) -> None:
-    """Write a text at a pixel: light on dark or dark on light, and on a plate where the ground is structured."""
+    """Write text at a pixel: light on dark or dark on light, and on a plate if the background has structure."""
     draw = ImageDraw.Draw(picture, "RGBA")
     left, top, right, bottom = draw.textbbox(at, text, font(size), anchor)
     plate = (left - 0.3 * size, top - 0.2 * size, right + 0.3 * size, bottom + 0.2 * size)
@@ -84,7 +84,7 @@ def caption(scene: dict, picture: Image.Image, names: list[str], rows: list[str]
         raise SystemExit(f"{len(rows)} names for {len(levels)} rows")
     pitch = min(np.diff(levels), default=picture.height)
     longest = max((font(size).getlength(name) for name in rows), default=1.0)
-    small = size * min(0.9, 0.65 * pitch / longest)  # so that two names do not read as one
+    small = size * min(0.9, 0.65 * pitch / longest)  # so that adjacent names do not run together
     for name, level in zip(rows, levels, strict=False):
         turned = picture.rotate(-90, expand=True)  # so that the text reads upward
         write(turned, (picture.height - level, 0.9 * size), name, small, "mm")

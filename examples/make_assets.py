@@ -1,4 +1,4 @@
-"""Make the images and meshes that the examples use. Run it to get them again: python examples/make_assets.py"""
+"""Generate the images and meshes that the examples use: python examples/make_assets.py"""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ HERE = Path(__file__).parent
 
 
 def png(path: str, values: np.ndarray) -> None:
-    """Values in [0, 1], (height, width, 3), as bytes: v = byte / 255."""
+    """Write values in [0, 1], (height, width, 3), as bytes: v = byte / 255."""
     (HERE / path).write_bytes(images.png_bytes(np.rint(values * 255).astype(np.uint8)))
 
 
 def checker(cells: int, dark: tuple[float, ...], bright: tuple[float, ...]) -> np.ndarray:
-    """One texel a cell; for filter "nearest"."""
+    """A checkerboard with one texel per cell, for filter "nearest"."""
     odd = np.add.outer(np.arange(cells), np.arange(cells)) % 2
     return np.where(odd[..., None] == 1, dark, bright)
 
@@ -37,22 +37,22 @@ def sphere(height: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scattered(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Points anywhere on the unit sphere, (count, 3)."""
+    """Random points on the unit sphere, (count, 3)."""
     points = rng.standard_normal((count, 3))
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
 def hammered(height: int, dents: int, seed: int, depth: float = 0.055) -> np.ndarray:
-    """Normal map of round dents over a sphere, (height, 2 height, 3), as a hammer leaves them.
+    """Normal map of a hammered sphere with round dents, (height, 2 height, 3).
 
-    A place lies in the dent whose center is nearest: its floor is a bowl, and bowls meet in ridges. Tangent along u;
+    Each point belongs to the dent with the nearest center. Dents are bowls, which meet in ridges. Tangent along u;
     bitangent = normal x tangent, which on a sphere points up (-v).
     """
     rng = np.random.default_rng(seed)
     centers = scattered(rng, dents)
     place, phi = sphere(height)
     nearest = centers[np.argmax(place @ centers.T, axis=-1)]
-    away = place - nearest  # the slope of a bowl grows in proportion
+    away = place - nearest  # the slope of a bowl is proportional to it
     east = np.stack([-np.sin(phi), np.cos(phi), np.zeros_like(phi)], -1)
     steep = depth * dents**0.5
     slope_u = steep * np.sum(away * east, -1)
@@ -76,7 +76,7 @@ def terrazzo(height: int, chips: int, seed: int) -> np.ndarray:
 
 
 def cloudy(size: int, seed: int, octaves: range) -> np.ndarray:
-    """Smooth noise of a few octaves that tiles, contrast raised, 0 to 1."""
+    """Smooth tileable noise of a few octaves with increased contrast, 0 to 1."""
     rng = np.random.default_rng(seed)
     total = np.zeros((size, size))
     for octave in octaves:
@@ -89,12 +89,12 @@ def cloudy(size: int, seed: int, octaves: range) -> np.ndarray:
 
 
 def worn(size: int) -> np.ndarray:
-    """Roughness of a worn surface, .1 to .6."""
+    """Roughness of a worn surface, 0.1 to 0.6."""
     return np.repeat((0.1 + 0.5 * cloudy(size, 8, range(2, 6)))[..., None], 3, axis=2)
 
 
 def maria(height: int) -> np.ndarray:
-    """Albedo of a moon, (height, 2 height, 3): dark plains in bright highlands, craters, rays about the youngest."""
+    """Albedo of a moon, (height, 2 height, 3): dark plains in bright highlands, craters, rays around the youngest."""
     rng = np.random.default_rng(11)
     place, _ = sphere(height)
 
@@ -131,7 +131,7 @@ def shore_sky(height: int) -> np.ndarray:
     )
     up = np.clip(np.cos(theta), 0.0, 1.0)[..., None]
     blue = np.array([0.95, 0.95, 0.9]) * (1.0 - up) ** 3 + np.array([0.1, 0.3, 0.72]) * (1.0 - (1.0 - up) ** 3)
-    # Clouds as on a map seen from below, so that they have no seam at the zenith.
+    # Clouds in a planar projection from below, so that they have no seam at the zenith.
     radius = height / 2.0 * np.tan(np.minimum(theta, 1.45) / 2.0)
     place = [height / 2.0 + radius * f(phi) for f in (np.cos, np.sin)]
     cover, relief = (
@@ -147,7 +147,7 @@ def shore_sky(height: int) -> np.ndarray:
 
 
 def sky(height: int) -> np.ndarray:
-    """A studio: dim grey-blue walls, a floor, two soft boxes. Row t = angle from +y, column p = angle from +z to +x."""
+    """A studio: dim gray-blue walls, a floor, two soft boxes. Row t = angle from +y, column p = angle from +z to +x."""
     theta, phi = np.meshgrid(
         (np.arange(height) + 0.5) / height * math.pi, (np.arange(2 * height) + 0.5) / height * math.pi, indexing="ij"
     )
@@ -210,13 +210,13 @@ def shell(radius: float, inner: float, rows: int = 40, columns: int = 80) -> tup
 
 
 def obj(path: str, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """A faceted mesh as text; faces count from 0."""
+    """Write a faceted mesh as an .obj file; indices in `faces` start at 0."""
     lines = [*("v {:.9g} {:.9g} {:.9g}".format(*v) for v in vertices), *("f {} {} {}".format(*f) for f in faces + 1)]
     (HERE / path).write_text("\n".join(lines) + "\n")
 
 
 def convex(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The hull of points, its triangles counter-clockwise from outside."""
+    """The convex hull of points, with triangles counterclockwise as seen from outside."""
     hull = ConvexHull(vertices)
     faces = hull.simplices.copy()
     a, b, c = (vertices[faces[:, i]] for i in range(3))
@@ -226,20 +226,20 @@ def convex(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def prism(turn: float, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """An upright prism of side 1; its base runs along x, turned toward -z, its apex points to +z."""
+    """An upright prism of side 1; its base runs along x, rotated toward -z, its apex points to +z."""
     along, apex = np.array([math.cos(turn), -math.sin(turn)]), np.array([math.sin(turn), math.cos(turn)])
     corners = [apex / math.sqrt(3.0), *(-apex / math.sqrt(12.0) + side * along / 2.0 for side in (-1.0, 1.0))]
     return convex(np.array([[x, y, z] for y in (0.0, height) for x, z in corners]))
 
 
 def brilliant() -> tuple[np.ndarray, np.ndarray]:
-    """A round brilliant of radius 1, 57 facets and the girdle, with Tolkowsky's proportions; its table faces +y."""
+    """A round brilliant of radius 1 with 57 facets, a girdle and Tolkowsky's proportions; its table faces +y."""
     crown, pavilion, table, girdle = math.radians(34.5), math.radians(40.75), 0.53, 0.02
     top = girdle + (1.0 - table) * math.tan(crown)
     planes = [(0.0, 1.0, 0.0, top)]
 
     def ring(count: int, first: float, angle: float, radius: float, height: float) -> None:
-        """Facets tilted by `angle`, through the point at that radius and height; below the girdle it is negative."""
+        """Add facets tilted by `angle`, negative below the girdle, through the point at that radius and height."""
         for number in range(count):
             around = math.radians(first) + number * 2.0 * math.pi / count
             sin, cos = math.sin(abs(angle)), math.copysign(math.cos(angle), angle)
@@ -257,12 +257,12 @@ def brilliant() -> tuple[np.ndarray, np.ndarray]:
 
 
 def tube(points: np.ndarray, radius: float, sides: int = 48) -> tuple[np.ndarray, ...]:
-    """A rod along points, smooth outside, with flat ends."""
+    """A rod along points, with a smooth outside and flat ends."""
     along = np.gradient(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = np.zeros_like(along)
     across[0] = np.cross(along[0], [0.0, 1.0, 0.0])
-    for i in range(1, len(points)):  # carried along without a twist
+    for i in range(1, len(points)):  # transport the frame without twist
         across[i] = across[i - 1] - along[i] * (along[i] @ across[i - 1])
         across[i] /= np.linalg.norm(across[i])
     other = np.cross(along, across)
@@ -286,7 +286,7 @@ def tube(points: np.ndarray, radius: float, sides: int = 48) -> tuple[np.ndarray
 
 
 def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
-    """Water of some waves over [-size, size]^2: heights by a sum of sines, normals by their slopes."""
+    """A water surface with waves over [-size, size]^2: heights from a sum of sines, normals from its slopes."""
     rng = np.random.default_rng(4)
     x, z = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-size, size, cells + 1)] * 2, indexing="ij"))
     level, slope_x, slope_z = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
@@ -306,10 +306,10 @@ def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
 
 
 def turned(profile: np.ndarray, sides: int) -> tuple[np.ndarray, ...]:
-    """A solid turned on a lathe about +y from a profile of (radius, height); u runs around it, v along the profile.
+    """A solid of revolution about +y from a profile of (radius, height); u runs around it, v along the profile.
 
-    The profile runs counterclockwise about what is inside, as seen with the axis on the left: up the outside. Corners
-    sharper than 40 degrees stay sharp, because their points are given once for each side.
+    With the axis on the left, the profile runs counterclockwise around the inside: up the outside. Corners sharper than
+    40 degrees remain sharp, because their points are duplicated, once for each side.
     """
     steps = np.diff(profile, axis=0)
     outward = np.stack([steps[:, 1], -steps[:, 0]], 1) / np.linalg.norm(steps, axis=1, keepdims=True)
@@ -341,7 +341,7 @@ def turned(profile: np.ndarray, sides: int) -> tuple[np.ndarray, ...]:
 
 
 def draped(radius: float, height: float, folds: int, rows: int = 36, columns: int = 132) -> tuple[np.ndarray, ...]:
-    """A cloth over a ball on the ground: smooth on the ball, in folds of rising depth below its equator."""
+    """A cloth over a ball on the ground: smooth on the ball, in folds of increasing depth below its equator."""
     along = np.linspace(0.0, 1.0, rows + 1)[:, None]
     turn = np.linspace(0.0, 2.0 * math.pi, columns + 1)[None, :]
     arc = along * (math.pi / 2.0 * radius + height)  # length from the top
@@ -366,7 +366,7 @@ def draped(radius: float, height: float, folds: int, rows: int = 36, columns: in
 
 
 def goblet() -> tuple[np.ndarray, np.ndarray]:
-    """Profiles of a wine glass 2.6 high, and of the wine in it, which reaches half into the wall of the glass."""
+    """Profiles of a wine glass of height 2.6, and of the wine, which extends halfway into the wall of the glass."""
     bowl = np.linspace(-math.pi / 2.0 + 0.12, 0.95, 22)
     outer = np.stack([0.72 * np.cos(bowl), 1.78 + 0.82 * np.sin(bowl)], 1)
     inner = np.stack([0.69 * np.cos(bowl), 1.79 + 0.79 * np.sin(bowl)], 1)
@@ -380,17 +380,17 @@ def goblet() -> tuple[np.ndarray, np.ndarray]:
 
 
 def knob() -> np.ndarray:
-    """Profile of the ring between side and face of a hi-fi knob of radius 1 and height 0.9."""
+    """Profile of the ring between the side and the face of a hi-fi knob of radius 1 and height 0.9."""
     turn = np.linspace(0.0, math.pi / 2.0, 7)
     return np.stack([0.94 + 0.06 * np.cos(turn), 0.84 + 0.06 * np.sin(turn)], 1)
 
 
 def photographs() -> None:
-    """A ball of brown paint under one lamp after the other, as a camera takes it; lengths in millimetres."""
+    """Photographs of a ball of brown paint under one lamp after another; lengths in millimeters."""
     center, distance = np.array([0.0, 0.0, 500.0]), 400.0
     lamps = {}
     for name, angles in (("right", (20, 0)), ("below", (50, 100)), ("left", (80, 220)), ("above", (35, 300))):
-        theta, phi = np.radians(angles)  # from the camera as seen from the ball, and about that axis
+        theta, phi = np.radians(angles)  # angle from the camera as seen from the ball, and azimuth about that axis
         toward = np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), -math.cos(theta)])
         lamps[name] = {"position": (center + distance * toward).round(2).tolist(), "intensity": distance**2}
     calibration = {

@@ -1,4 +1,4 @@
-"""Sheets of pictures with titles, for the programs of the gallery."""
+"""Sheets of pictures with titles, for programs in the gallery."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from gonio.pictures import images
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 
-WIDTH = 1280  # pixels of a sheet
+WIDTH = 1280  # width of a sheet, pixels
 DPI = 100
 TEXT = "#e4e4e4"
 BACKGROUND = "#15171b"
-LETTERS = 28.0  # pixels; a page may show the sheet at half its width
+LETTERS = 28.0  # font size in pixels; a page may show the sheet at half its width
 POINTS = LETTERS * 72.0 / DPI
-LINE = 1.25 * LETTERS / DPI  # inches from one line of text to the next
+LINE = 1.25 * LETTERS / DPI  # line spacing, inches
 GAP = 0.08  # inches between pictures
 BACKDROP = 0.05  # radiance behind a ball, so that its unlit side has an outline
 
@@ -43,9 +43,9 @@ def draw(
 ) -> Path:
     """Write pictures of linear radiance, (height, width, 3) each, in rows of `columns`, each below its title.
 
-    names   of the parts that each picture shows side by side, written at its foot
-    rows    of the rows, written upward at the left
-    Titles are of one size, and of as many lines as they have; a row without a title has no space for one.
+    names   labels of the parts that each picture shows side by side, written at its lower edge
+    rows    labels of the rows, written upward at the left
+    Titles have the same font size and may have several lines; a row without titles has no space for them.
     """
     height, width = cells[0][1].shape[:2]
     margin = GAP + (LINE if rows else 0.0)
@@ -90,9 +90,9 @@ def shaded(
     backdrop: float = BACKDROP,
     oversampling: int = 3,
 ) -> np.ndarray:
-    """A ball under one directional light, (size, size, 3), as a shader computes it: nothing casts a shadow.
+    """A ball under one directional light, (size, size, 3), as a shader computes it, without shadows.
 
-    light         direction toward the light in the frame of the picture: x to the right, y up, z to the viewer
+    light         direction toward the light in the frame of the picture: x to the right, y up, z toward the viewer
     backdrop      radiance behind the ball
     oversampling  samples along each side of a pixel; the radiance of a pixel is their mean
     """
@@ -115,6 +115,6 @@ def tangent_frames(n: np.ndarray) -> np.ndarray:
 
 
 def averaged(pixels: np.ndarray, block: int) -> np.ndarray:
-    """The mean of each block of `block` by `block` pixels, of a square picture."""
+    """The mean of each block of `block` x `block` pixels of a square picture."""
     size = len(pixels) // block
     return pixels.reshape(size, block, size, block, -1).mean((1, 3))

@@ -158,7 +158,7 @@ def trial(kind: str, folder: Path, seed: int, length: float, kills: int) -> tupl
             continue
         if process.returncode:
             return False, warned
-        told.append("went on" if "goes on" in warned else "from the start")
+        told.append("went on" if "continues" in warned else "from the start")
         break
     same = content(folder, "killed") == content(folder, "whole")
     return same, f"{'same bits' if same else 'OTHER BITS'} ({took:.1f} s whole; {'; '.join(told)})"

@@ -123,7 +123,7 @@ def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.M
     baked = go.bake("ggx", resolution=4, lut=["E"])
     assert baked.arrays["E"].shape == (4, 4) and list(tmp_path.iterdir()) == []
     assert go.bake("conductor(preset=Au)", resolution=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
-    for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "without parameters")):
+    for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "which has no parameters")):
         with pytest.raises(InputError, match=message):
             go.bake(target)
 

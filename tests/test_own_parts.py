@@ -6,6 +6,8 @@ from __future__ import annotations
 import json
 import pickle
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -311,7 +313,7 @@ def test_a_power_by_two_stars_is_one_message(here: Path, command: str, capsys: p
 def test_an_error_in_a_loop_names_the_users_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", "sub/loop.py:Looked", "--spp", "1", "--size", "8x8", "-o", "a.exr") == 2
     told = capsys.readouterr().err
-    assert "loop.py:13" in told and "see above" not in told and "fault of Gonio" not in told
+    assert "loop.py:13" in told and "see above" not in told and "bug in Gonio" not in told
     with pytest.raises(go.InputError, match=r"loop\.py:13"):
         go.render(notation.named("sub/loop.py:Looked")[0], spp=1, size=(8, 8))
     # a notebook keeps the error, which must not keep the scene: virtual calls would go to its material too
@@ -323,3 +325,18 @@ def test_an_error_in_a_loop_names_the_users_line(here: Path, capsys: pytest.Capt
     with pytest.raises(go.InputError, match=r"/given/loop\.py:13"), tiles._places_as_given():
         go.render(notation.named("sub/loop.py:Looked")[0], spp=1, size=(8, 8))
     tiles._copies.clear()
+
+
+def test_a_class_that_comes_by_a_pipe_is_judged_although_its_file_cannot_be_opened() -> None:
+    program = """
+import gonio as go
+from gonio.catalog import outside
+
+class Pale(go.BSDF):
+    def eval(self, wo, wi, mode="radiance"):
+        return wi.z * go.ops.inv_pi
+
+outside.check_operators(Pale())
+"""
+    done = subprocess.run([sys.executable, "-"], input=program, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -148,6 +148,6 @@ def test_a_plugin_of_another_variant_is_refused_in_words() -> None:
     w = np.array([[0.0, 0.0, 1.0]])
     rough = foreign.load({"type": "roughplastic"})
     before = rough.eval(w, w)
-    with engine.using("llvm_ad_spectral"), pytest.raises(InputError, match="of variant llvm_ad_rgb"):
+    with engine.using("llvm_ad_spectral"), pytest.raises(InputError, match="in variant llvm_ad_rgb"):
         rough.eval(w, w)
     np.testing.assert_array_equal(rough.eval(w, w), before)

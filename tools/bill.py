@@ -1,9 +1,9 @@
-"""A software bill of materials: what an installed Gonio consists of, as CycloneDX 1.6 JSON.
+"""A software bill of materials: the components of an installed Gonio, as CycloneDX 1.6 JSON.
 
-    python tools/bill.py dist/gonio.cdx.json         # of the environment whose Python runs it
+    python tools/bill.py dist/gonio.cdx.json         # for the environment whose Python runs it
 
-Lists Gonio, every package that it requires here with its version, license and the hash of its list of files, which
-names each file with its own; and what the page's script contains, by web/package-lock.json.
+It lists Gonio and every package that it requires here, each with its version, its license and the hash of its RECORD,
+which contains the hash of each file; and the packages in the page's script, from web/package-lock.json.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ NAME = "gonio"
 
 
 def key(name: str) -> str:
-    """A package's name as indices spell it."""
+    """The name of a package as package indices spell it."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def required(package: Distribution) -> list[str]:
-    """The names of what a package requires in this environment, extras left out."""
+    """The names of the packages that a package requires in this environment, without extras."""
     found = [Requirement(line) for line in package.requires or ()]
     return sorted({key(one.name) for one in found if one.marker is None or one.marker.evaluate({"extra": ""})})
 
 
 def closure(name: str) -> dict[str, Distribution]:
-    """A package and all that it requires, by name. Raises PackageNotFoundError if one is not installed."""
+    """A package and everything that it requires, by name. Raises PackageNotFoundError if one is not installed."""
     found: dict[str, Distribution] = {}
     left = [key(name)]
     while left:
@@ -81,7 +81,7 @@ def scripts(lock: Path) -> list[dict[str, Any]]:
 
 
 def bill() -> dict[str, Any]:
-    """The bill of the environment that runs this. It names no time and no machine: equal environments, equal bills."""
+    """The bill of this environment. It names no time and no machine, so that equal environments give equal bills."""
     packages = closure(NAME)
     parts = {name: component(name, package) for name, package in packages.items()}
     own = parts.pop(NAME)

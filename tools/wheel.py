@@ -1,9 +1,9 @@
-"""A wheel and a source archive, each tried in an empty environment outside the repository: `make wheel`.
+"""Build a wheel and a source archive, and try each in an empty environment outside the repository: `make wheel`.
 
     python tools/wheel.py            # writes dist/: the wheel, the archive, and a bill of materials of the tried wheel
 
-Each environment is made in a temporary folder, so that neither the repository nor what is installed here can stand in
-for a file that the package lacks.
+Each environment is created in a temporary folder, so that neither the repository nor packages installed here can supply
+a file that the package lacks.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 DIST = ROOT / "dist"
-# Verbs that read what the package must bring along: models, tables, indices, templates, the page, schemas, a sample.
+# Verbs that read files which the package must contain: models, tables, indices, templates, the page, schemas, a sample.
 TRIED = (
     "models",
     "explain ggx",
@@ -34,7 +34,7 @@ TRIED = (
 
 
 def run(command: Sequence[str | Path], folder: Path) -> None:
-    """Run a command, or end with what it printed."""
+    """Run a command; if it fails, exit with its output."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(
         [*map(str, command)], cwd=folder, env=environment, capture_output=True, text=True, check=False
@@ -44,7 +44,7 @@ def run(command: Sequence[str | Path], folder: Path) -> None:
 
 
 def environment(folder: Path, *packages: str | Path) -> Path:
-    """A new environment with these packages; its folder of programs."""
+    """Create an environment with these packages; returns its folder of programs."""
     venv.create(folder, with_pip=True)
     programs = folder / ("Scripts" if os.name == "nt" else "bin")
     run([programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages], folder)
@@ -62,7 +62,7 @@ def build(folder: Path) -> list[Path]:
 
 
 def tried(artifact: Path, folder: Path) -> Path:
-    """Install it into an empty environment, and run verbs there; its folder of programs."""
+    """Install it into an empty environment and run verbs there; returns its folder of programs."""
     programs = environment(folder / "environment", artifact)
     work = folder / "work"
     work.mkdir()

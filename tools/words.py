@@ -1,9 +1,9 @@
-"""The words of the project: names in code and prose in documents, docstrings and comments. `make lint` runs it.
+"""Check the words of the project: names in code, and prose in documents, docstrings and comments. `make lint` runs it.
 
-    python tools/words.py            # every finding with file and line; exit code 1 where there is one
+    python tools/words.py            # prints every finding with file and line; exit code 1 if there is any
 
-Names are to be the field's own terms, prose is to be American English that says its subject first. The lists below hold
-what has been replaced, so that it does not come back.
+Names should be the field's own terms, and prose should be American English that states its subject first. The lists
+below hold words that have been replaced, so that they do not come back.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 
-# names of functions, classes, arguments and variables, and what to write instead
+# names of functions, classes, arguments and variables, and their replacements
 NAMES = {
     "account": "LayerTables",
     "again": "u_remapped, or what it is",
@@ -51,7 +51,7 @@ BRITISH = (
     "neighbour", "normalis", "optimis", "organis", "recognis", "summaris", "travelled", "unlabelled",
 )  # fmt: skip
 
-# what prose must not say, as a regular expression, and why
+# regular expressions of what prose must not say, and why
 PHRASES = {
     r"\bnobody vouches\b": "say 'untrusted'",
     r"\bspoi(l|ls|lt|led)\b": "say 'mutate' or 'damage'",
@@ -66,7 +66,7 @@ PHRASES = {
     r"(?<![\w.\])/$-])\.\d+(?![\w.]*[/\w])": "write the leading zero, 0.5",
     r"\b(" + "|".join(BRITISH) + r")\w*\b": "write American English",
 }
-# what stays: keys of the course's scenes, names of published files and of the public API
+# exceptions: keys of the course's scenes, names of published files and of the public API
 ALLOWED = re.compile(r"`[^`]*`|\"[^\"]*\"|https?://\S+|\b\w*[._/=]\w+\S*|\b[A-Z]\w*Colour\w*|--\S+")
 
 SOURCES = ("src/gonio",)
@@ -77,7 +77,7 @@ DOCUMENTS = (
 
 
 def names(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Every name that a file gives to something, with its line."""
+    """Every name that a file defines, with its line."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield node.lineno, node.name
@@ -115,7 +115,7 @@ def prose_of_document(text: str) -> Iterator[tuple[int, str]]:
 
 
 def findings() -> Iterator[str]:
-    """FILE:LINE: what stands there, and what to write."""
+    """FILE:LINE: the text found there, and what to write instead."""
     for folder in SOURCES:
         for path in sorted((ROOT / folder).rglob("*.py")):
             text = path.read_text(encoding="utf-8")
@@ -139,7 +139,7 @@ def judged(path: Path, prose: Iterator[tuple[int, str]]) -> Iterator[str]:
 
 
 def main() -> int:
-    """Print every finding; 1 where there is one."""
+    """Print every finding; returns 1 if there is any."""
     lines = list(findings())
     print("\n".join(lines) if lines else "words: nothing to report")
     return bool(lines)

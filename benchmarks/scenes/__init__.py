@@ -1,7 +1,7 @@
-"""The scenes of `benchmarks/suite.py`: what differs between them is what path tracers differ in.
+"""The scenes of `benchmarks/suite.py`, which differ in aspects that distinguish path tracers.
 
 Each is a function that returns a Mitsuba dictionary without camera, film and sampler; `Scene.load` adds those. All are
-made here, textures and environments too, so that the suite needs no file.
+generated here, including textures and environments, so that the suite needs no files.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Dict = dict[str, Any]
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: `make(mi)` is its content; size of the picture, samples that it is judged at, depth of its paths."""
+    """A scene: its content `make(mi)`, the size of its picture, the samples per pixel of the comparison, its depth."""
 
     name: str
     what: str
@@ -29,10 +29,10 @@ class Scene:
     eye: tuple[float, float, float]
     at: tuple[float, float, float]
     fov: float
-    caustic: bool  # whether its light comes by way of smooth glass or metal, which no path from the eye finds
+    caustic: bool  # whether it is lit through smooth glass or metal, by paths that a camera path cannot find
 
     def load(self, mi: Any, sampler: str = "independent", spp: int | None = None) -> Any:
-        """The scene as Mitsuba has it, with a sampler of Mitsuba's."""
+        """The scene loaded by Mitsuba, with one of its samplers."""
         width, height = self.size
         film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}}
         sensor = {
@@ -58,7 +58,7 @@ def scene(
     fov: float = 30,
     caustic: bool = False,
 ) -> Callable[[Callable[[Any], Dict]], Callable[[Any], Dict]]:
-    """Declare a scene: its name is the function's, its first line of documentation says what it is."""
+    """Declare a scene: its name is that of the function, its description the first line of the docstring."""
 
     def declare(make: Callable[[Any], Dict]) -> Callable[[Any], Dict]:
         name = make.__name__.replace("_", "-")
@@ -94,14 +94,14 @@ def floor(mi: Any, bsdf: Dict, y: float = -0.5, side: float = 6.0) -> Dict:
 
 
 def lamp(mi: Any, at: list[float], to: list[float], half: float, radiance: float) -> Dict:
-    """A square lamp that shines toward a point."""
+    """A square lamp that faces a point."""
     up = [0, 0, 1] if abs(at[0] - to[0]) + abs(at[2] - to[2]) < 1e-6 else [0, 1, 0]
     placed = mi.ScalarTransform4f().look_at(at, to, up).scale(half)
     return {"type": "rectangle", "to_world": placed, "emitter": {"type": "area", "radiance": rgb(radiance)}}
 
 
 def sky(sun: float, width: int = 512) -> np.ndarray:
-    """An environment, (width / 2, width, 3): blue above, brown below, clouds of waves, and a sun of 3 degrees."""
+    """An environment, (width / 2, width, 3): blue above, brown below, clouds from waves, and a sun 3 degrees wide."""
     v, u = np.mgrid[0 : width // 2, 0:width]
     theta, phi = (v + 0.5) / (width // 2) * np.pi, (u + 0.5) / width * 2 * np.pi
     up = np.cos(theta)
@@ -124,20 +124,20 @@ def environment(mi: Any, pixels: np.ndarray) -> Dict:
 
 @scene(size=(500, 150), eye=(0, 1, 4), at=(0, 0, 0), fov=22)
 def five_metals(mi: Any) -> Dict:
-    """Five metal balls of rising roughness on a floor under a square lamp."""
+    """Five metal balls of increasing roughness on a floor under a square lamp."""
     balls = {f"ball{i}": ball(i - 2, metal(a), 0.45) for i, a in enumerate((0.05, 0.25, 0.5, 0.75, 0.99))}
     return {"floor": floor(mi, grey(0.7), -0.45, 10), "light": lamp(mi, [2, 3, 6], [2, 0, 6], 2, 50), **balls}
 
 
 @scene(size=(64, 64), spp=16)
 def tiny(mi: Any) -> Dict:
-    """A picture of 64 x 64 pixels, as fits and studies of parameters make by hundreds."""
+    """A picture of 64 x 64 pixels, as rendered by the hundreds in fits and parameter studies."""
     return {"floor": floor(mi, grey()), "light": lamp(mi, [1, 3, 2], [0, 0, 0], 0.7, 20), "ball": ball(0, metal(0.3))}
 
 
 @scene()
 def near_lamps(mi: Any) -> Dict:
-    """Rectangle lamps close above rough metal."""
+    """Rectangular lamps close above rough metal."""
     lamps = {f"lamp{i}": lamp(mi, [1.5 * i - 1.5, 0.3, -0.8], [1.5 * i - 1.5, -0.5, 0.2], 0.3, 8) for i in range(3)}
     return {"floor": floor(mi, metal(0.3, "Al")), "ball": ball(0.2, metal(0.15), 0.35, -0.15, 0.5), **lamps}
 
@@ -165,7 +165,7 @@ def _three(mi: Any) -> Dict:
 
 @scene()
 def textured(mi: Any) -> Dict:
-    """Textures of colour and roughness, and a normal map, under sky and lamp."""
+    """Textures of color and roughness, and a normal map, under a sky and a lamp."""
     y, x = np.mgrid[0:128, 0:128] / 128
     checks = ((np.floor(8 * x) + np.floor(8 * y)) % 2)[..., None]
     colours = (0.1 + 0.7 * checks * np.array([0.9, 0.5, 0.2])).astype(np.float32)
@@ -188,12 +188,12 @@ def textured(mi: Any) -> Dict:
     }
 
 
-# ---------------------------------------------------------------------- glass, a room, many
+# ---------------------------------------------------------------------- glass, a room, many shapes
 
 
 @scene(depth=10)
 def rough_glass(mi: Any) -> Dict:
-    """Two balls of rough glass before a metal one, under a sky."""
+    """Two balls of rough glass in front of a metal one, under a sky."""
     glass = {"type": "roughdielectric", "distribution": "ggx", "int_ior": 1.5}
     balls = {"a": ball(-0.6, {**glass, "alpha": 0.1}, z=0.5), "b": ball(0.6, {**glass, "alpha": 0.4}, z=0.5)}
     return {"env": environment(mi, sky(30.0)), "floor": floor(mi, grey()), "c": ball(0, metal(0.1), z=-0.8), **balls}
@@ -240,13 +240,13 @@ GLASS = {"type": "dielectric", "int_ior": 1.5}
 
 @scene(depth=10, caustic=True)
 def glass_ball(mi: Any) -> Dict:
-    """A glass ball gathers the light of a small lamp."""
+    """A glass ball that focuses the light of a small lamp."""
     return {"floor": floor(mi, grey()), "light": lamp(mi, [2, 3, 1], [0, 0, 0], 0.1, 500), "ball": ball(0, GLASS)}
 
 
 @scene(depth=8, caustic=True, eye=(0, 3, 2.5), at=(0, -0.4, 0))
 def metal_ring(mi: Any) -> Dict:
-    """The nephroid within a ring of metal."""
+    """The nephroid caustic inside a metal ring."""
     ring = {
         "type": "cylinder",
         "p0": [0, -0.5, 0],
@@ -280,7 +280,7 @@ def pool(mi: Any) -> Dict:
 
 @scene(depth=12, caustic=True)
 def glass_in_a_mirror(mi: Any) -> Dict:
-    """A glass ball, its light and both in a mirror behind."""
+    """A glass ball and its caustic, both also seen in a mirror behind them."""
     mirror = {
         "type": "rectangle",
         "to_world": mi.ScalarTransform4f().translate([0, 0.3, -1.2]).scale([1.6, 0.8, 1]),

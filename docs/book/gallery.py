@@ -47,7 +47,7 @@ def pages() -> dict[str, str | bytes]:
     )
     listed = "\n".join(example.folder for example in examples())
     made["gallery/index.md"] = (
-        "# Gallery\n\nEach picture with its scene, its command, what to see and why.\n\n"
+        "# Gallery\n\nEach page shows a picture with its scene and command, and says what to see in it and why.\n\n"
         f":::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}\n:::::\n\n:::{{toctree}}\n:hidden:\n\n{listed}\n:::\n"
     )
     return made

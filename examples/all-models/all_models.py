@@ -1,6 +1,6 @@
 """All models on one sheet: python examples/all-models/all_models.py [MODEL ...] writes models.jpg.
 
-Each model is rendered on the ball of scene.json, at its defaults where they show what it is for, else as `LOOKS` says.
+Each model is rendered on the ball of scene.json, with its defaults if these show its purpose, else as `LOOKS` says.
 """
 
 from __future__ import annotations
@@ -58,21 +58,21 @@ LOOKS = {
     "ward": "diffuse=0.02,specular=0.5,alpha=0.08,0.3",
     "ward-duer": "diffuse=0.02,specular=0.5,alpha=0.3,0.08",
 }
-IMAGES = {  # of those whose parameters come from images
+IMAGES = {  # for models whose parameters come from images
     "bump": {"type": "conductor", "preset": "Cu", "roughness": 0.45, "bump": {"file": "heights.png", "scale": 0.12}},
     "normal-map": {"type": "conductor", "preset": "Au", "roughness": 0.45, "normalmap": {"file": "dents.png"}},
 }
 
 
 def material(name: str) -> go.BSDF:
-    """The model as it is shown."""
+    """The model as shown on the sheet."""
     if name == "measured":
         return go.Measured(HERE.parent / "three-forms" / "rough-copper.gonio")
     return go.material(f"{name}({LOOKS[name]})" if name in LOOKS else name)
 
 
 def ball(name: str, size: int = 240, spp: int = 64) -> np.ndarray:
-    """Its picture, linear."""
+    """The picture of a model, linear."""
     return go.render(
         HERE,
         overrides={"shapes.0.material": IMAGES.get(name) or material(name)},

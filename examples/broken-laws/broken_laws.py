@@ -1,6 +1,6 @@
 """A sound ball and a broken one for each law: python examples/broken-laws/broken_laws.py writes laws.jpg.
 
-The broken materials are the negative controls of tests/broken: each differs from its sound twin in one mistake.
+The broken materials are the negative controls of tests/broken: each differs from a sound material in one mistake.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import sheets  # noqa: E402
 from broken import facets, surfaces  # noqa: E402
 
 PICTURE = "laws.jpg"  # in the current folder
-# the mistakes that show most; none is known that breaks `delta` or `shader` alone
+# the most visible mistakes; none is known that breaks only `delta` or only `shader`
 SHOWN: dict[type[Any], dict[str, object]] = {
     facets.UnnormalisedD: {"alpha": 0.35},
     surfaces.CosineTwice: {"albedo": (0.75, 0.5, 0.3)},
@@ -41,7 +41,7 @@ def twin(broken: type[Any]) -> type[Any]:
 
 
 def ball(material: go.BSDF, size: int = 208, spp: int = 256) -> np.ndarray:
-    """Its picture by directions that the material samples, which shows mistakes of `sample` and `pdf` too."""
+    """The picture of a material by BSDF sampling, which also shows mistakes in `sample` and `pdf`."""
     scene = HERE.parent / "all-models"
     changes = {"shapes.0.material": material}
     return go.render(
@@ -50,7 +50,7 @@ def ball(material: go.BSDF, size: int = 208, spp: int = 256) -> np.ndarray:
 
 
 def visible(sound: np.ndarray, broken: np.ndarray) -> bool:
-    """Whether two pictures differ on a screen by more than 4 levels of 255, in the mean."""
+    """Whether two pictures, as encoded for a screen, differ by more than 4 levels of 255 on average."""
     one, other = (images.to_screen(picture).astype(float) for picture in (sound, broken))
     return bool(np.abs(one - other).mean() > 4.0)
 

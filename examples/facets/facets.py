@@ -1,4 +1,4 @@
-"""What D, G and F do to a ball, and the facets behind them: python examples/facets/facets.py writes facets.jpg."""
+"""D, G and F on a ball, and the facets that they describe: python examples/facets/facets.py writes facets.jpg."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import sheets
 
 PICTURE = "facets.jpg"  # in the current folder
-LIGHT, VIEWER = np.array([-1.2, 0.95, 1.5]), np.array([0.0, 0.0, 2.6])  # near the ball, so that angles vary over it
+LIGHT, VIEWER = np.array([-1.2, 0.95, 1.5]), np.array([0.0, 0.0, 2.6])  # near the ball, so that angles vary across it
 GOLD, BLUE, RED, GRAY = "#ffc24d", "#6ea4ff", "#ff6b7d", "#8a9099"
-UNLIT = 0.008  # radiance of the side that no light reaches
+UNLIT = 0.008  # radiance of the unlit side
 
 
 def local(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """View and light in the frames of a ball's normals, (N, 3) each, and the mask of its pixels, (size, size)."""
+    """View and light directions in the frames of a ball's normals, (N, 3) each, and the mask of its pixels."""
     y, x = np.meshgrid(*[np.linspace(-1.06, 1.06, size)] * 2, indexing="ij")
     inside = x**2 + y**2 < 1.0
-    # the part of the ball that the viewer sees ends where n.VIEWER = 1
+    # the visible part of the ball ends where n.VIEWER = 1
     z = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
     rim = 1.0 / VIEWER[2]
     n = np.stack([x * np.sqrt(1.0 - rim**2), -y * np.sqrt(1.0 - rim**2), rim + (1.0 - rim) * z], -1)[inside]
@@ -77,7 +77,7 @@ def hidden(x: np.ndarray, y: np.ndarray, slope: float) -> np.ndarray:
 
 
 def section(axes: matplotlib.axes.Axes) -> None:
-    """Facets: toward the half vector, in the light's shadow, behind others from the viewer."""
+    """Draw facets that face the half vector, are shadowed from the light, or are masked from the viewer."""
     x, y = profile()
     middle = (x[1:] + x[:-1]) / 2.0, (y[1:] + y[:-1]) / 2.0
     tilt = np.arctan(np.gradient(y, x))[:-1]
@@ -107,7 +107,7 @@ def section(axes: matplotlib.axes.Axes) -> None:
 
 def main(size: int = 305) -> None:
     cells = balls(size)
-    side, low = 3.05, 3.4  # inches: of a ball's picture, of the section
+    side, low = 3.05, 3.4  # inches: size of a ball's picture, height of the section
     height = low + side + 2.2 * sheets.LINE + 0.1
     width = sheets.WIDTH / sheets.DPI
     figure = Figure(figsize=(width, height), facecolor=sheets.BACKGROUND, dpi=sheets.DPI)

@@ -1,6 +1,6 @@
 """The two rows with their names: python examples/homework-rows/homework_rows.py writes homework-rows.jpg.
 
-The balls of scene.json under its light, as a shader computes them, on grey: on black the darkest ones have no outline.
+The balls of scene.json under its light, as a shader computes them, on gray: on black, the darkest ones have no outline.
 """
 
 from __future__ import annotations

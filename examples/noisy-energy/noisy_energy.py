@@ -1,4 +1,4 @@
-"""E(mu) by 64 directions per texel, and exact: python examples/noisy-energy/noisy_energy.py writes energy.jpg."""
+"""E(mu) from 64 directions per texel, and exact: python examples/noisy-energy/noisy_energy.py writes energy.jpg."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Panel = tuple[str, np.ndarray, float, float, str]  # title, values, the colors' 
 
 
 def panels(resolution: int) -> list[Panel]:
-    """Three tables, and three errors."""
+    """The panels of three tables and their errors."""
     exact = table(resolution)
     cosine = table(resolution, method="cosine", sampler="independent", samples=64)
     normals = table(resolution, method="ggx", sampler="independent", samples=64)

@@ -1,6 +1,6 @@
 """Phong's failures as pictures: python examples/phong-failures/phong_failures.py writes failures.jpg.
 
-Above: Phong as it is often typed in. Below: the same light on a ball without that failure.
+Above: Phong as it is often written. Below: the same light on a ball without that failure.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ FRONT, SIDE, BEHIND = (-0.5, 0.45, 0.75), (-0.75, 0.45, -0.45), (0.45, 0.55, -0.
 
 
 def normalized(ks: float, p: float) -> go.BSDF:
-    """The reciprocal, energy-conserving form, of the same body color."""
+    """The reciprocal, energy-conserving form with the same body color."""
     return go.ModifiedPhong(kd=tuple(np.pi * kd * (1.0 - ks) for kd in BODY), ks=ks, p=p)
 
 
 def cases() -> list[tuple[tuple[float, float, float], str, go.BSDF, str, go.BSDF]]:
-    """The light; title and material, wrong and sound."""
+    """The light, then title and material of the wrong form and of the sound one."""
     phong = functools.partial(go.Phong, kd=BODY)
     even, through = EvenPower(kd=BODY, ks=0.6, p=4.0), NoHorizon(kd=BODY, ks=0.6, p=6.0)
     return [

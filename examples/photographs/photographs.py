@@ -20,9 +20,9 @@ SIDES = ("right", "lower right", "below", "lower left", "left", "upper left", "a
 
 
 def lamp_angles(calibration: dict[str, dict]) -> dict[str, tuple[float, np.ndarray]]:
-    """Of each lamp: the angle between it and the camera as seen from the ball, and its direction in the picture.
+    """For each lamp, the angle between it and the camera as seen from the ball, and its direction in the picture.
 
-    The angle is in degrees, the direction a unit vector: x to the right, y downward, as the pixels are counted.
+    The angle is in degrees, the direction a unit vector with x to the right and y downward, as for pixels.
     """
     center = np.array(calibration["ball"]["center"])
     found = {}
@@ -60,7 +60,7 @@ def main(stops: float = 1.0) -> None:
         middle, radius = outline(calibration, len(pixels))
         x, y = np.meshgrid(*[np.arange(len(pixels))] * 2)
         outside = np.hypot(x - middle[0], y - middle[1]) > radius
-        # the ball's unlit side is black, so what is no ball must not be
+        # the ball's unlit side is black, so the background must not be
         shown = np.where(outside[..., None], sheets.BACKDROP, pixels * 2.0**stops)
         axes.imshow(images.to_screen(shown), interpolation="nearest")
         style = {"arrowstyle": "-|>", "color": LAMP, "lw": 4.0, "mutation_scale": 26, "shrinkA": 0, "shrinkB": 0}

@@ -1,8 +1,8 @@
 """The rainbow of a cloud of drops, ray by ray: python examples/rainbow/rainbow.py [rays] writes sky.jpg.
 
-Sunlight meets drops anywhere on their discs. Every ray goes its way through one of them by `go.Dielectric.sample`, a
-wavelength each, and leaves for the eye that stands where it goes. The cloud is thin and everywhere, so that the sky's
-brightness in a direction is the light that drops send back at that angle from the antisolar point.
+Sunlight hits the disks of the drops uniformly. Each ray has one wavelength, is traced through a drop by
+`go.Dielectric.sample`, and is seen by an eye in the direction in which it leaves. The cloud is thin and uniform, so the
+brightness of the sky in a direction is the light that drops scatter back at that angle from the antisolar point.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 PICTURE = "sky.jpg"  # in the current folder
-SUN = np.radians(0.2665)  # radius of its disc
-STEP = 0.01  # degrees, of the profile
-ORDERS = 6  # times that a ray meets the drop's surface, beyond which 0.3 % of it is left
+SUN = np.radians(0.2665)  # angular radius of the sun
+STEP = 0.01  # step of the profile, degrees
+ORDERS = 6  # interactions of a ray with the drop's surface, after which 0.3 % of the light is left inside
 
 
 def frame(normal: Floats) -> tuple[Floats, Floats]:
@@ -34,12 +34,12 @@ def frame(normal: Floats) -> tuple[Floats, Floats]:
 def scattered(
     wavelengths: Floats, rng: np.random.Generator, sun: float = SUN
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """A ray of sunlight for each wavelength: where it is seen, as the angle from the antisolar point in degrees; its
-    share of power; and whether it has left the drop at all."""
+    """One ray of sunlight per wavelength: the angle from the antisolar point at which it is seen, in degrees; its
+    fraction of the power; and whether it has left the drop."""
     count = len(wavelengths)
     angle, radius = 2.0 * np.pi * rng.random(count), np.sqrt(rng.random(count))
     height = np.sqrt(1.0 - radius**2)
-    place = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)  # the sun stands at +z
+    place = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)  # the sun is at +z
     turn, tilt = 2.0 * np.pi * rng.random(count), sun * np.sqrt(rng.random(count))
     way = -np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=1)
     water = go.Dielectric(eta=go.refractive_index("water", wavelengths).eta, alpha=0.0)
@@ -58,7 +58,7 @@ def scattered(
 
 
 def descartes(eta: Floats, reflections: int) -> Floats:
-    """The angle of the bow in degrees: where the deviation of rays reflected k times inside stands still.
+    """The angle of the bow in degrees, where the deviation of rays reflected k times inside is stationary.
 
     cos^2 i = (n^2 - 1) / (k (k + 2)), deviation k pi + 2 i - 2 (k + 1) r.
     """
@@ -68,9 +68,9 @@ def descartes(eta: Floats, reflections: int) -> Floats:
 
 
 def edge(wavelength: float, low: float, high: float, inner: bool, rays: int = 400_000) -> float:
-    """Where a bow of one wavelength ends, in degrees: the steepest place of its brightness from `low` to `high`.
+    """The edge of a bow of one wavelength in degrees: the steepest point of its brightness between `low` and `high`.
 
-    inner  whether the bow lies at smaller angles than its edge, as the primary does
+    inner  whether the bow lies at smaller angles than its edge, as the primary bow does
     """
     rng = np.random.default_rng(7)
     seen, power, free = scattered(np.full(rays, wavelength), rng, sun=0.0)
@@ -81,7 +81,7 @@ def edge(wavelength: float, low: float, high: float, inner: bool, rays: int = 40
 
 
 def profile(rays: int) -> tuple[Floats, Floats]:
-    """Angles from the antisolar point, and the colour there of the sky behind the drops, relative to sunlight."""
+    """Angles from the antisolar point, and the color of the drops there, relative to sunlight."""
     rng, bins = np.random.default_rng(1), np.arange(0.0, 90.0 + STEP, 5.0 * STEP)
     xyz, white = np.zeros((3, len(bins) - 1)), np.zeros(3)
     for _ in range(max(rays // 500_000, 1)):
@@ -107,7 +107,7 @@ def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (1280, 640)
     down = np.radians(sun)
     away = np.degrees(np.arccos(way @ [0.0, -np.sin(down), np.cos(down)]))
     bow = np.stack([np.interp(away, angles, colours[:, channel]) for channel in range(3)], axis=2)
-    haze = np.exp(-7.0 * np.maximum(way[..., 1:2], 0.0))  # the air near the horizon, warm in the low sun
+    haze = np.exp(-7.0 * np.maximum(way[..., 1:2], 0.0))  # air near the horizon, warm under the low sun
     sky = np.array([0.04, 0.055, 0.1]) * (1.0 - 0.6 * way[..., 1:2]) + np.array([0.1, 0.075, 0.055]) * haze
     sky += 4.0 * np.maximum(bow, 0.0)
     ground = landscape(way)
@@ -115,7 +115,7 @@ def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (1280, 640)
 
 
 def ridge(across: Floats, seed: int = 4, height: float = 0.012) -> Floats:
-    """Height of the hills above the horizon, in the tangent of the angle, at tangents of the azimuth."""
+    """Height of the hills above the horizon, as the tangent of the elevation, at tangents of the azimuth."""
     rng = np.random.default_rng(seed)
     waves = [(2.0**k, rng.uniform(0.0, 2.0 * np.pi), 1.7**-k) for k in range(1, 8)]
     return np.asarray(height * (1.0 + sum(size * np.sin(rate * 1.3 * across + turn) for rate, turn, size in waves)))
@@ -125,7 +125,7 @@ def landscape(way: Floats) -> Floats:
     """Radiance of hills and fields lit by the low sun behind the viewer, for directions (..., 3)."""
     down = np.maximum(-way[..., 1:2], 0.004)
     across = way[..., 0:1] / way[..., 2:3]
-    depth = way[..., 2:3] / down  # how far away the plain is, in heights of the eye
+    depth = way[..., 2:3] / down  # distance of the plain, relative to the height of the eye
     stripes = np.floor(1.8 * np.log(depth) + 0.35 * np.sin(2.0 * across)) % 3.0
     fields = np.array([[0.16, 0.13, 0.025], [0.075, 0.105, 0.02], [0.21, 0.16, 0.045]])[stripes[..., 0].astype(int)]
     furrows = 1.0 + 0.12 * np.exp(-depth / 12.0) * np.sin(14.0 * across * depth)
@@ -136,7 +136,7 @@ def landscape(way: Floats) -> Floats:
 
 
 def angles(rays: int = 400_000) -> list[float]:
-    """Print where the bows end, by Descartes and by rays: degrees between the two."""
+    """Print the angles of the bows by Descartes and by rays; returns the differences in degrees."""
     apart = []
     print("bow         nm      n        Descartes   rays      apart")
     for name, k, low, high, inner in (("primary", 1, 39.0, 44.0, True), ("secondary", 2, 48.0, 56.0, False)):

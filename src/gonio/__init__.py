@@ -5,8 +5,8 @@
     value = gold.eval(wo, wi)            # (N, 3) arrays in, (N, 3) out
     sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
 
-Names are loaded on first use; Dr.Jit and Mitsuba are loaded by the first computation. Importing Gonio chooses a libLLVM
-for Dr.Jit, so that `import drjit` and `import mitsuba` work before and after it.
+Names are loaded on first use; Dr.Jit and Mitsuba are loaded by the first computation. Importing Gonio selects a libLLVM
+for Dr.Jit; `import drjit` and `import mitsuba` may come before or after it.
 """
 
 from __future__ import annotations

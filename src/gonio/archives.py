@@ -20,25 +20,25 @@ MAX_ENTRIES = 1000
 
 
 class Unreadable(ValueError):
-    """A file that is not an .npz archive, is damaged, or unpacks to an implausible size; the text is the reason."""
+    """A file that is not an .npz archive, is damaged, or unpacks to an implausible size; the message says which."""
 
 
 def read(path: Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """All arrays in a file by name, or those of `names` that exist. Objects (pickles) are never loaded.
 
-    Raises Unreadable, and OSError where the file cannot be opened.
+    Raises Unreadable, and OSError if the file cannot be opened.
     """
     with open(path, "rb") as file:
         try:
             with zipfile.ZipFile(file) as archive:
                 entries = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
                 if len(entries) > MAX_ENTRIES:
-                    raise Unreadable(f"it has {len(entries)} entries, {MAX_ENTRIES} at most are expected")
+                    raise Unreadable(f"it has {len(entries)} entries, at most {MAX_ENTRIES} expected")
                 wanted = {name: info for name, info in entries.items() if names is None or name in names}
                 limit = MIN_LIMIT + MAX_EXPANSION * path.stat().st_size
                 size = sum(info.file_size for info in wanted.values())
                 if size > limit:
-                    raise Unreadable(f"it unpacks to {size >> 20} MiB, {limit >> 20} MiB at most are expected")
+                    raise Unreadable(f"it unpacks to {size >> 20} MiB, at most {limit >> 20} MiB expected")
                 return {name: _array(archive, info) for name, info in wanted.items()}
         except Unreadable:
             raise
@@ -52,7 +52,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, fortran, dtype = header(file)
         if dtype.hasobject:
-            raise Unreadable(f"'{info.filename}' holds objects (a pickle), which are never loaded")
+            raise Unreadable(f"'{info.filename}' holds pickled objects, which are never loaded")
         if min(shape, default=1) < 0 or math.prod(shape) * dtype.itemsize != info.file_size - file.tell():
             raise Unreadable(f"'{info.filename}' claims the shape {shape}, which does not match its size")
         # `read` returns the bytes that exist, whatever size the directory claims

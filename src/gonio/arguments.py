@@ -28,7 +28,7 @@ R = TypeVar("R")
 # returns the converted value; raises ValueError if it is wrong
 Check: TypeAlias = Callable[[object], object]
 
-_SHOWN = 60  # characters of a wrong value
+_SHOWN = 60  # characters of an invalid value that an error message shows
 
 
 def checked(call: Callable[P, R]) -> Callable[P, R]:
@@ -54,10 +54,10 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def takes_fields(options: type | tuple[type, ...], keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function with `**options` takes the fields of a dataclass, or of several, that are not among its own
-    parameters: its signature is expanded to them and their defaults, for `help`, notebooks and `checked`.
+    """Let a function with `**options` accept the fields of one or more dataclasses that are not among its own
+    parameters: its signature is expanded with the fields and their defaults, for `help`, notebooks and `checked`.
 
-    keywords  a TypedDict that repeats their types for type checkers, since Python cannot derive them from a class
+    keywords  a TypedDict that repeats the types of the fields for type checkers, which cannot derive them from a class
     """
 
     def decorate(call: Callable[P, R]) -> Callable[P, R]:
@@ -82,7 +82,7 @@ def takes_fields(options: type | tuple[type, ...], keywords: type) -> Callable[[
 
 
 def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function that takes former names of keywords too, with a DeprecationWarning: `@renamed(former="present")`."""
+    """Let a function accept former names of its keywords, with a DeprecationWarning: `@renamed(former="present")`."""
 
     def decorate(call: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(call)
@@ -90,7 +90,7 @@ def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
             for former, present in names.items():
                 if former in kwargs:
                     if present in kwargs:
-                        raise InputError(f"both {former} and {present} given", call.__name__, f"give {present} alone")
+                        raise InputError(f"both {former} and {present} given", call.__name__, f"give only {present}")
                     text = f"{call.__name__}: {former} is now {present}"
                     warnings.warn(text, DeprecationWarning, stacklevel=2)
                     kwargs[present] = kwargs.pop(former)
@@ -261,5 +261,5 @@ def _one(name: str) -> tuple[Check, str] | None:
         items = [inner(item) for item in value]
         return tuple(items) if count is not None else items
 
-    words = {"int": "whole numbers", "float": "numbers", "str": "texts"}.get(parts[0], "such values")
+    words = {"int": "whole numbers", "float": "numbers", "str": "strings"}.get(parts[0], "such values")
     return check, f"{count} {words}" if count is not None else f"several {words}"

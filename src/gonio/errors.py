@@ -21,7 +21,7 @@ def printable(text: str) -> str:
 
 
 def encodable(text: str) -> str:
-    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes."""
+    """The text with characters that no encoding has, such as invalid UTF-8 in a file name, written as escapes."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -57,7 +57,7 @@ class MachineError(GonioError):
 
 
 class GonioWarning(UserWarning):
-    """Unusual but usable input; the text says what is assumed."""
+    """Unusual but usable input; the message says what is assumed."""
 
 
 def did_you_mean(name: str, known: list[str] | tuple[str, ...]) -> str:
@@ -78,7 +78,7 @@ _IN_LOOP = "encountered an exception (see above)"  # Dr.Jit's text for any excep
 
 
 def user_line(error: BaseException) -> str:
-    """FILE:LINE of the innermost frame in user code called by Gonio (neither Gonio's own nor a library's); "" if there
+    """FILE:LINE of the innermost frame in user code that Gonio called (not in Gonio's or a library's code); "" if there
     is none. The program that calls Gonio does not count as user code."""
     cause: BaseException | None = error
     visited: list[BaseException] = []
@@ -100,7 +100,7 @@ def user_line(error: BaseException) -> str:
 
 
 def summary(error: BaseException) -> str:
-    """The exception's type and the first line of its text."""
+    """The exception's type and the first line of its message."""
     text = str(error).strip().partition("\n")[0]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
@@ -114,7 +114,7 @@ def in_user_code(error: BaseException) -> InputError | None:
 
 
 def out_of_loop(error: BaseException) -> BaseException:
-    """The exception that Dr.Jit replaced by a generic one while it recorded a loop; any other error unchanged."""
+    """The original exception if Dr.Jit replaced it by a generic one while recording a loop; else the error itself."""
     cause: BaseException | None = error
     while isinstance(cause, RuntimeError) and _IN_LOOP in str(cause):
         cause = cause.__cause__ or cause.__context__

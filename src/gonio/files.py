@@ -19,7 +19,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def check_current_folder() -> None:
-    """Raise InputError where the current folder has been deleted: libraries in C++ end the process then."""
+    """Raise InputError if the current folder has been deleted, which makes C++ libraries end the process."""
     try:
         os.getcwd()
     except OSError as error:
@@ -27,12 +27,12 @@ def check_current_folder() -> None:
 
 
 def check_file(path: str | Path) -> Path:
-    """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
+    """The file that `path` names, with links followed. Raises InputError now if it could not be written later."""
     target = Path(os.path.expanduser(path))
     try:
         if target.is_symlink():
             target = target.resolve()
-        looped = target.is_symlink()  # from Python 3.13 on; before, it raises
+        looped = target.is_symlink()  # since Python 3.13; earlier versions raise
     except RuntimeError:
         looped = True
     except (OSError, ValueError) as error:
@@ -53,9 +53,9 @@ def check_file(path: str | Path) -> Path:
 
 
 def changeable_by_others(path: Path) -> bool:
-    """Whether a user other than this one and root may change a file or folder. False where files have no such owners.
+    """Whether a user other than this one and root may change a file or folder. False on systems without `getuid`.
 
-    Root is not warned of a user's files: in a container they are often its own, from outside.
+    For root, files owned by another user do not count: in a container they often belong to the same person outside.
     """
     if not hasattr(os, "getuid"):
         return False
@@ -66,9 +66,9 @@ def changeable_by_others(path: Path) -> bool:
 
 
 def check_folder(folder: str | Path, parents: bool = False) -> Path:
-    """The folder, if it exists or can be made where it is named; InputError before anything is computed where not.
+    """The folder, which exists or can be created. Raises InputError otherwise, before anything is computed.
 
-    parents  whether the folders above it may be missing too: `write_all` makes them
+    parents  whether its parent folders may be missing too; `write_all` creates them
     """
     folder = Path(os.path.expanduser(folder))
     if parents and not os.path.lexists(folder.parent):
@@ -78,7 +78,7 @@ def check_folder(folder: str | Path, parents: bool = False) -> Path:
         if os.path.exists(folder):
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
         check_file(folder)
-        try:  # a folder that is reported as writable may still refuse
+        try:  # a folder reported as writable may still refuse
             folder.mkdir()
             folder.rmdir()
         except OSError as error:
@@ -95,9 +95,9 @@ def _reason(error: Exception) -> str:
 
 
 def with_ending(path: Path, ending: str, start: str = "") -> Path:
-    """The path of a file beside `path`: its name with `start` before and `ending` behind.
+    """The path of a file in the same folder, with `start` before the name and `ending` after it.
 
-    A name that would be longer than file systems allow is cut, and has a sum of the whole name in its place.
+    A name longer than file systems allow is truncated and given a checksum of the whole name.
     """
     if not path.name:  # "." or "/"
         return path / (start + ending)
@@ -107,20 +107,20 @@ def with_ending(path: Path, ending: str, start: str = "") -> Path:
     return path.with_name(start + os.fsdecode(name) + ending)
 
 
-written: list[Path] = []  # results of this process, which a command that is ended names
+written: list[Path] = []  # results of this process, which a terminated command lists
 
 
 def write_whole(
     path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True, durable: bool = True
 ) -> Path:
-    """Write a file atomically: at every moment `path` is either the old file or the complete new one.
+    """Write a file atomically: at any time, `path` is either the old file or the complete new one.
 
-    content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
-    durable  force it to the disk first, so that not even a power cut leaves half of it
-    rescue   where it cannot be written, write it elsewhere, so that hours of work are not lost: in a new folder beside
-             it, in the current folder or among the temporary files
-    Raises MachineError where it cannot be written, InputError where the path cannot be a file's. The error says where
-    the content is; nothing of it is left as `path`.
+    content  the bytes, or a function that writes to the path it is given, which has the same suffix
+    rescue   if the file cannot be written, write it to a new folder beside it, in the current folder or among the
+             temporary files, so that hours of work are not lost
+    durable  flush it to the disk first, so that not even a power cut leaves a partial file
+    Raises MachineError if the file cannot be written, InputError if the path cannot name a file. The error says where
+    the content was rescued to; `path` is left unchanged.
     """
 
     def fill(file: Path) -> None:
@@ -142,7 +142,7 @@ def write_whole(
         fill(temporary)
         if durable:
             with open(temporary, "rb") as file:
-                os.fsync(file.fileno())  # a full disk can show itself as late as here
+                os.fsync(file.fileno())  # a full disk may be reported only here
         os.replace(temporary, target)
     except OSError as error:
         failure = _failure(error, path)
@@ -163,15 +163,15 @@ def _failure(error: OSError, path: str | Path) -> MachineError:
 
 
 def _remove(file: Path) -> None:
-    with contextlib.suppress(OSError):  # its folder may be gone: this must not hide where the content is
+    with contextlib.suppress(OSError):  # its folder may be gone; an error here would hide the rescue's
         file.unlink()
 
 
 def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], elsewhere: bool = False) -> NoReturn:
-    """Raise the failure, with the place where the content lies now.
+    """Write the content elsewhere and raise the failure, with that place as its hint.
 
-    fill       makes the file, or the folder, of the name that it is given
-    elsewhere  do not try beside the target: its disk is full
+    fill       writes the file or folder at the path it is given
+    elsewhere  skip the target's folder, since its disk is full
     """
     place = keep_elsewhere(target, fill, elsewhere)
     hint = failure.hint if place is None else f"it is kept as {place}: move it from there"
@@ -179,10 +179,10 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
 
 
 def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool = False) -> Path | None:
-    """The file or folder that `fill` made, with the target's name, in a new folder: beside the target, in the current
-    folder or among the temporary files; None where there is no room in any.
+    """The file or folder that `fill` wrote, with the target's name, in a new folder: beside the target, in the current
+    folder or among the temporary files; None if all of these failed.
 
-    elsewhere  not beside the target: its disk is full
+    elsewhere  skip the target's folder, since its disk is full
     """
     import tempfile  # its import takes 2 ms, and this is rarely needed
 
@@ -201,10 +201,10 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files.
+    """Write files to a temporary folder, then move them: a new folder appears complete, an old one keeps other files.
 
-    Folders above it are made.
-    Raises MachineError where it cannot be written, which says where its files are instead.
+    Missing parent folders are created.
+    Raises MachineError if the folder cannot be written; the error says where its files are instead.
     """
 
     def fill(into: Path) -> None:

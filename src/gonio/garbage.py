@@ -1,4 +1,4 @@
-"""Suspend garbage collection where it would crash, or would only cost time.
+"""Suspend garbage collection where it could crash or would only cost time.
 
 Python may collect cycles at any allocation. If a cycle holds a scene, Mitsuba removes its objects from Dr.Jit's
 registry. While a kernel is being traced, or in another thread, this occasionally causes a segmentation fault.

@@ -56,7 +56,7 @@ def read_version(path: Path) -> str:
     """The version of the libLLVM at `path`, "" if it is not one; the file is read, not loaded."""
     try:
         with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-            at = text.find(_SYMBOL)  # faster than a search by a regular expression, which every start would wait for
+            at = text.find(_SYMBOL)  # faster than a regular expression, and every start waits for it
             while at >= 0:
                 start = at + len(_SYMBOL)
                 version = text[start : text.find(b"\0", start)]
@@ -154,7 +154,7 @@ def _loaded() -> Library | None:
 
 
 def _exchange() -> bool:
-    """Restart Dr.Jit with the libLLVM that the environment names now; returns whether it was restarted.
+    """Restart Dr.Jit with the libLLVM that the environment now names; returns whether it was restarted.
 
     Dr.Jit is not restarted if kernels have run, a GPU holds values, or Mitsuba objects are alive: they would be lost.
     Dr.Jit offers this to C++ only, under the mangled names that Linux and macOS give to `jit_shutdown(int)` etc. If it

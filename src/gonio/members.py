@@ -73,7 +73,7 @@ class Family(Generic[Member]):
         if self._shipped is None:
             self.all()
         if not isinstance(name, str):
-            raise InputError(f"{shown(name)} is no name", where or self.where, "give the name of a " + self.kind)
+            raise InputError(f"{shown(name)} is not a name", where or self.where, "give the name of a " + self.kind)
         for known in (self._added, self._shipped or {}):  # called at every evaluation, so nothing is sorted here
             if name in known:
                 return known[name]
@@ -110,7 +110,7 @@ class Family(Generic[Member]):
         return name
 
     def portable(self, name: str) -> Member | type | str:
-        """What identifies a member to another process: its class, or the given instance, if this program added it;
+        """The identity of a member for another process: its class, or the given instance, if this program added it;
         otherwise its name."""
         if name in self._announced_names or name not in self._added:
             return name
@@ -174,7 +174,7 @@ def _entry_points(group: str) -> Iterable[EntryPoint]:
 
 
 def _declares(folder: str, group: bytes) -> bool:
-    """Whether a package that is installed in a folder may declare entry points of a group."""
+    """Whether a package installed in a folder may declare entry points of a group."""
     with contextlib.suppress(OSError):
         for name in os.listdir(folder or "."):
             if name.endswith("-info"):
@@ -185,7 +185,7 @@ def _declares(folder: str, group: bytes) -> bool:
 
 
 Thing = TypeVar("Thing")
-registered: list[str] = []  # by this program; unknown to other processes
+registered: list[str] = []  # names that this program added, which other processes do not know
 
 
 def register(thing: Thing) -> Thing:
@@ -215,7 +215,7 @@ def _class_of(member: object) -> type:
 
 
 def _same(standing: object, member: object) -> bool:
-    """Whether two members are interchangeable: identical, or instances of one class with the same values."""
+    """Whether two members are interchangeable: identical, or instances of the same class with the same values."""
     if standing is member:
         return True
     if isinstance(standing, type) or isinstance(member, type) or type(standing) is not type(member):
@@ -228,7 +228,7 @@ def _settings(member: object) -> dict[str, str]:
 
 
 def _source(member: object) -> tuple[str, str]:
-    """File (or module) and name of a member; the same if its class is loaded again."""
+    """File (or module) and name of a member, which stay the same if its class is loaded again."""
     thing = member if isinstance(member, type) or callable(member) else type(member)
     module = sys.modules.get(thing.__module__)
     file = str(getattr(module, "__file__", None) or thing.__module__)

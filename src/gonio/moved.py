@@ -124,9 +124,9 @@ def new_name(name: str) -> str:
 
 
 class _Finder:
-    """Finds moved modules; it is asked last, for names that no other finder knows.
+    """Finds moved modules; Python asks it last, for names that no other finder knows.
 
-    Not derived from the base classes in `importlib.abc`, whose import would take a sixth of that of Gonio.
+    Not derived from the base classes in `importlib.abc`, whose import would take a sixth as long as Gonio's.
     """
 
     def find_spec(

@@ -1,9 +1,9 @@
 """One thread at a time uses Dr.Jit and Mitsuba.
 
-Both are imported lazily, have one variant for all threads, and order kernels within one thread only; the recorder
-has a single stack. Every public call that computes therefore holds `COMPUTING` until its values are available: calls
-from several threads, or through `asyncio.to_thread`, wait for each other. Code that uses Dr.Jit or Mitsuba in other
-threads must hold the lock too:
+Both are imported lazily, have one variant for all threads, and order kernels only within a thread; the recorder has a
+single stack. Every public call that computes therefore holds `COMPUTING` until its values are available, so calls from
+several threads, or through `asyncio.to_thread`, wait for each other. Code that uses Dr.Jit or Mitsuba in other threads
+must hold the lock too:
 
     from gonio.owner import COMPUTING
     with COMPUTING:
@@ -54,7 +54,7 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
                 forget_frames(error, names_line=isinstance(cause, GonioError))
                 if cause is error:
                     raise
-                # an inner error is raised again without the outer one: errors that cause each other have no end
+                # raise an inner error without the outer one: errors that cause each other would form an endless chain
                 raise cause from (error if isinstance(cause, InputError) else None)
             finally:
                 settle()
@@ -63,12 +63,12 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def forget_frames(error: BaseException, names_line: bool = True) -> None:
-    """Drop what the frames hold that an exception and its causes have left.
+    """Release the local variables of the frames in the tracebacks of an exception and its causes.
 
-    names_line  its text names the line of the user's code, which is otherwise looked for in its causes
-    A notebook stores its last exception and with it the scene: Dr.Jit's virtual calls go to every living BSDF, so that
-    each later render would raise the same error. Of errors that Dr.Jit wraps, the lines go too, since from Python 3.12
-    on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves all of it for a debugger.
+    names_line  whether its message names the line of user code, which is otherwise looked up in its causes
+    A notebook stores its last exception and with it the scene. Dr.Jit's virtual calls reach every living BSDF, so that
+    each later render would raise the same error. Errors that Dr.Jit wraps lose their tracebacks too, since from Python
+    3.12 on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves everything for a debugger.
     """
     if os.environ.get("GONIO_DEBUG"):
         return

@@ -49,11 +49,11 @@ def check(
 ) -> Report:
     """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
 
-    target  a material, or a target's name as `gonio verify` takes it
-    law     a law's name, or several; all where None
-    breaks  laws that may be broken, by name, or with the largest figure that may be; one that holds fails the test
-    more    as `gonio.verify` takes it: deep, seed, timeout, memory, isolated
-    A material that can be sent to another process, or named, is judged there, and may crash.
+    target  a material, or the name of a target as `gonio verify` takes it
+    law     the name of one law or several; None for all
+    breaks  names of laws that may be violated, or a mapping to the largest value allowed; the test fails if one holds
+    more    further keywords of `gonio.verify`: deep, seed, timeout, memory, isolated
+    A material that can be named, or sent to another process, is judged in that process, where it may crash.
     """
     __tracebackhide__ = True
     from .errors import InputError
@@ -64,7 +64,7 @@ def check(
     except InputError as error:
         if error.where != "isolated" or "isolated" in more:
             raise
-        report = verify(target, quick=quick, law=law, isolated=False, **more)  # a class local to the test
+        report = verify(target, quick=quick, law=law, isolated=False, **more)  # for a class local to the test
     complaints = _complaints(report, breaks)
     if complaints:
         pytest.fail("\n".join([str(report), *complaints]), pytrace=False)
@@ -90,7 +90,7 @@ def _complaints(report: Report, breaks: Mapping[str, float] | Collection[str]) -
 # --------------------------------------------------------------------------- --gonio
 
 
-@pytest.hookimpl(tryfirst=True)  # before -k and -m choose
+@pytest.hookimpl(tryfirst=True)  # before -k and -m select
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
     targets = dict.fromkeys(config.getoption("--gonio"))
     if not targets:

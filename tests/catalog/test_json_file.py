@@ -86,7 +86,7 @@ def test_the_best_fit_is_meant_and_others_have_numbers(fitted: Path) -> None:
             name, _, channel = path.rpartition(".")
             held = notation.tree.value_at(material, name if channel in "rgb" else path)
             assert (held["rgb".index(channel)] if channel in "rgb" else held) == value
-    with pytest.raises(InputError, match="no material '3' in it"):
+    with pytest.raises(InputError, match="no material '3' in this file"):
         go.material(f"{fitted}:3")
 
 
@@ -230,7 +230,7 @@ def test_a_material_given_as_text_is_written_as_json(tmp_path: Path) -> None:
     text = "kulla-conty(base=conductor(preset=Au,alpha=0.3))"
     go.convert(text, tmp_path / "gold.json")
     assert go.material(tmp_path / "gold.json") == go.material(text)
-    with pytest.raises(go.InputError, match=r"'\.gltf' is not a format of materials"):
+    with pytest.raises(go.InputError, match=r"'\.gltf' is not a material format"):
         go.convert(text, tmp_path / "gold.gltf")
     assert not (tmp_path / "gold.gltf").exists()
 

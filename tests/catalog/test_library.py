@@ -70,7 +70,7 @@ def test_names_stand_where_materials_do() -> None:
     [
         ("alum-bronz", "did you mean 'alum-bronze'"),
         ("alum-bronze:low2012/lowsmoth_E2", "did you mean 'low2012/lowsmooth_E2'"),
-        ("two-layer-gold:ngan2005/ward", "ngan2005/ward leaves 'two-layer-gold' out"),
+        ("two-layer-gold:ngan2005/ward", "ngan2005/ward does not include 'two-layer-gold'"),
         ("conducter", "did you mean 'conductor'"),
     ],
 )

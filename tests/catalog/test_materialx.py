@@ -126,7 +126,7 @@ if importlib.util.find_spec("MaterialX"):
 
     def test_a_material_that_the_format_does_not_hold_is_not_written(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"type": "conductor", "alpha": 0.3}')
-        with pytest.raises(InputError, match="a conductor given, but materialx holds openpbr"):
+        with pytest.raises(InputError, match="a conductor given, but materialx files hold openpbr"):
             documents.convert(str(tmp_path / "a.json"), tmp_path / "a.mtlx")
         (tmp_path / "b.json").write_text('{"type": "openpbr", "alpha": 0.3}')
         with pytest.raises(InputError, match="has no input 'alpha'"):
@@ -149,8 +149,8 @@ if importlib.util.find_spec("MaterialX"):
         "a picture": (given("base_color", "color3", 'nodename="tiles"'), "its base_color is connected to 'tiles'"),
         "a graph": (given("base_color", "color3", 'nodegraph="G" output="o"'), "its base_color is connected to 'G'"),
         "another type": (given("base_color", "float", 'value="1"'), "of type float, color3 expected"),
-        "no number": (given("base_weight", "float", 'value="red"'), "base_weight = 'red' is no float"),
-        "no value": (given("base_weight", "float", ""), "base_weight = '' is no float"),
+        "no number": (given("base_weight", "float", 'value="red"'), "base_weight = 'red' is not of type float"),
+        "no value": (given("base_weight", "float", ""), "base_weight = '' is not of type float"),
         "not finite": (given("base_weight", "float", 'value="1e999"'), "base_weight = '1e999' is no"),
         "of itself": (including("a.mtlx"), "which includes it again"),
         "outside": (including("../b.mtlx"), "is outside its folder"),
@@ -182,7 +182,7 @@ else:
 
     def test_without_the_wheel_the_error_says_what_to_install(tmp_path: Path) -> None:
         """Nothing of MaterialX is tried where its wheel is missing."""
-        with pytest.raises(MachineError, match="needs the wheel MaterialX") as caught:
+        with pytest.raises(MachineError, match="needs the package MaterialX") as caught:
             read(tmp_path, PAINT)
         assert caught.value.hint == "pip install 'gonio[materialx]'"
         with pytest.raises(MachineError):

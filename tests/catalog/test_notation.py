@@ -90,8 +90,8 @@ class Strict(BSDF):
     [
         ("lamberd", [], "did you mean 'lambert'"),
         ("lambert(", [], "is not a material"),
-        ("lambert(albedo)", [], "sets nothing"),
-        ("lambert", ["=3"], "sets nothing"),
+        ("lambert(albedo)", [], "NAME=VALUE expected"),
+        ("lambert", ["=3"], "NAME=VALUE expected"),
         ("lambert", ["albdo=1"], "no parameter 'albdo'"),
         ("lambert", ["albedo=red"], "a number expected"),
         ("lambert", ["albedo=1,2,"], "a number expected"),

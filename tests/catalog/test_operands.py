@@ -97,7 +97,7 @@ def test_what_is_there_goes_before_what_is_a_name_alone(here: Path) -> None:
         ("a.exr", {Kind.SCENE, *MATERIALS}, ["'a.exr' is a picture, a material or a scene expected", "compare"]),
         ("tables", {Kind.SCENE}, ["baked tables, a scene expected", "info and plot"]),
         ("nowhere/a", MATERIALS, ["no file or folder 'nowhere/a'", "check the path"]),
-        ("broken.json", MATERIALS, ["no JSON: ", "broken.json"]),
+        ("broken.json", MATERIALS, ["not valid JSON: ", "broken.json"]),
         ("sub/mine.py", MATERIALS, ["names a file, but no class in it", "sub/mine.py:CLASS"]),
         ("y" * 5000, MATERIALS, ["'yyy", "...' does not name a material, and no file can have that name"]),
         ("y" * 5000 + "/scene", {Kind.SCENE}, ["no file can have that name"]),

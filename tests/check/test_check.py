@@ -223,7 +223,7 @@ def test_bad_tables_are_refused_with_one_line(tmp_path: Path, capsys: pytest.Cap
     assert "32 x 20 pixels, a square table" in _error(capsys, str(tmp_path / "wide.png"))
     deep = np.repeat((right.astype(np.uint16) * 257)[..., None], 3, axis=2)
     (tmp_path / "deep.png").write_bytes(images.png_bytes(deep))
-    assert "16 bits" in _error(capsys, str(tmp_path / "deep.png"))
+    assert "16-bit" in _error(capsys, str(tmp_path / "deep.png"))
     encoded = images.to_screen(np.repeat(right[..., None] / 255.0, 3, axis=2))
     (tmp_path / "gamma.png").write_bytes(images.png_bytes(encoded))
     assert "encoded as sRGB" in _error(capsys, str(tmp_path / "gamma.png"))
@@ -240,11 +240,11 @@ def test_bad_rows_and_targets_are_refused_with_one_line(tmp_path: Path, capsys: 
     long = _rows(tmp_path / "long.csv", OrenNayar()(of.WO, of.WI))
     long.write_text(long.read_text().replace(long.read_text().splitlines()[1].split(",")[0], "7", 1))
     assert "a unit vector expected" in _error(capsys, str(long), "oren-nayar")
-    assert "no model to judge by" in _error(capsys, str(long))
+    assert "no model to judge against" in _error(capsys, str(long))
     assert "a PDF" in _error(capsys, str(tmp_path / "report.pdf"))
     assert "no file" in _error(capsys, str(tmp_path / "E.png"))
     (tmp_path / "empty").mkdir()
-    assert "an empty folder" in _error(capsys, str(tmp_path / "empty"), "--sheet", "hw4")
+    assert "the folder is empty" in _error(capsys, str(tmp_path / "empty"), "--sheet", "hw4")
     assert "name its sheet" in _error(capsys, str(tmp_path / "empty"))
 
 
@@ -254,7 +254,7 @@ def test_a_picture_of_something_else_or_of_another_shape_is_refused(scene: Path,
     with pytest.raises(go.InputError, match="something else"):
         go.check(tmp_path / "noise.exr", scene=scene)
     images.write(tmp_path / "square.exr", noise[:, :64])
-    with pytest.raises(go.InputError, match="64 x 64 pixels, and the scene's film has 96 x 64"):
+    with pytest.raises(go.InputError, match="64 x 64 pixels, but the scene's film has 96 x 64"):
         go.check(tmp_path / "square.exr", scene=scene)
 
 

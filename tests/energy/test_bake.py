@@ -253,7 +253,7 @@ def test_an_altered_file_is_refused(tmp_path, change):
         ({"method": "sobol"}, "unknown method"),
         ({"lut": ["F"]}, "unknown table"),
         ({"layout": "polar"}, "unknown layout"),
-        ({"layout": "homework", "store": "E/2"}, "unknown 'E/2'"),
+        ({"layout": "homework", "store": "E/2"}, "unknown form 'E/2'"),
         ({"layout": "homework", "aspect": 0.5}, "homework's layout"),
         ({"layout": "homework", "lut": ["E", "glass"]}, "'glass' in the homework's layout"),
         ({"aspect": 0.0}, "alpha_y / alpha_x = 0"),

@@ -220,10 +220,10 @@ def test_a_bad_map_is_refused_by_its_name(tmp_path, capsys, monkeypatch, name):
         (["sky.exr", "--ndf", "gxx"], "ggx"),
         (["sky.exr", "--masking", "x"], "masking"),
         (["sky.exr", "--lut", "E"], "prefiltered"),
-        (["sky.exr", "--resolution", "64"], "--resolution 64 does not go with"),
+        (["sky.exr", "--resolution", "64"], "--resolution 64 does not apply to"),
         (["sky.exr", "-o", "no/folder"], "does not exist"),
         (["screen.png"], "clipped at white"),
-        (["ggx", "--lut", "E", "--levels", "3"], "--levels 3 does not go with"),
+        (["ggx", "--lut", "E", "--levels", "3"], "--levels 3 does not apply to"),
     ],
 )
 def test_bad_words_exit_with_2_and_write_nothing(sky, tmp_path, capsys, monkeypatch, words, says):

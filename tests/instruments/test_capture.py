@@ -373,8 +373,8 @@ def no_picture(raw: Raw, folder: Path) -> None:
         (without_seconds, r"p2.npz: no exposure time"),
         (of_another_size, r"p2.npz: 32x32 pixels, 64x64 expected"),
         (saturated, r"white.png: saturated throughout"),
-        (empty, r"p2.npz: no ball in it"),
-        (a_grey_wall, r"p2.npz: no ball in it"),
+        (empty, r"p2.npz: no ball found"),
+        (a_grey_wall, r"p2.npz: no ball found"),
         (missing, r"p2.npz: cannot read this photograph"),
         (no_picture, r"p2.png: no picture of a known format"),
     ],
@@ -397,7 +397,7 @@ def test_pictures_without_any_ball_are_refused(taken: Path, tmp_path: Path) -> N
     square[10:50, 12:52] = 0.5
     for n in range(4):
         images.write(folder / f"p{n}.npz", square)
-    with pytest.raises(InputError, match="no ball in it: what stands out is not round"):
+    with pytest.raises(InputError, match="no ball found: the shape that stands out is not round"):
         go.capture(folder)
 
 
@@ -407,10 +407,10 @@ def test_pictures_without_any_ball_are_refused(taken: Path, tmp_path: Path) -> N
         ({"camera": {"size": [64, 64]}}, "focal"),
         ({"lights": {}}, "no light 'l0'"),
         ({"ball": {"radius": 50.0, "centre": [0, 0, 1]}}, "unknown key 'centre'"),
-        ({"ball": {"radius": 50.0, "center": [0, 0, 1]}}, "stands inside the ball"),
+        ({"ball": {"radius": 50.0, "center": [0, 0, 1]}}, "is inside the ball"),
         ({"response": [[0, 0], [0.5, 0.6], [0.4, 0.8], [1, 1]]}, "does not rise"),
         ({"flat": {"base": [0, 0, 1], "edge0": [1, 0, 0], "edge1": [2, 0, 0]}}, "span no plane"),
-        ({"photographs": [{"light": "l0", "seconds": 1}]}, "file or exposures"),
+        ({"photographs": [{"light": "l0", "seconds": 1}]}, "exactly one of file and exposures"),
     ],
 )
 def test_a_calibration_is_held_to_its_keys(tmp_path: Path, change: Raw, text: str) -> None:

@@ -118,7 +118,7 @@ def spoilt(kind: str) -> np.ndarray:
         ("inf", "1 of 64 heights are not finite"),
         ("one", "1 x 1 pixels, 4 to 1024"),
         ("huge", "1025 x 4 pixels, 4 to 1024"),
-        ("colour", "three channels that differ"),
+        ("colour", "the three channels differ"),
     ],
 )
 def test_a_map_that_is_none_is_refused(kind: str, says: str, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_values_at_wavelengths_follow_the_dispersion() -> None:
         np.testing.assert_allclose(column, plain[:, 0], rtol=1e-12)
     film = go.FilmConductor(eta=0.2, k=3.0, thickness=300.0, alpha=0.3).eval(wo, wi, wavelengths=[450.0, 500.0])
     assert film.shape == (10, 2) and not np.allclose(film[:, 0], film[:, 1], rtol=1e-3)
-    with pytest.raises(InputError, match="no spectrum"):
+    with pytest.raises(InputError, match="not a spectrum"):
         GOLD.eval(wo, wi, wavelengths=[500.0])
     with pytest.raises(InputError, match="positive numbers"):
         go.Lambert().eval(wo, wi, wavelengths=[-1.0])

@@ -121,7 +121,7 @@ def test_arrays_of_jax_have_values_and_gradients_also_compiled(jax: Any) -> None
 @pytest.mark.parametrize(
     ("more", "text"),
     [
-        ({"parameters": {"width": 0.3}}, "'width' is no number or color of Conductor"),
+        ({"parameters": {"width": 0.3}}, "'width' is not a number or color of Conductor"),
         ({"derivatives": ["alpha"]}, "tensors of PyTorch or JAX in eval with derivatives"),
     ],
 )
@@ -131,7 +131,7 @@ def test_a_wrong_call_is_one_clear_error(torch: Any, more: dict[str, Any], text:
 
 
 def test_parameters_of_numpy_belong_to_the_material() -> None:
-    with pytest.raises(go.InputError, match="parameters without tensors"):
+    with pytest.raises(go.InputError, match="parameters given without tensors"):
         GOLD.eval(WO, WI, parameters={"alpha": 0.2})
 
 

@@ -82,9 +82,9 @@ def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
     assert path.stat().st_size <= 2 * 4096 + 1 and report.describe(path)["items"] == ["sample", "half"]
     one, half = (read(row.path) for row in rows)
     assert one.arrays()["basis_theta_h"].tobytes() == half.arrays()["basis_theta_h"].tobytes()
-    with pytest.raises(InputError, match="2 materials in it, one expected"):
+    with pytest.raises(InputError, match="it has 2 materials, one expected"):
         read(path)
-    with pytest.raises(InputError, match="no material 'halb' in it"):
+    with pytest.raises(InputError, match="no material 'halb' in this file"):
         read(f"{path}:halb")
     # as a material like any other
     wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.0, -0.6, 0.8]])

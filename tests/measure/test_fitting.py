@@ -276,7 +276,7 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
         batch.run(files, ["lambert"], report=ends)
     told: list[str] = []
     rows = batch.run(files, ["lambert"], notice=told.append)
-    assert told == ["1 of 2 files were fitted before"] and len(rows) == 2
+    assert told == ["1 of 2 files were already fitted"] and len(rows) == 2
     assert rows[0].best is None and rows[0].fits[0]["material"].startswith("lambert")
 
 

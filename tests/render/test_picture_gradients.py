@@ -118,7 +118,7 @@ def test_derivatives_go_on_from_a_checkpoint_to_the_same_bits(
     scene, path = written(GOLD), ["shapes.0.material.alpha"]
     whole = go.render(scene, spp=9, gradient=path)
     go.render(scene, spp=4, gradient=path, checkpoint=tmp_path / "c")
-    with pytest.warns(go.GonioWarning, match="goes on from"):
+    with pytest.warns(go.GonioWarning, match="continues from"):
         assert np.array_equal(go.resume(tmp_path / "c", spp=9), whole)
 
 

@@ -137,7 +137,7 @@ def test_a_mitsuba_scene_has_passes_of_one_size() -> None:
 
 @pytest.mark.parametrize("text", ["640", "x", "640x", "-3x4", "6.5x4", "640x480x3", "99999999999x1"])
 def test_a_bad_size_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="is no size"):
+    with pytest.raises(InputError, match="is not a size"):
         parse_size(text)
 
 

@@ -226,7 +226,7 @@ def test_one_that_was_stopped_goes_on_to_the_same_bits(scene: Path, tmp_path: Pa
 
 def test_a_checkpoint_keeps_the_error_that_was_asked_for(scene: Path, tmp_path: Path) -> None:
     whole = go.render(scene, until_error=3e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
-    with pytest.warns(GonioWarning, match="goes on from"):
+    with pytest.warns(GonioWarning, match="continues from"):
         assert np.array_equal(go.resume(tmp_path / "c"), whole)
     with pytest.raises(InputError, match=r"settings: .*until_error 0.0003"):
         go.render(scene, until_error=1e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
@@ -259,11 +259,11 @@ def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> N
     result = render_to_file(Request(scene, tmp_path / "a.exr", spp=20, until_error=1e-7))
     assert result.spp == 20 and result.stopped == "" and result.error is not None
     assert result.warnings == (
-        f"relMSE is estimated to be {result.error:.3g} after 20 samples per pixel, 1e-07 was asked for",
+        f"relMSE is estimated to be {result.error:.3g} after 20 samples per pixel, 1e-07 was requested",
     )
     about = images.read(tmp_path / "a.exr").metadata
     assert about["until_error"] == 1e-7 and about["estimated_error"] == pytest.approx(result.error)
-    with pytest.warns(GonioWarning, match="was asked for"):
+    with pytest.warns(GonioWarning, match="was requested"):
         go.render(scene, spp=4, until_error=1e-7)
 
 
@@ -282,7 +282,7 @@ def test_an_error_that_no_picture_has_is_refused(scene: Path, error: float) -> N
 
 
 def test_who_cannot_tell_the_error_says_so(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match="tells no error"):
+    with pytest.raises(InputError, match="gives no error estimate"):
         go.render(scene, until_error=0.1, spp=1)
     with monkeypatch.context() as other:
         other.setattr(executor, "current", lambda: type("Executor", (), {"size": 4, "remote": True})())

@@ -157,7 +157,7 @@ def test_words_that_show_a_missing_picture_are_an_error_before_anything_is_made(
     ("text", "what"),
     [
         ("![a](https://example.org/a.png)", "is not a file"),
-        ("![a](/etc/passwd)", "is no picture"),
+        ("![a](/etc/passwd)", "is not a picture"),
         ("![a](../a.png)", "no file"),
         (r"$\nonsense{x}$", "cannot be set"),
     ],

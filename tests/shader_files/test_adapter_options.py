@@ -100,7 +100,7 @@ def test_command_line_gives_the_adapter_and_macros(own: Path, capsys: pytest.Cap
     ("options", "message"),
     [
         (["-D", "N=2", "--adapter", "cosin=true"], "unknown key 'cosin'"),
-        (["-D", "N=2", "--adapter", "function"], "'function' sets nothing"),
+        (["-D", "N=2", "--adapter", "function"], "'function' given, NAME=VALUE expected"),
         (["-D", "N=2", "--adapter", "arguments=light,vew"], "unknown meaning of an argument 'vew'"),
         (["-D", "N=2", "--adapter", "includes=parts", "--adapter", "function=f"], "no function 'f'"),
         (["--adapter", "includes=parts"], "N is not set"),
@@ -115,7 +115,7 @@ def test_wrong_option_is_an_error(
 
 def test_options_without_a_shader_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["explain", "lambert", "-D", "N=1"]) == 2
-    assert "and no shader" in capsys.readouterr().err
+    assert "without a shader" in capsys.readouterr().err
 
 
 def test_name_with_options_is_read_back() -> None:
@@ -145,7 +145,7 @@ ERRORS = {
     "[parameters.nope]\nlow = 1": r"matte\.glsl\.toml: parameters\.nope: no uniform 'nope'",
     "includes = [1]": r"matte\.glsl\.toml: includes = \[1\]",
     "[defines]\nA = [1]": r"matte\.glsl\.toml: defines\.A",
-    'arguments = ["light", "derived"]': r"matte\.glsl\.toml: arguments: 'derived' without a function",
+    'arguments = ["light", "derived"]': r"matte\.glsl\.toml: arguments: 'derived' given without a function",
     f"[parameters.gloss]\ndefault = 1{'0' * 400}": r"matte\.glsl\.toml: parameters\.gloss: default = 1000",
     f"[parameters.albedo]\nlow = -1{'0' * 400}": r"parameters\.albedo: low = -1000",
     "[parameters.gloss]\nhigh = nan": r"parameters\.gloss: high = nan",
@@ -181,14 +181,14 @@ def test_table_whose_header_lies_is_refused_before_memory_is_taken(own: Path, mo
     monkeypatch.setattr(np, "load", lambda *_, **__: pytest.fail("memory is taken"))
     npy(own.parent, "{'descr': '<f8', 'fortran_order': False, 'shape': (100000, 100000, 1), }")
     with pytest.raises(
-        InputError, match=r"textures\.lut: 'lut\.npy' is no table: its header claims 10000000000 numbers"
+        InputError, match=r"textures\.lut: 'lut\.npy' is not a table: its header claims 10000000000 numbers"
     ):
         shader(own)
 
 
 def test_complex_table_is_refused(own: Path) -> None:
     np.save(own.parent / "lut.npy", np.full((4, 4, 1), 1.0j))
-    with pytest.raises(InputError, match="complex128, no real numbers"):
+    with pytest.raises(InputError, match="complex128, real numbers expected"):
         shader(own)
 
 

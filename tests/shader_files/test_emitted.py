@@ -116,9 +116,9 @@ def test_several_materials_are_told_apart_by_the_function(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"shader": "lambert.wgsl", ', "no manifest"),
+        ('{"shader": "lambert.wgsl", ', "not a manifest"),
         ('{"shader": "lambert.wgsl"}', "KeyError 'functions'"),
-        ('{"shader": "lambert.wgsl", "functions": 3}', "no manifest of `gonio emit`"),
+        ('{"shader": "lambert.wgsl", "functions": 3}', "not a manifest of `gonio emit`"),
     ],
 )
 def test_damaged_manifest_is_refused(text: str, message: str, tmp_path: Path) -> None:

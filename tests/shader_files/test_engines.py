@@ -376,9 +376,9 @@ def test_verb_writes_the_package_and_keeps_what_is_there(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "is no JSON"),
-        (None, "no package.json"),
-        ("[]", "no adapter to the package 'None'"),
+        ("", "is not valid JSON"),
+        (None, "its package.json cannot be read"),
+        ("[]", "no adapter for the package 'None'"),
         ('{"name": "left-pad"}', "'left-pad'"),
     ],
 )

@@ -132,7 +132,7 @@ def test_a_spectral_picture_of_a_shader_says_why_not(tmp_path: Path, scene: Path
     described["scene"]["shapes"][0]["material"] = {"type": "shader", "file": "matte.glsl", "albedo": 0.5}
     (scene / "scene.json").write_text(json.dumps(described))
     assert np.asarray(go.render(scene)).max() > 0.1
-    with pytest.raises(go.InputError, match="knows red, green and blue only") as refused:
+    with pytest.raises(go.InputError, match="supports only red, green and blue") as refused:
         go.render(scene, spectral=True)
     assert refused.value.hint == "render in an RGB variant, such as llvm_ad_rgb"
     assert str(refused.value.where).endswith("/shapes/0/material")
@@ -168,7 +168,7 @@ def test_adopted_shader_reads_as_before(tmp_path: Path) -> None:
 
 BAD = {
     "::begin parameters\nfloat a 0 1\n::end parameters": "declares no parameter",
-    "::begin parameters\nfloat a 0 1 x\n::end parameters": "no numbers",
+    "::begin parameters\nfloat a 0 1 x\n::end parameters": "not numbers",
     "::begin parameters\nfloat a 0 nan 1\n::end parameters": "not finite",
     "::begin shader\nvec3 F() { return vec3(0); }\n::end shader": "no function 'BRDF'",
     "::begin shader\nvec3 BRDF(vec3 L) { return vec3(0); }\n::end shader": "5 meanings for the 1",
@@ -187,7 +187,7 @@ BAD_ADAPTERS = {
     "arguments = ['lihgt']": "unknown meaning",
     "[parameters.a]\ndefault = 1": "no uniform 'a'",
     "[parameters.albedo]\ndefault = 'x'": "wrong type",
-    "a = [": "no adapter",
+    "a = [": "not an adapter",
     "function = 'g'": "no function 'g'",
 }
 
@@ -397,7 +397,7 @@ def test_quoted_include_is_found_beside_the_shader(tmp_path: Path) -> None:
     written(tmp_path, "outside.glsl", "float half_of(float x) { return x; }")
     for name in ('"../outside.glsl"', "<outside>"):
         written(folder, "b.glsl", text % name)
-        with pytest.raises(InputError, match=r"outside.* lies in no folder"):
+        with pytest.raises(InputError, match=r"outside.* is not in a folder"):
             go.Shader(str(folder / "b.glsl"))
 
 

@@ -118,5 +118,5 @@ def test_each_override_is_computed_once(tmp_path: Path) -> None:
     file.write_text("\n".join([*reversed(lines), "fn brdf(L: vec3f, V: vec3f) -> f32 { return a29; }"]))
     np.testing.assert_allclose(go.Shader(file, a0=0.75).eval(WO, WI)[:, 0], 0.75 * WI[:, 2], rtol=1e-6)
     file.write_text("override a = b;\noverride b = a;\nfn brdf(L: vec3f, V: vec3f) -> f32 { return a; }")
-    with pytest.raises(InputError, match="needs itself"):
+    with pytest.raises(InputError, match="depends on itself"):
         go.Shader(file)

@@ -74,5 +74,5 @@ def test_numbers_that_overflow_are_refused() -> None:
 
 @pytest.mark.parametrize(("lang", "more"), [("glsl", {"fit": "2"}), ("glsl", {"ibl": True}), ("numpy", {})])
 def test_it_goes_with_whole_materials_in_a_shader_language(lang: str, more: dict[str, Any]) -> None:
-    with pytest.raises(go.InputError, match="half precision asked for"):
+    with pytest.raises(go.InputError, match="half precision requested"):
         half(GLASS, lang, **more)

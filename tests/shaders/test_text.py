@@ -260,7 +260,7 @@ def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: s
     assert f"// KullaConty_eval({own}, derived, wo, wi)   the BSDF times |cos theta_i|, RGB, 1/sr" in head
     assert f"// KullaConty_derive({own})" in head and "KullaConty_terms" not in head
     assert "not enough." in head or lang in ("glsl-vulkan", "osl")  # which have no precision of 16 bits
-    assert re.search(r"base_k\b.*// imaginary part of the refractive index, over the outside's; >= 0", text)
+    assert re.search(r"base_k\b.*// imaginary part of the refractive index, relative to the outside; >= 0", text)
     assert "// width of the microfacet distribution; along x, along y; >= 0 and <= 1" in text
     assert re.search(r"pdf\b.*// density of wi, 1/sr", text)
 

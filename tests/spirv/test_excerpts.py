@@ -42,8 +42,8 @@ def test_functions_keep_their_text_and_lines() -> None:
     ("text", "name", "message"),
     [
         (TEXT, "missing", "no function 'missing' is defined here"),
-        (TEXT, "twice,", "'' is no name of a function"),
-        (TEXT, "a b", "'a b' is no name"),
+        (TEXT, "twice,", "'' is not a function name"),
+        (TEXT, "a b", "'a b' is not a function name"),
         ("float open(float x) { return x;", "open", "no function 'open'"),
         ("float declared(float x);", "declared", "no function 'declared'"),
     ],

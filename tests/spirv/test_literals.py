@@ -42,7 +42,7 @@ def test_text_that_is_made_by_code_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["`", "a = `b ${ c", "`${ `${ `", "x = `\\"])
 def test_literal_without_an_end_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="does not end"):
+    with pytest.raises(InputError, match="is not closed"):
         literals(text, "x.js")
 
 
@@ -92,8 +92,8 @@ def test_include_repeats_a_text_per_index_and_renames(tmp_path: Path) -> None:
     assert [Machine(module).call(module.function(name)[0], []) for name in names] == [0.0, 1.0, 5.0, 7.5]
     assert not module.function("lamp2")
     for wrong, words in (
-        ("[0..65]", "65 as the end"),
-        ("[0..MANY]", "MANY as the end"),
+        ("[0..65]", "65 is not a number of repeats"),
+        ("[0..MANY]", "MANY is not a number of repeats"),
         ("(a,b,c)", "after an include"),
     ):
         with pytest.raises(InputError, match=words):

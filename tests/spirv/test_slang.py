@@ -113,7 +113,7 @@ def test_a_mistake_is_told_with_file_and_line(tmp_path: Path) -> None:
     ["import core;", 'int a; import "/etc/passwd";', '#/* */include "/etc/passwd"', '#\\\ninclude "x"', "__include x;"],
 )
 def test_the_compiler_itself_reads_no_other_file(line: str) -> None:
-    with pytest.raises(InputError, match="is not followed"):
+    with pytest.raises(InputError, match="is not supported"):
         slang.program(f"{line}\nfloat f() {{ return 1; }}", [], "my.slang")
     harmless = slang.program(f"// {line.partition(chr(10))[0]}\nfloat f() {{ return 1; }}", [], "my.slang")
     assert "gonio_entry" in harmless
@@ -121,7 +121,7 @@ def test_the_compiler_itself_reads_no_other_file(line: str) -> None:
 
 def test_without_the_compiler_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MachineError, match="no compiler of Slang is installed") as refused:
+    with pytest.raises(MachineError, match="the Slang compiler slangpy is not installed") as refused:
         compile_text("float f() { return 1; }", "my.slang", language="slang")
     assert "slangpy" in refused.value.hint
 
@@ -130,7 +130,7 @@ def test_without_the_compiler_it_is_named(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize(
     ("line", "what"),
     [
-        ("double d = double(L.x) * 0.5;", "doubles and 16-bit types are not read"),
+        ("double d = double(L.x) * 0.5;", "doubles and 16-bit types"),
         ("float d = WaveActiveSum(L.x);", "a subgroup operation"),
         ("c[0] = 1.0; float d = 0.0;", "a write to the buffer 'c'"),
     ],

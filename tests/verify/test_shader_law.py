@@ -43,12 +43,12 @@ def test_a_material_without_shader_code_is_not_judged() -> None:
 
 def test_without_a_compiler_the_law_is_not_tried_and_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> str:
-        raise MachineError("no compiler of shaders is installed", "shader", "install it")
+        raise MachineError("the shader compiler glslang is not installed", "shader", "install it")
 
     monkeypatch.setattr("gonio.spirv.compiler.compiler", missing)
     report = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)
     found = report["shader"]
-    assert found.status == "not tried" and "no compiler" in found.why[0] and found.figure is not None
+    assert found.status == "not tried" and "not installed" in found.why[0] and found.figure is not None
     assert "NOT TRIED" in str(report) and "shader holds" not in str(report)
     assert report.untried == ["shader"]
     assert 'skipped="1"' in junit.text(report) and "::notice" in github.text(report)
@@ -57,7 +57,7 @@ def test_without_a_compiler_the_law_is_not_tried_and_does_not_pass(monkeypatch: 
 
 def test_text_that_differs_fails_without_a_compiler_too(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> str:
-        raise MachineError("no compiler of shaders is installed", "shader", "install it")
+        raise MachineError("the shader compiler glslang is not installed", "shader", "install it")
 
     def wrong(material: go.BSDF, language: str) -> Any:
         made = bundle(material, language)

@@ -196,7 +196,7 @@ def test_a_class_of_a_plugin_names_it_or_says_what_to_type(tmp_path: Path) -> No
     with pytest.raises(go.InputError) as caught:
         targets.resolve(f"{other}:MyBlack")
     assert "mi.register_bsdf('NAME', MyBlack)" in caught.value.hint
-    with pytest.raises(go.InputError, match="MyBlack is a BSDF of Mitsuba's"):
+    with pytest.raises(go.InputError, match="MyBlack is a Mitsuba BSDF"):
         go.plot(f"{other}:MyBlack")
 
 

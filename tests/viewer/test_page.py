@@ -364,4 +364,4 @@ def test_the_homework_by_its_text_has_its_terms_and_says_why_it_has_a_rim() -> N
 
 def test_the_homework_takes_no_material(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["view", "lambert", "--homework"]) == 2
-    assert "--homework and lambert together" in capsys.readouterr().err
+    assert "--homework given with lambert" in capsys.readouterr().err

@@ -2,4 +2,4 @@
 
 from ..files import check_current_folder
 
-check_current_folder()  # where it has been deleted, importing Mitsuba ends the process
+check_current_folder()  # if it has been deleted, importing Mitsuba ends the process

@@ -12,11 +12,11 @@ Rows = tuple[str, str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 class Answer(NamedTuple):
     """A query and its result.
 
-    what   the call, "eval_pdf"
-    wrong  what is wrong with the result, "" if nothing is
-    share  fraction of the reflected light that is wrong, if it shows in a picture
-    worst  the same for a single pair of directions
-    rows   two values that should be equal: their names, wo, wi, (N, 3), and the values, (N, channels)
+    what   the call, such as "eval_pdf"
+    wrong  what is wrong with the result; "" if nothing is
+    share  error as a fraction of the reflected light, if the error affects pictures
+    worst  largest error relative to the value for a single pair of directions
+    rows   two values that should be equal: their names, wo and wi, (N, 3), and the values, (N, channels)
     """
 
     what: str

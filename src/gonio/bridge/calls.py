@@ -1,8 +1,8 @@
-"""The calls of Mitsuba's integrators other than eval, pdf and sample, compared with those three.
+"""The calls that Mitsuba's integrators make in addition to eval, pdf and sample, compared with those three.
 
-Path tracers call `eval_pdf` and `eval_pdf_sample`, switch lanes off with `active`, request single components and types,
-and read flags first; denoisers call `eval_diffuse_reflectance`. A plugin that implements one of these separately can
-pass every test of the others.
+Path tracers call `eval_pdf` and `eval_pdf_sample`, disable lanes with `active`, request single components and types,
+and read flags first; denoisers call `eval_diffuse_reflectance`. A plugin that implements one of these separately may
+have an error there and still pass every test of the others.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .answers import Answer
 from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceInteraction
 
 COUNT = 4096
-SAME = 1e-4  # relative: float32, and kernels that are fused differently
-SIGMAS = 6.0  # of the difference of two means that chance does not explain
+SAME = 1e-4  # relative tolerance, for float32 and kernels that are fused differently
+SIGMAS = 6.0  # standard deviations beyond which a difference of two means is not due to chance
 LEAST = 0.02  # smallest difference of means that is reported
-FEW = 0.002  # fraction of rows that rounding may move across a discontinuity
+FEW = 0.002  # fraction of rows that rounding errors may move across a discontinuity
 
 
 def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
-    """The result of every call at the given surface interaction (COUNT wide), whose wi is replaced."""
+    """The result of every call at the given surface interaction, which has COUNT lanes and whose wi is replaced."""
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
         ("eval_pdf", trial.eval_pdf),
@@ -83,7 +83,7 @@ class _Trial:
         u = rng.random((3, COUNT), dtype=np.float32)
         self.wo, self.u = _vector(wo), (mi.Float(u[0]), mi.Point2f(u[1], u[2]))
         si.wi = _vector(wi)
-        # Half of the pairs follow the plugin's own samples, to cover narrow lobes.
+        # Half of the pairs are the plugin's own samples, to cover narrow lobes.
         drawn, _ = bsdf.sample(self.ctx, si, *self.u)
         usable = (np.arange(COUNT) % 2 == 0) & (np.abs(np.linalg.norm(_rows(drawn.wo), axis=1) - 1.0) < 1e-3)
         self.wo = _vector(np.where(usable[:, None], _rows(drawn.wo), wo))
@@ -132,7 +132,7 @@ class _Trial:
             "sample's weight": (self.color(weight), self.weight),
         }
         for name, (got, expected) in asked.items():
-            # Many of Mitsuba's own plugins leave pdf and weight of inactive lanes unchanged: integrators discard them.
+            # Many of Mitsuba's own plugins do not mask the pdf and weight of inactive lanes; integrators discard them.
             if name.startswith("eval") and "pdf's pdf" not in name and np.any(got[~live] != 0.0):
                 return f"{name} of inactive lanes is {np.abs(got[~live]).max():.4g}, 0 expected"
             wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], expected[live])
@@ -170,7 +170,7 @@ class _Trial:
             return "light is transmitted, but no flag declares transmission"
         beyond = wi * _rows(self.drawn.wo)[:, 2] < 0.0
         said = (sampled & (int(flags.Transmission) | int(flags.Null))) > 0
-        either = (sampled & int(flags.Reflection)) > 0  # the lobes of hair go to both sides
+        either = (sampled & int(flags.Reflection)) > 0  # the lobes of hair cover both sides
         strange = self.lit & (said != beyond) & (np.abs(wi) > 1e-3) & ~(said & either)
         if strange.any():
             row = int(np.argmax(strange))
@@ -209,7 +209,7 @@ class _Trial:
         return self.parts(contexts, "reflection and transmission")
 
     def rotated_frame(self) -> str:
-        """Directions are local: a surface rotated in space together with its tangents has the same values."""
+        """Whether a surface rotated in space together with its tangents has the same values: directions are local."""
         frame = mi.Frame3f(mi.Vector3f(0.48, 0.6, 0.64), mi.Vector3f(-0.8, 0.6, 0.0), mi.Vector3f(-0.36, -0.48, 0.8))
         frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
         si = mi.SurfaceInteraction3f(self.si)
@@ -224,7 +224,7 @@ class _Trial:
         )
 
     def textured(self) -> str:
-        """At other texture coordinates sample, eval and pdf read the same textures."""
+        """Whether sample, eval and pdf read the same textures at other texture coordinates."""
         si = mi.SurfaceInteraction3f(self.si)
         uv = np.random.default_rng(112).random((2, COUNT), dtype=np.float32)
         si.uv = mi.Point2f(uv[0], uv[1])
@@ -240,8 +240,8 @@ class _Trial:
         )
 
     def null_transmission(self) -> str:
-        """What passes unscattered, as integrators with shadow rays through surfaces ask for it, is what null samples
-        carry. The base class, and thus a plugin without this call, answers 0."""
+        """Whether the unscattered transmission, which integrators query for shadow rays through surfaces, equals the
+        contribution of null samples. The base class, and thus a plugin without this method, returns 0."""
         null = self.lit & (
             np.broadcast_to(np.asarray(self.drawn.sampled_type.numpy()), COUNT) & int(mi.BSDFFlags.Null) > 0
         )
@@ -252,7 +252,7 @@ class _Trial:
         return self.unlike("eval_null_transmission", "weight x pdf of null samples", value[null], carried)
 
     def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
-        """Components requested one by one add up to the sum, and their samples are of the requested component."""
+        """Whether components requested one by one add up to the total and return samples of the requested component."""
         total = np.zeros_like(self.value)
         for name, ctx, number in contexts:
             value = self.color(self.bsdf.eval(ctx, self.si, self.wo))
@@ -275,10 +275,10 @@ class _Trial:
         return ""
 
     def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
-        """A delta lobe carries weight x pdf, whether it is requested alone or chosen among others."""
+        """Whether weight x pdf of a delta lobe is the same if it is requested alone or chosen among others."""
         delta = _is_delta(bs)
         wo, drawn = _rows(bs.wo), _rows(self.drawn.wo)
-        # at grazing views what is mirrored and what passes straight on are close together, on either side
+        # at grazing angles, mirrored and straight directions are close together, on opposite sides of the surface
         same = (np.abs(wo - drawn).max(1) < 1e-3) & (np.sign(wo[:, 2]) == np.sign(drawn[:, 2]))
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
@@ -287,9 +287,9 @@ class _Trial:
         return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", single, among)
 
     def drawn_by_pdf(self, name: str, ctx: BSDFContext, bs: BSDFSample, weight: np.ndarray) -> str:
-        """Samples that were requested of one part have the density that `pdf` states for it: their means of 1, of the
-        cosine to the mirror direction and of cos^2, where the part reflects light, are those of all samples, weighted
-        by the ratio of the densities."""
+        """Whether samples requested of one component have the density that `pdf` returns for it: where the component
+        reflects light, their means of 1, of the cosine to the mirror direction and of cos^2 must equal those of all
+        samples, weighted by the ratio of the densities."""
         if self.delta.any() or _is_delta(bs).any():
             return ""
         other = self.drawn.wo
@@ -322,7 +322,8 @@ class _Trial:
         up = mi.Vector3f(0.0, 0.0, 1.0)
         # the default of Mitsuba's base class, which exceeds 1 for glossy BSDFs
         default = np.pi * self.color(self.bsdf.eval(self.ctx, self.si, up))
-        # From behind, where `eval` may be 0, a plugin that forwards to a nested one looks like one with its own method.
+        # Behind the surface, where `eval` may be 0, a plugin that forwards to a nested one would seem to have a method
+        # of its own.
         front = _rows(self.si.wi)[:, 2] > 0.0
         own = not np.allclose(value[front], default[front], rtol=1e-3, atol=1e-6)
         if own and (np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3)):
@@ -337,7 +338,7 @@ class _Trial:
         return ""
 
     def unlike(self, name: str, other: str, got: np.ndarray, expected: np.ndarray) -> str:
-        """A description of the largest difference, "" if there is none."""
+        """A description of the difference between two values; "" if there is none."""
         if self.noisy:
             return ""
         got, expected = np.broadcast_arrays(got, expected)
@@ -357,7 +358,7 @@ class _Trial:
 
 
 def _is_delta(bs: BSDFSample) -> np.ndarray:
-    """Whether each sample is of a delta lobe or passes straight through, (COUNT,)."""
+    """Whether each sample belongs to a delta lobe or passes straight through, (COUNT,)."""
     type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
     return np.asarray((type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0)
 

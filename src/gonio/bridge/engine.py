@@ -19,7 +19,7 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 def _driver() -> ctypes.CDLL | None:
-    """NVIDIA's driver library, if it is installed and initializes (tried without starting Dr.Jit)."""
+    """NVIDIA's driver library if it is installed and can be initialized, else None; does not start Dr.Jit."""
     for name in ("libcuda.so.1", "nvcuda.dll"):
         with contextlib.suppress(OSError):
             driver = ctypes.CDLL(name)
@@ -28,7 +28,7 @@ def _driver() -> ctypes.CDLL | None:
 
 
 def cuda_available() -> bool:
-    """Whether an NVIDIA driver with at least one device answers."""
+    """Whether there is a working NVIDIA driver with at least one device."""
     driver, count = _driver(), ctypes.c_int(0)
     return driver is not None and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
 
@@ -52,16 +52,16 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
 
 
 def polarized(variant: str) -> str:
-    """The polarized variant, with spectral colors, on the same device as another variant."""
+    """The polarized spectral variant on the same device as another variant."""
     return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
 @exclusive
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
-    """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else `variant_for`.
+    """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else that of `variant_for`.
 
-    threads  how many cores to use; None leaves Dr.Jit's default (all)
-    Raises MachineError where no usable LLVM or no GPU is found, or other users may change the kernels; InputError where
+    threads  number of cores to use; None keeps Dr.Jit's default (all)
+    Raises MachineError if no usable LLVM or no GPU is found, or if other users may change the kernels; InputError if
     the current folder has been deleted.
     """
     if "mitsuba" not in sys.modules:
@@ -106,7 +106,7 @@ def _own(mi: ModuleType) -> int:
 
 @contextlib.contextmanager
 def using(variant: str) -> Iterator[None]:
-    """Compute with a variant, whatever another thread has set, and restore the previous one."""
+    """Use a variant inside the block, whatever another thread has set, and restore the previous one."""
     import mitsuba as mi
 
     with COMPUTING:
@@ -123,9 +123,10 @@ def using(variant: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
-    """Restore the variant and the number of threads after the block. If no variant was set before, a spectral one
-    becomes RGB on the same device: the rest of a program expects three colors, and as many threads as Dr.Jit has by
-    itself: with one, Mitsuba can read no OpenEXR, see `faults.exr_threads`."""
+    """Restore the variant and the number of threads after the block. If no variant was set before, a spectral one is
+    replaced by RGB on the same device, since the rest of a program expects three colors. If Mitsuba was not loaded
+    before, the number of threads becomes Dr.Jit's default: with one, Mitsuba can read no OpenEXR, see
+    `faults.exr_threads`."""
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
     threads = None if loaded is None else sys.modules["drjit"].thread_count()

@@ -26,9 +26,9 @@ from .faults.exr_threads import file_threads
 from .native import MitsubaBSDF
 from .types import BSDFPlugin, OfVariant, PluginDict
 
-# Below it, Mitsuba's documentation recommends the smooth plugin, and its float32 code is close to its limit.
+# Below this, Mitsuba's documentation recommends the smooth plugin, and its float32 code is close to its limit.
 SMALLEST_ALPHA = 1e-3
-# Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are passed on as they are
+# Albedo-like properties of Mitsuba's own plugins, in [0, 1]; other colors are passed on unchanged
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
 
 
@@ -54,7 +54,7 @@ class _Described(MitsubaBSDF):
     """A BSDF that is built from a dictionary, and rebuilt when a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
-    plugin: ClassVar[PluginDict] = {}  # of an instance: its description with parameter values
+    plugin: ClassVar[PluginDict] = {}  # in an instance: its description with parameter values
 
     @property
     def by_nature(self) -> Mapping[str, str]:
@@ -90,7 +90,7 @@ class _Described(MitsubaBSDF):
 
 
 def load(description: PluginDict) -> MitsubaBSDF:
-    """The BSDF of a dictionary for `mi.load_dict`; InputError if Mitsuba rejects it."""
+    """The BSDF of a dictionary for `mi.load_dict`. Raises InputError if Mitsuba rejects it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
     known = RANGES.get(kind, {})
@@ -111,7 +111,7 @@ def load(description: PluginDict) -> MitsubaBSDF:
 
 
 def _built(description: PluginDict) -> BSDFPlugin:
-    """The plugin of a description; InputError if Mitsuba rejects it."""
+    """The plugin of a description. Raises InputError if Mitsuba rejects it."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
     _check_plugins(description, f"mitsuba:{kind}")
@@ -138,7 +138,7 @@ def _check_plugins(description: Mapping[str, object], location: str) -> None:
 
 
 def _albedos(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
-    """The albedos of a plugin that are one number or color each."""
+    """The albedos of a plugin that are a single number or color."""
     import mitsuba as mi
 
     held = mi.traverse(bsdf)
@@ -166,7 +166,7 @@ def plugins() -> list[str]:
     return sorted(_NESTS)
 
 
-# Mitsuba does not tell a plugin's kind without building it: these are the properties that each needs to be built.
+# Mitsuba does not report a plugin's kind without building it; these are the properties that each needs to be built.
 _DIFFUSE = {"type": "diffuse"}
 _NESTS: dict[str, PluginDict] = {
     "blendbsdf": {"weight": 0.5, "a": _DIFFUSE, "b": {"type": "roughconductor"}},
@@ -194,8 +194,8 @@ _NESTS: dict[str, PluginDict] = {
     "twosided": {"bsdf": {"type": "roughconductor"}},
 }
 
-# A frame that differs from the surface's has a preferred direction, and cosines that are not the surface's (Veach1997,
-# section 5.3). Mitsuba's manual calls these two plugins an approximation for this reason.
+# A frame that differs from the surface's has a preferred direction, and its cosines are not the surface's (Veach1997,
+# section 5.3). For this reason, Mitsuba's manual calls these two plugins an approximation.
 _TILTED_FRAME = {
     "isotropy": "its shading normal is tilted to one side and rotates with the surface",
     "reciprocity": "the cosine of wi refers to a normal other than the surface's (Veach1997, section 5.3)",
@@ -212,7 +212,7 @@ _BY_NATURE: dict[str, dict[str, str]] = {
 
 
 def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
-    """A plugin by name with the given properties; plugins that nest BSDFs get plain ones."""
+    """A plugin by name with the given properties; plugins that need nested BSDFs get plain ones."""
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
         ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
@@ -221,12 +221,12 @@ def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
     return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
 
 
-_registered: dict[Path, dict[str, object]] = {}  # registered plugins by the path of the file that was run
+_registered: dict[Path, dict[str, object]] = {}  # plugins by the path of the file that registered them
 
 
 def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
-    """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
-    the file registers none of that name."""
+    """The plugin FILE.py:NAME, where NAME is the name under which the file registers it, or its class; None if the file
+    registers no such plugin."""
     path = Path(os.path.expanduser(target.rpartition(":")[0])).resolve()
     name = target.rpartition(":")[2]
     if not path.is_file() or b"mitsuba" not in path.read_bytes():
@@ -251,7 +251,7 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
 
 
 def _name_of(cls: object, registered: Mapping[str, object], file: str) -> str:
-    """The name under which a file registers a class of plugins, itself or by a function that constructs it. Raises
+    """The name under which a file registers a class of plugins, directly or by a function that constructs it. Raises
     InputError if there is none."""
     name = getattr(cls, "__name__", "")
     by_class = next((kind for kind, make in registered.items() if make is cls), "")
@@ -263,7 +263,7 @@ def _name_of(cls: object, registered: Mapping[str, object], file: str) -> str:
                 return kind
     known = [f"{file}:{kind}" for kind in registered]
     hint = f"name a registered plugin: {', '.join(known)}" if known else f"add mi.register_bsdf('NAME', {name})"
-    raise InputError(f"no plugin that the file registers is a {name}", file, hint)
+    raise InputError(f"the file registers no plugin of the class {name}", file, hint)
 
 
 def mitsuba() -> ModuleType:

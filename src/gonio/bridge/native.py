@@ -1,7 +1,7 @@
 """A Mitsuba BSDF, built in or a user's plugin, as a material of its own or nested in one of Gonio's.
 
-Mitsuba's `wi` is Gonio's `wo`, and vice versa. Mitsuba's BSDFs read a surface interaction: nested in a Gonio plugin
-they get that of the ray; otherwise one whose shading frame is the local frame, at uv = (0.5, 0.5). Values are float32,
+Mitsuba's `wi` is Gonio's `wo`, and vice versa. Mitsuba's BSDFs read a surface interaction: those nested in a Gonio
+plugin get that of the ray, others one whose shading frame is the local frame, at uv = (0.5, 0.5). Values are float32,
 since the wheel has no 64-bit variant; a Mueller matrix is reduced to its value for unpolarized light.
 """
 
@@ -29,14 +29,14 @@ class MitsubaBSDF(BSDF):
     precisions: ClassVar[tuple[str, ...]] = ("float32",)
     zero_weight_is_failure: ClassVar[bool] = True
     bsdf: ClassVar[BSDFPlugin]  # an attribute of each instance, but not a parameter
-    _si: ClassVar[SurfaceInteraction | None] = None  # where it is evaluated, on a copy bound by `at`
+    _si: ClassVar[SurfaceInteraction | None] = None  # in a copy bound by `at`: where it is evaluated
     _active: ClassVar[Mask] = True
 
     def __init__(self, bsdf: BSDFPlugin) -> None:
         object.__setattr__(self, "bsdf", bsdf)
 
     def at(self, si: SurfaceInteraction, active: Mask) -> MitsubaBSDF:
-        """The copy that is evaluated at a surface interaction."""
+        """A copy that is evaluated at a surface interaction."""
         return binding.bound_copy(self, {"_si": si, "_active": active})
 
     # ------------------------------------------------------------------ formulas
@@ -61,9 +61,9 @@ class MitsubaBSDF(BSDF):
         delta = mi.has_flag(bs.sampled_type, flags.Delta) | mi.has_flag(bs.sampled_type, flags.Null)
         pdf = bs.pdf
         if self._si is None:
-            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. A direction
-            # that is drawn with the density that `pdf` states is a sample, though, also where nothing is reflected.
-            # Inside a mix, weight 0 may also be a black lobe toward a direction that the other material reflects to.
+            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. However, a
+            # direction sampled with the density that `pdf` returns is a valid sample, even if nothing is reflected.
+            # Inside a mix, weight 0 may also be a black lobe toward a direction in which the other material reflects.
             stated = self.bsdf.pdf(ctx, si, bs.wo, self._active)
             failed = dr.all(weight == 0.0) & ~((pdf > 0.0) & (dr.abs(stated - pdf) < 1e-3 * pdf))
             pdf, delta = dr.select(failed, 0.0, pdf), delta & ~failed
@@ -79,7 +79,7 @@ class MitsubaBSDF(BSDF):
             si.wi = mi.Vector3f(wo)
             return si
         if self.bsdf.variant_name() != mi.variant():
-            what = f"this BSDF is of variant {self.bsdf.variant_name()}, but {mi.variant()} is set"
+            what = f"this BSDF was built in variant {self.bsdf.variant_name()}, but {mi.variant()} is set"
             raise InputError(what, type(self).__name__, "set its variant again, or build the BSDF again")
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wo))
         si.wi = mi.Vector3f(wo)
@@ -95,7 +95,7 @@ class MitsubaBSDF(BSDF):
     # ------------------------------------------------------------------ facts
 
     def renderer_calls(self, seed: int) -> Iterator[Answer]:
-        """The results of the other calls that a renderer makes."""
+        """The results of the calls that a renderer makes in addition to eval, pdf and sample."""
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)
 

@@ -1,8 +1,8 @@
 """Which native plugins Mitsuba may load, and where it looks for them.
 
 Mitsuba loads `plugins/TYPE.so` from the first folder of its file resolver that contains it, otherwise from the current
-folder; this fallback cannot be disabled. Mitsuba also searches for a type that Python has registered, since `load_dict`
-looks up its kind in another variant. Therefore
+folder; this fallback cannot be disabled. Mitsuba searches even for types registered in Python, since `load_dict` looks
+up their kind in another variant. Therefore
 
 - the resolver begins with Mitsuba's own folder and does not contain the current folder (`confine`),
 - a type named by a document is checked before Mitsuba reads the document (`check`),
@@ -25,7 +25,7 @@ from .types import OfVariant
 
 VARIABLE = "GONIO_PLUGINS"  # the user's folders, each with a subfolder `plugins` as in Mitsuba's own
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-# Their properties are memory addresses, which only the program that calls Mitsuba can provide.
+# plugins whose properties are memory addresses, which only the program that calls Mitsuba can provide
 _UNSAFE = ("blender",)
 
 
@@ -45,7 +45,7 @@ def trusted() -> list[Path]:
 
 def confine(mi: ModuleType) -> None:
     """Make Mitsuba search its own folder first, then those of GONIO_PLUGINS and of the program, but not the current
-    one.
+    folder.
 
     On import, Mitsuba appends the folder that is current at that time, and its own.
     """
@@ -61,7 +61,7 @@ def confine(mi: ModuleType) -> None:
 
 @contextlib.contextmanager
 def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
-    """Let Mitsuba also search these folders inside the block, after all others."""
+    """Make Mitsuba also search these folders inside the block, after all others."""
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     for path in folders:
@@ -79,7 +79,7 @@ def check(name: str, location: str, folder: Path | None = None, allow_code: bool
     folder      the document's folder, whose `plugins` may be loaded if `allow_code` is set
     Returns the file in that folder that will be loaded, else None.
     """
-    if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path of it and drops everything from a dot on
+    if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path from it and drops everything after a dot
         raise InputError(f"'{name}' is not a plugin type", location, "a type is a name such as sphere, not a path")
     if name.lower() in _UNSAFE:  # file systems may ignore case
         what = f"'{name}' reads from memory addresses, which a file cannot provide"
@@ -96,7 +96,7 @@ def check(name: str, location: str, folder: Path | None = None, allow_code: bool
 
 
 def register(register_kind: Callable[[str, OfVariant], None], name: str, make: OfVariant) -> None:
-    """Register a Python plugin by `mi.register_bsdf` or a similar function; see `_refuse_current_folder`."""
+    """Register a Python plugin with `mi.register_bsdf` or a similar function; see `_refuse_current_folder`."""
     _refuse_current_folder(name, "Mitsuba")
     register_kind(name, make)
 

@@ -1,27 +1,27 @@
 """Names for the types of Mitsuba and Dr.Jit.
 
-Both ship type information for single variants only, but this package serves all of them: these names document what a
-value is, and check nothing. Values of materials have their own types, in `gonio.ops.types`.
+Both libraries ship type information for single variants only, but this package serves all variants: these names
+document what a value is and check nothing. Values of materials have their own types, in `gonio.ops.types`.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-OfVariant: TypeAlias = Any  # of a class that Mitsuba or Dr.Jit has once per variant
+OfVariant: TypeAlias = Any  # an object of a class that Mitsuba or Dr.Jit has once per variant
 
 # Objects of Mitsuba
-Plugin: TypeAlias = OfVariant  # what a dictionary or a file loads to
+Plugin: TypeAlias = OfVariant  # the result of loading a dictionary or a file
 Scene: TypeAlias = Plugin
 Sensor: TypeAlias = Plugin
 Shape: TypeAlias = Plugin
 Emitter: TypeAlias = Plugin
 Texture: TypeAlias = Plugin
 BSDFPlugin: TypeAlias = Plugin
-Properties: TypeAlias = OfVariant  # of a plugin under construction
+Properties: TypeAlias = OfVariant  # properties of a plugin under construction
 BSDFContext: TypeAlias = OfVariant
 TraversalCallback: TypeAlias = OfVariant
-PluginDict: TypeAlias = dict[str, Any]  # what `mi.load_dict` takes
+PluginDict: TypeAlias = dict[str, Any]  # the argument of `mi.load_dict`
 
 # The contents of a scene file
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
@@ -34,7 +34,7 @@ SurfaceInteraction: TypeAlias = OfVariant
 PositionSample: TypeAlias = OfVariant
 DirectionSample: TypeAlias = OfVariant
 BSDFSample: TypeAlias = OfVariant
-Record: TypeAlias = OfVariant  # one of Gonio's, made for a variant
+Record: TypeAlias = OfVariant  # any other record
 
 # Values with one entry per lane, of the variant's types
 Float: TypeAlias = OfVariant
@@ -44,4 +44,4 @@ Mask: TypeAlias = OfVariant
 Point: TypeAlias = OfVariant  # of two or three components
 Vector: TypeAlias = OfVariant
 Color: TypeAlias = OfVariant  # linear RGB
-Radiance: TypeAlias = OfVariant  # mi.Spectrum: as many channels as the variant has, a Mueller matrix where polarized
+Radiance: TypeAlias = OfVariant  # mi.Spectrum: the variant's channels, or Mueller matrices in polarized variants

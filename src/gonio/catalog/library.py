@@ -4,7 +4,7 @@
     go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
 
 As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The files in `published/`
-contain the figures as printed; this file converts them to parameters. Every fit is also a preset of its model.
+contain the values as printed; this module converts them to parameters. Every fit is also a preset of its model.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
     if fit not in published():
         raise InputError(f"unknown fit '{fit}'", where, did_you_mean(fit, fits(name)))
     if name not in published()[fit].materials:
-        raise InputError(f"{fit} leaves '{name}' out", where, "it has " + ", ".join(fits(name)))
+        raise InputError(f"{fit} does not include '{name}'", where, "it has " + ", ".join(fits(name)))
     return model(published()[fit].model), _key(name, fit)
 
 
@@ -109,7 +109,7 @@ def published() -> dict[str, Fit]:
 
 
 def _unpacked(numbers: list[float], shapes: Mapping[str, tuple[int, ...]]) -> Figures:
-    """The flat list of a material's figures, by parameter: numbers, colors, pairs of colors."""
+    """A material's values from a flat list, by parameter: numbers, colors, pairs of colors."""
     figures: Figures = {}
     at = 0
     for name, shape in shapes.items():
@@ -133,7 +133,7 @@ def _known(name: str, where: str) -> None:
         raise InputError(f"unknown material '{name}'", where, did_you_mean(name, materials()))
 
 
-# --------------------------------------------------------------------------- conversion of the printed figures
+# --------------------------------------------------------------------------- conversion of the printed values
 
 
 def _index(f0: float) -> float:
@@ -155,14 +155,14 @@ def _phong(p: Figures) -> Figures:
 
 
 def _lafortune(p: Figures) -> Figures:
-    """Divided by max(|Cz|, |Cxy|)^n."""
+    """The lobe is divided by max(|Cz|, |Cxy|)^n."""
     largest = max(abs(p["Cz"]), abs(p["Cxy"]))
     cxy, cz = p["Cxy"] / largest, p["Cz"] / largest
     return {"specular": p["albedo"], "cx": cxy, "cy": cxy, "cz": cz, "exponent": p["sharpness"]}
 
 
 def _ngan_cook_torrance(p: Figures) -> Figures:
-    """D with its 1 / pi, over pi again; `eta` is F0 of Schlick's formula."""
+    """D contains 1 / pi and is divided by pi again; `eta` is F0 of Schlick's formula."""
     values = {"alpha": p["roughness"], "eta": _index(p["eta"]), "fresnel": "schlick"}
     return {"specular": _times(p["albedo"], 1.0 / math.pi), **values}
 
@@ -173,13 +173,13 @@ def _ngan_ashikhmin_shirley(p: Figures) -> Figures:
 
 
 def _he(p: Figures) -> Figures:
-    """Lengths in micrometers."""
+    """Lengths are converted to micrometers."""
     lengths = {"sigma": 1000.0 * p["roughness"], "tau": 1000.0 * p["autocorrelation"]}
     return {"specular": p["albedo"], **lengths, "eta": p["eta"]}
 
 
 def _low_ashikhmin_shirley(p: Figures) -> Figures:
-    """`fresnelReflectance` is the index, of the exact equations."""
+    """`fresnelReflectance` is the index, for the exact equations."""
     values = {"exponent": p["sharpness"], "eta": p["fresnelReflectance"], "fresnel": "exact"}
     return {"specular": p["albedo"], **values}
 

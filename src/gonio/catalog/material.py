@@ -1,4 +1,4 @@
-"""`go.material`: a material from anything that names, describes or is one. Every public function takes the same."""
+"""`go.material`: a material from anything that names, describes or is one. Every public function accepts the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from . import notation, outside, texts
 
 
 class HasEval(Protocol):
-    """An object of a class of one's own, with `eval(wo, wi)`, that is not derived from `BSDF`."""
+    """An object of a user's class with `eval(wo, wi)` that is not derived from `BSDF`."""
 
     eval: Any
 
@@ -44,7 +44,7 @@ def material(given: MaterialLike, fit: str = "", **parameters: Value) -> BSDF:
     be read, and for anything else; a GonioWarning names features of a file that Gonio's materials lack.
     """
     if fit and not isinstance(given, str):
-        raise InputError(f"fit '{fit}' given with a {type(given).__name__}", "material: fit", "it goes with a name")
+        raise InputError(f"fit '{fit}' given with a {type(given).__name__}", "material: fit", "give a name with it")
     if isinstance(given, BSDF):
         return notation.changed(given, parameters) if parameters else given
     cls, own = _class_and_values(f"{given}:{fit}" if fit else given)
@@ -52,12 +52,12 @@ def material(given: MaterialLike, fit: str = "", **parameters: Value) -> BSDF:
 
 
 def title_of(given: MaterialLike) -> str:
-    """A short name of what was given, for titles: a text itself, any other material as text."""
+    """A short name for titles: a text itself, any other material as text."""
     return str(given) if isinstance(given, str | Path) else notation.written(material(given))
 
 
 def is_material(value: object) -> bool:
-    """Whether a value other than a text or a path is taken by `material`."""
+    """Whether a value other than a text or a path is accepted by `material`."""
     return isinstance(value, BSDF | Mapping) or callable(getattr(value, "eval", None))
 
 
@@ -70,5 +70,5 @@ def _class_and_values(given: object) -> notation.Settings:
         return outside.as_material(given), {}
     if callable(getattr(given, "eval", None)):
         return outside.adopt(given), {}
-    hint = "a text such as 'conductor(preset=Au)', a file, a dictionary with a \"type\", a class or an instance"
+    hint = "a string such as 'conductor(preset=Au)', a file, a dictionary with a \"type\", a class or an instance"
     raise InputError(f"{shown(given)} given, a material expected", "material", hint)

@@ -62,7 +62,7 @@ def named(
 
 
 def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = True) -> list[Settings]:
-    """For each text the class and its settings: its own, and those of the shared ones that it has.
+    """The class and settings of each text: its own settings, and those of the shared ones that the class has.
 
     assignments  "name=value" each, shared by all; raises InputError for one that no material has
     nested       as in `shared`
@@ -74,7 +74,7 @@ def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = Tru
 
 
 def shared(named: Sequence[Settings], assignments: Sequence[str], nested: bool = True) -> list[dict[str, str]]:
-    """The subset of settings, "name=value" each, for each material; raises InputError for one that none has.
+    """The subset of shared settings, "name=value" each, for each material; raises InputError for one that none has.
 
     nested  also for a material of which an inner one has the parameter
     """
@@ -131,8 +131,8 @@ def _one_of(owner: str, paths: Sequence[str], name: str) -> str:
 
 
 def path_of(material: BSDF, name: str) -> str:
-    """The path of the parameter that a path, or the name of a parameter of one inner material alone, refers to; the
-    text itself if there is none. Raises InputError if several inner materials have it."""
+    """The path of a parameter given by its path, or by its name if only one inner material has it; the text itself if
+    there is none. Raises InputError if several inner materials have it."""
     if "." in name or name in material.parameters():
         return name
     here = {key: getattr(material, key) for key, parameter in material.parameters().items() if parameter.inner}
@@ -166,12 +166,12 @@ def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, 
         return cls(**values), values
     except InputError:
         raise
-    except Exception as error:  # a user's class
+    except Exception as error:  # raised in a user's class
         raise InputError(f"{cls.__name__} cannot be constructed: {type(error).__name__}: {error}", "TARGET") from None
 
 
 def _own_name(known: Mapping[str, Parameter], name: str) -> str:
-    """The name of a parameter: with the underscore that it has where materials have a member of that name."""
+    """The name of a parameter, with the underscore that it has if materials have a member of that name."""
     return f"{name}_" if name not in known and f"{name}_" in known else name
 
 
@@ -219,7 +219,7 @@ def typed(parameter: Parameter, value: Value) -> object:
     if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
         return parameter.coerce(value.strip(' "'), where)
     if isinstance(value, np.ndarray | DispersiveIndex) or backend.is_drjit(value):
-        return value  # one value per ray, or a curve, which a program gives
+        return value  # one value per ray, or a curve, as given by a program
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
@@ -229,8 +229,8 @@ def typed(parameter: Parameter, value: Value) -> object:
 
 
 def written(value: Value) -> str:
-    """A value in the form that `typed` accepts, a material with its non-default parameters; of one value per ray only
-    the shape."""
+    """A value in the form that `typed` accepts: a material with its non-default parameters, but only the shape of an
+    array with one value per ray."""
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={setting(value, name, v)}" for name, v in settings(value).items())
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
@@ -270,7 +270,7 @@ def as_json(material: BSDF) -> dict[str, object]:
     if type(material).spelling:
         notation = {"type": texts.SHADER, "file": type(material).spelling}
     elif notation["type"] != type(material).name and ":" not in str(notation["type"]):
-        what = f"the class {type(material).__name__} is known to this program only"
+        what = f"the class {type(material).__name__} is defined only in this program"
         raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
     for name, value in settings(material).items():
         if isinstance(value, BSDF):
@@ -301,7 +301,7 @@ def for_files(material: BSDF) -> dict[str, object] | None:
 def from_json(described: Mapping[str, object]) -> BSDF:
     """The material that `as_json` describes. Raises InputError for anything else."""
     if not isinstance(described, Mapping) or "type" not in described:
-        raise InputError(f"{described!r:.60} describes no material", "material", 'such as {"type": "conductor"}')
+        raise InputError(f"{described!r:.60} does not describe a material", "material", 'such as {"type": "conductor"}')
     fields = dict(described)
     return made(class_named(texts.named_by(fields), "material"), fields)[0]
 

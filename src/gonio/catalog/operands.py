@@ -1,10 +1,10 @@
-"""The kind of thing that a word of the command line names, a material, a scene, a picture, ..., for all verbs.
+"""The kind of thing that a word of the command line names, a material, a scene, an image, ..., for all verbs.
 
     kind_of("examples/phong", {Kind.SCENE, *MATERIALS}, "SCENE")     Kind.SCENE
 
 A word may have several readings: `phong` is a material, and a folder of that name may contain a scene. The readings are
 ordered, existing files before plain names, and the first that the verb accepts is chosen. Only names, suffixes and file
-contents matter; nothing is run, and names of any length are accepted.
+contents matter: no code is run, and names of any length are accepted.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Kind(enum.Enum):
     TABLE = "a file of measured values"
     DOCUMENT = "a file that describes a material"
     DISTRIBUTION = "a distribution of normals"
-    PLUGIN = "a plugin of Mitsuba's"
+    PLUGIN = "a Mitsuba plugin"
     SCENE = "a scene"
     TABLES = "baked tables"
     PICTURE = "a picture"
@@ -63,12 +63,12 @@ _TAKEN = {
 def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str) -> Kind:
     """The kind of a word, which must be one of the accepted kinds.
 
-    where  the operand, "SCENE", for errors
+    where  name of the operand, "SCENE", for errors
     Raises InputError, with the actual and the expected kinds, if it has none of these kinds.
     """
     text = os.fspath(word)
     if Kind.SCENE in accepted and _exists(Path(text.strip()) / SCENE_FILE):
-        return Kind.SCENE  # the first reading of such a folder; no other needs to be looked for
+        return Kind.SCENE  # the first reading of such a folder, so that others need not be determined
     kinds = readings(text)
     kind = next((one for one in kinds if one in accepted), None)
     if kind is not None:
@@ -141,7 +141,7 @@ def readings(text: str) -> list[Kind]:
 
 
 def _described(name: str, kind: Kind) -> list[Kind]:
-    """The readings of a description by its type: Gonio's, or a Mitsuba plugin's. Names that both have are Gonio's;
+    """The readings of a description by its type: Gonio's, or a Mitsuba plugin's. Names that the two share are Gonio's;
     `twosided` and `thindielectric`, which other verbs read as two-sided and thin-dielectric, are plugins."""
     known = (
         re.sub("^gonio-", "", name) in models()
@@ -204,7 +204,7 @@ def _of_file(path: Path) -> list[Kind]:
 
 
 def _of_archive(path: Path) -> list[Kind]:
-    """Baked tables, networks of several materials, or a picture, by the names of the arrays."""
+    """The readings of an archive, baked tables, networks of several materials or an image, by its array names."""
     try:
         with zipfile.ZipFile(path) as file:
             names = file.namelist()
@@ -231,12 +231,12 @@ def _broken(path: Path) -> str:
     try:
         json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
-        return f"no JSON: {str(error)[:200]}"
+        return f"not valid JSON: {str(error)[:200]}"
     return ""
 
 
 def _may_be_a_path(path: Path) -> bool:
-    """Whether a file could have that name: it is not too long, and contains no zero byte."""
+    """Whether a file could have that name: it is not too long and contains no zero byte."""
     try:
         os.stat(path)
     except ValueError:

@@ -7,6 +7,7 @@ and programs, and by the reader of scenes for which code is allowed.
 from __future__ import annotations
 
 import inspect
+import linecache
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,16 +60,16 @@ def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BS
 
 
 def as_material(cls: object) -> type[BSDF]:
-    """A class as that of a material; raises InputError if it cannot be one."""
+    """A class as a material class; raises InputError if it cannot be one."""
     place = place_of(cls)
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
         hint = f"use it in a material: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
-        raise InputError(f"a {family.kind} given, the class of a material expected", place, hint)
+        raise InputError(f"a {family.kind} given, a material class expected", place, hint)
     if is_plugin(cls):
         name = "".join(f"-{c.lower()}" if c.isupper() else c for c in cls.__name__).lstrip("-")
-        hint = f"register it, mi.register_bsdf('{name}', {cls.__name__}), and judge it: gonio verify FILE.py:{name}"
-        raise InputError(f"{cls.__name__} is a BSDF of Mitsuba's, a material of Gonio's expected", place, hint)
+        hint = f"register it by mi.register_bsdf('{name}', {cls.__name__}), then run gonio verify FILE.py:{name}"
+        raise InputError(f"{cls.__name__} is a Mitsuba BSDF, a Gonio material expected", place, hint)
     if not issubclass(cls, BSDF):
         return adopt(cls, place)
     if cls.eval is BSDF.eval:
@@ -87,8 +88,8 @@ def is_plugin(cls: object) -> bool:
 
 
 def adopt(thing: object, where: str = "") -> type[BSDF]:
-    """A class with `eval` that is not a gonio.BSDF, or an instance, as one: `pdf` and `sample` use a guide computed
-    from it."""
+    """A material class for a class with `eval` that is not a gonio.BSDF, or for an instance of one: `pdf` and `sample`
+    use a guide computed from `eval`."""
     cls = thing if isinstance(thing, type) else type(thing)
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
@@ -124,8 +125,10 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
 
 @exclusive
 def probe(material: BSDF) -> BSDF:
-    """The material itself, after its formulas were tested on two directions. Raises InputError, with file and line, if
-    one raises, uses Python's `if` on a value, or returns a wrong type, instead of a failure deep inside a render."""
+    """The material itself, after a test of its formulas on two directions, before they fail deep inside a render.
+
+    Raises InputError, with file and line, if one raises, uses Python's `if` on a value, or returns a wrong type.
+    """
     if any(is_outside(type(inner)) for _, inner in tree.walk(material)):
         _try(material)
     return material
@@ -140,7 +143,7 @@ def check_operators(material: BSDF) -> BSDF:
     """
     classes = {type(inner) for _, inner in tree.walk(material)}
     files = [_file_of(cls) for cls in classes if not cls.__module__.startswith("gonio.")]
-    if not any(file and "**" in Path(file).read_text(encoding="utf-8", errors="replace") for file in files):
+    if not any("**" in line for file in files for line in linecache.getlines(file)):
         return material
     for formula in ("eval", "pdf", "sample"):
         try:
@@ -166,7 +169,7 @@ U = np.array([[0.3, 0.7, 0.2], [0.8, 0.1, 0.6]])
 
 
 def _try(material: BSDF) -> None:
-    """Test by recording, which compiles nothing; by running if the code uses Dr.Jit directly and cannot be recorded."""
+    """Test by recording, which compiles nothing, or by running, if Dr.Jit is used directly and prevents a recording."""
     path = Path(inspect.getsourcefile(inspect.unwrap(type(material).eval)) or "")
     for formula in ("eval", "pdf", "sample"):
         if material.stochastic or not _recorded(material, formula, path):
@@ -174,7 +177,7 @@ def _try(material: BSDF) -> None:
 
 
 def _recorded(material: BSDF, formula: str, path: Path) -> bool:
-    """Whether a formula can be recorded; if so, its result is checked for the right kinds of values."""
+    """Whether a formula can be recorded; if so, the types of its result are checked."""
     try:
         result = material.record(formula).entry.result
     except RecordingError as error:

@@ -34,14 +34,16 @@ def assignment(text: str, option: str = "--param") -> tuple[str, str]:
     """("alpha", "0.3") for "alpha=0.3"."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
-        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", option, "such as alpha=0.3")
+        raise InputError(f"'{text}' given, NAME=VALUE expected", option, "such as alpha=0.3")
     return name.strip(), value.strip()
 
 
 def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tuple[type[BSDF], dict[str, object]]:
     """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); JSON values for a document's
-    material and for JSON. Raises InputError if it is not a material, and for a document that names code that is not
-    allowed."""
+    material and for JSON.
+
+    Raises InputError if it is not a material, and for a document that names code without permission.
+    """
     if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
         raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
     if parts := summands(text):
@@ -93,7 +95,7 @@ def split(text: str) -> tuple[str, str]:
 
 def summands(text: str) -> list[str]:
     """The parts of a sum of materials, "lambert+ggx", with the lobes of `LOBES` written out; empty for any other text.
-    A + inside brackets, as in 1e+5, or in the name of a file belongs to that."""
+    A + inside brackets, as in 1e+5, or in a file name does not separate parts."""
     parts, depth = [""], 0
     for letter in text if "+" in text else "":
         depth += (letter in "([{") - (letter in ")]}")
@@ -236,9 +238,9 @@ def as_text(value: object) -> str:
 
 
 def range_of(text: str) -> list[str]:
-    """The five values of "LOW..HIGH", geometric where the range spans a factor of ten or more; empty of any other text.
+    """The five values of "LOW..HIGH", geometric if the range spans a factor of ten or more; empty for any other text.
 
-    Raises InputError for ends that are no numbers, or do not increase.
+    Raises InputError for ends that are not numbers or do not increase.
     """
     import numpy as np
 

@@ -1,8 +1,8 @@
-"""A student's own work against the truth: tables, values of f, classes, pictures and folders of these.
+"""Checks of a student's own work against Gonio: tables, values of f, classes, pictures and folders of these.
 
     go.check("E.png"); go.check("f.csv", "oren-nayar(sigma=0.3)", up="y"); go.check("submissions", sheet="hw4")
 
-`run` chooses the judge of each kind of work, `mistakes` and `table_forms` hold the mistakes that can be named, and
+`run` selects the check for each kind of work, `mistakes` and `table_forms` hold the mistakes that can be named, and
 `sheet` the tasks of the courses.
 """
 

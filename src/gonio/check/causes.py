@@ -1,4 +1,4 @@
-"""The probable mistake in values of f: a formula of `mistakes`, or what the referee's finder reads from the ratio."""
+"""The probable mistake in values of f: a formula of `mistakes`, or a factor that `verify.forensics` finds."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .finding import Mistake
 from .mistakes import FAMILIES, Values, Variant, f_of
 
 TOP, BOTTOM = "your f", "the model's"
-REGION = "the region where the values differ"  # the topic where no formula explains them
+REGION = "the region where the values differ"  # the topic if no formula explains them
 
 
 def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expected: Values, accuracy: float) -> Ratio:
-    """The given values over the expected ones, (N, 3) both."""
+    """The ratio of the given to the expected values, each (N, 3)."""
 
     def recompute(subject: Subject, wo: np.ndarray, wi: np.ndarray, mode: str) -> np.ndarray:
         return f_of(subject.model, wo, wi)
@@ -33,8 +33,8 @@ def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expecte
 def named(both: Ratio) -> Mistake | None:
     """The mistake that explains a ratio; None if no formula does.
 
-    A known wrong formula that gives all the values prevails over a factor that the referee reads from the ratio, both
-    over a wrong formula that needs a factor besides, and all over the region where the ratio is not 1.
+    In order of preference: a known wrong formula that reproduces the values; a factor that `verify.forensics` fits to
+    the ratio; a wrong formula times such a factor; the region where the ratio differs from 1.
     """
     telling = referee.telling(both)
     wrong: list[Variant] = []
@@ -57,13 +57,13 @@ def named(both: Ratio) -> Mistake | None:
 
 
 def _either(mistakes: list[Mistake]) -> Mistake:
-    """Mistakes with the same values, such as a factor of 4 and of 1 / alpha = 4: the first three of them."""
+    """The first three of several mistakes with equal values, such as a factor of 4 and of 1 / alpha = 4, as one."""
     texts = list(dict.fromkeys(mistake.words for mistake in mistakes))[:3]
     return Mistake(", or ".join(texts), " or ".join(dict.fromkeys(mistake.topic for mistake in mistakes[:3])))
 
 
 def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
-    """The mistakes whose values differ from the right ones over these rows."""
+    """The mistakes whose values differ from the right ones in these rows."""
     for variant in variants:
         if variant.values.shape != both.below.shape:
             variant = Variant(variant.mistake, variant.values[:, : both.below.shape[1]])
@@ -73,13 +73,13 @@ def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
 
 
 def _equal(both: Ratio, variant: Variant) -> bool:
-    """Whether the given values are those of a mistake, where these are not negligible."""
+    """Whether the given values are those of a mistake, up to negligible ones."""
     return bool(close(both.above, variant.values, tolerance(both)).mean() > COVER)
 
 
 def close(a: Values, b: Values, accuracy: float) -> NDArray[np.bool_]:
-    """Whether two rows of values are equal up to a relative accuracy, (N,); far below the largest value they may
-    differ."""
+    """Whether each two rows of values agree within a relative accuracy, (N,). Values far below the largest one may
+    differ more."""
     size = np.maximum(np.abs(a), np.abs(b))
     floor = 1e-5 * np.percentile(size, 99.0) if size.size else 0.0
     return np.all(np.abs(a - b) <= accuracy * size + accuracy * floor, axis=1)

@@ -1,4 +1,4 @@
-"""A class, or any other material, against a model: f over pairs of directions, as a file of values is judged."""
+"""Compare a class, or any other material, with a model: f at pairs of directions, judged like a file of values."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .finding import Finding
 from .mistakes import Values, f_of
 
 PAIRS = 1024
-ACCURACY = 1e-4  # both are evaluated in float64, from constants with perhaps five digits
-_GRAZING = 0.02  # beyond 89 degrees tangents differ by their formula alone
+ACCURACY = 1e-4  # relative; both materials are evaluated in float64, from constants with perhaps five digits
+_GRAZING = 0.02  # smallest cosine; beyond 89 degrees, equivalent formulas for the tangent differ numerically
 
 
 def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) -> Finding:
@@ -32,7 +32,8 @@ def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) ->
 
 
 def pairs(model: BSDF, count: int, seed: int = 1) -> tuple[Values, Values]:
-    """Pairs of directions above the surface: half of them uniform, half as the model samples light, (count, 3) each."""
+    """Pairs of directions above the surface, (count, 3) each: half of the wi are uniform, half are sampled by the
+    model."""
     rng = np.random.default_rng(seed)
     wo, wi = (directions.on_side(directions.uniform(rng, count), 1) for _ in range(2))
     sampled = model.sample(wo, directions.numbers(rng, count), precision="float64")
@@ -46,7 +47,7 @@ def pairs(model: BSDF, count: int, seed: int = 1) -> tuple[Values, Values]:
 
 
 def _with_angles(finding: Finding, wo: Values, wi: Values) -> Finding:
-    """The finding with the worst pair as angles in place of a line's number."""
+    """The finding with the angles of the worst pair in place of a line number."""
     if "line" not in finding.figures:
         return replace(finding, facts=tuple(fact.replace(" rows", " pairs of directions") for fact in finding.facts))
     row = int(finding.figures["line"]) - 1

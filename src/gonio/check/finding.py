@@ -1,4 +1,4 @@
-"""The result of a check: right, wrong or unreadable, how far off, and the probable mistake."""
+"""The result of a check: right, wrong or unreadable, the size of the difference, and the probable mistake."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 RIGHT, WRONG, ERROR, MISSING, BY_HAND = "right", "wrong", "input error", "not handed in", "by hand"
-ANOTHER = "another model"  # the kind of values whose file names another model than the task's
+ANOTHER = "another model"  # the kind of a file of values that names another model than the task's
 EXIT_CODES = {RIGHT: 0, BY_HAND: 0, WRONG: 1, MISSING: 1, ERROR: 2}
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake whose trace a formula reproduces.
+    """A mistake in a solution.
 
     words  the mistake with its formula: "k = (roughness + 1)^2 / 8 in place of alpha / 2"
-    topic  where it is, without the formula, for students who are to find it themselves: "the masking term G"
+    topic  its place without the formula, for students who are to find it themselves: "the masking term G"
     """
 
     words: str
@@ -29,11 +29,11 @@ class Finding:
     name     the file or class
     kind     what it was judged as: "table of E", "values of f", ...
     status   RIGHT, WRONG, ERROR (it could not be judged), MISSING or BY_HAND
-    facts    sentences: what it was compared with, how far off it is, and where
+    facts    sentences that say what it was compared with, how far off it is, and where
     mistake  the probable mistake, None if no formula fits
     figures  the numbers in `facts`
     hidden   whether formulas and values of the solution are left out
-    remark   by what it was judged, where the command does not say it all; "" otherwise
+    remark   what it was judged by, if the command does not say so completely; "" otherwise
     """
 
     name: str
@@ -56,13 +56,13 @@ class Finding:
 
     @property
     def cause(self) -> str:
-        """The probable mistake in words, "" if unknown; its topic alone if the solution is hidden."""
+        """The probable mistake in words, "" if unknown; only its topic if the solution is hidden."""
         if self.mistake is None:
             return ""
         return f"look at {self.mistake.topic}" if self.hidden else self.mistake.words
 
     def without_solution(self) -> Finding:
-        """The same without the values and formulas of the solution."""
+        """The finding without values and formulas of the solution."""
         facts = self.facts if self.status == ERROR else ()
         return replace(self, facts=facts, figures={}, hidden=True)
 
@@ -91,5 +91,5 @@ class Finding:
 
 
 def unreadable(name: str, why: str, hint: str = "") -> Finding:
-    """The finding about work that cannot be judged."""
+    """The finding for work that cannot be judged."""
     return Finding(name, "", ERROR, (f"{why}: {hint}" if hint else why,))

@@ -1,7 +1,7 @@
-"""A student's picture of a scene against Gonio's: moved by a row, gamma and exposure allowed for.
+"""Compare a student's picture of a scene with Gonio's, allowing for small shifts, gamma and exposure.
 
-Both pictures are averaged over blocks, so that the noise of few samples does not matter. The exposure is the ratio that
-most blocks have; one object with another ratio is named.
+Both pictures are averaged over blocks, so that noise from few samples does not matter. The ratio that most blocks have
+is taken as exposure; objects with another ratio are named.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ..verify.forensics.ratio import NUMBERS, written
 from .finding import RIGHT, WRONG, Finding, Mistake
 
 Values = NDArray[np.float64]
-BLOCKS = 48  # along the wider side
+BLOCKS = 48  # along the longer side
 SPP = 64
 SHIFTS = range(-2, 3)  # pixels
-FITS = 0.04  # mean relative difference of blocks: the noise of some 32 samples per pixel
-UNLIKE = 0.6  # correlation below which a picture is of something else
-CLEAN = 0.02  # relative accuracy of a ratio that is named
+FITS = 0.04  # largest mean relative difference of the blocks: the noise of some 32 samples per pixel
+UNLIKE = 0.6  # correlation below which a picture shows something else
+CLEAN = 0.02  # relative accuracy to which a ratio is identified with a known number
 
 
 class _Reading(NamedTuple):
-    """A reading of a picture: as words, whether it is a mistake, and linear values."""
+    """An interpretation of a picture: in words, the mistake that it implies (None if none), and linear values."""
 
     words: str
     mistake: Mistake | None
@@ -48,13 +48,13 @@ class _Match(NamedTuple):
 
 
 def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool = False) -> Finding:
-    """Judge a picture of a scene. Raises InputError for a picture of another shape, or of something else."""
+    """Judge a picture of a scene. Raises InputError for a picture of another aspect ratio or of something else."""
     picture = images.read(path)
     height, width = picture.pixels.shape[:2]
     outside = {"allow_outside": allow_outside, "allow_code": allow_code}
     film_width, film_height = _film(scene, outside)
     if width * film_height != height * film_width:
-        what = f"a picture of {width} x {height} pixels, and the scene's film has {film_width} x {film_height}"
+        what = f"the picture has {width} x {height} pixels, but the scene's film has {film_width} x {film_height}"
         raise InputError(what, path.name, "render the scene at its own size")
     if not np.all(np.isfinite(picture.pixels)):
         bad = int(np.sum(~np.isfinite(picture.pixels).all(axis=2)))
@@ -71,7 +71,7 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
     alike = np.corrcoef(np.log(blocks + 1e-3).ravel(), np.log(expected + 1e-3).ravel())[0, 1]
     if best.distance > 0.3 and not alike > UNLIKE:
         raise InputError(
-            "this picture does not resemble the scene: it is of something else", path.name, "check --scene"
+            "this picture does not resemble the scene: it shows something else", path.name, "check --scene"
         )
     facts = [f"{best.distance:.1%} mean relative difference from Gonio's picture, by blocks of {block} pixels"]
     facts += [best.reading.words] if best.reading.words else []
@@ -89,7 +89,7 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
 
 
 def _film(scene: Path, outside: dict[str, bool]) -> tuple[int, int]:
-    """Width and height of the scene's film, pixels."""
+    """Width and height of the scene's film in pixels."""
     size = _read(scene, outside).camera.film.size
     return int(size[0]), int(size[1])
 
@@ -99,7 +99,7 @@ def _read(scene: Path, outside: dict[str, bool]) -> SceneDescription:
 
 
 def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
-    """The picture as it is, and as it would be after the usual slips."""
+    """The picture as it is, and with each of the usual mistakes undone."""
     given = np.asarray(picture.pixels, float)
     encodings = [("", None, given)]
     if not picture.hdr:
@@ -122,7 +122,7 @@ def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
 
 
 def _match(reading: _Reading, reference: Values, block: int, clip: float | None) -> _Match:
-    """The exposure that most blocks have, and the mean relative difference that is left."""
+    """The match of a reading: the exposure that most blocks have, and the remaining mean relative difference."""
     given = _blocks(reading.pixels, block)
     lit = reference > 0.02 * np.percentile(reference, 99.0)
     lit &= given < 0.98 if clip is None else True  # a .png clips at white
@@ -135,7 +135,7 @@ def _match(reading: _Reading, reference: Values, block: int, clip: float | None)
 
 
 def _mode(ratio: Values) -> float:
-    """The ratio with the most others within 2 % of it; 1 if a quarter has it, or if no ratio is positive."""
+    """The ratio with the most others within 2 % of it; 1 if a quarter of them are about 1, or if none is positive."""
     logs = np.sort(np.log(ratio[ratio > 0.0]))
     if not len(logs) or np.mean(np.abs(logs) < 0.02) > 0.25:
         return 1.0
@@ -158,7 +158,7 @@ def _rendered(
     outside: dict[str, bool],
     overrides: dict[str, BSDF] | None = None,
 ) -> Values:
-    """A picture by Gonio, (H, W, 3) linear."""
+    """Gonio's picture, (H, W, 3), linear."""
     picture = render(scene, size=size, spp=spp, overrides=overrides, **outside)  # type: ignore[arg-type]
     return np.asarray(picture, np.float64)
 
@@ -166,7 +166,7 @@ def _rendered(
 def _objects(
     scene: Path, size: tuple[int, int], outside: dict[str, bool], given: Values, reference: Values
 ) -> Iterator[tuple[str, Mistake | None]]:
-    """What differs on each object: it is where the picture changes if the object is black."""
+    """The difference on each object. Its pixels are those that become dark if the object is rendered black."""
     shapes = _read(scene, outside).shapes
     for number, shape in enumerate(shapes):
         name = str(getattr(getattr(shape, "material", None), "type", ""))
@@ -192,7 +192,7 @@ def _objects(
 
 
 def _constant(which: str, ratio: Values, spread: Values) -> Mistake | None:
-    """A known number by which an object is too bright."""
+    """The mistake of a factor that is a known number; None if the ratio is not constant or no such number."""
     if np.any(np.ptp(spread, axis=0) > 0.05 * ratio) or np.ptp(ratio) > CLEAN * ratio.max():
         return None
     text = written(float(ratio.mean()), CLEAN)

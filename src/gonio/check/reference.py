@@ -1,9 +1,9 @@
-"""Reference values to check a program against without handing in anything: f at 200 pairs, tables of E and E_avg.
+"""Reference values for checking a program without handing in anything: f at 200 pairs, tables of E and E_avg.
 
     gonio check --reference DIR                      every model of the courses, and the homework's tables
     gonio check oren-nayar -p sigma=0.5 --reference DIR
 
-Each file of values names its material, so that `gonio check FILE MODEL` and a sheet read it.
+Each file of values names its material, so that it can be given to `gonio check FILE MODEL` or checked against a sheet.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .classes import pairs
 from .mistakes import f_of
 
 PAIRS = 200
-SIZE = 32  # of the tables
+SIZE = 32  # rows and columns of the tables
 _SILVER = "preset=Ag,alpha=0.25,fresnel=schlick,masking=smith-separable"
 _GLASS = "eta=1.5,alpha=0.25,fresnel=schlick,masking=smith-separable"
 _HOMEWORK = "conductor(preset=Ag,alpha=0.25,fresnel=schlick,masking=schlick-direct)"
@@ -42,9 +42,10 @@ TABLES = {"text": "schlick-direct", "figure": "schlick-ibl"}
 
 
 def write(folder: str | Path, material: str | BSDF | None = None) -> list[Path]:
-    """Write the tables of a material, also as text, or all of the courses; the files, all or none.
+    """Write the values of one material, or the values and tables of the courses; returns the paths of the files.
 
-    Raises InputError for a folder that cannot be written.
+    material  a material or its text; None for all models of the courses
+    Either all files are written or none. Raises InputError for a folder that cannot be written.
     """
     place = files.check_folder(folder)
     if material is not None:
@@ -63,7 +64,7 @@ def write(folder: str | Path, material: str | BSDF | None = None) -> list[Path]:
 
 
 def values(material: BSDF) -> str:
-    """f at 200 pairs of directions, z up, as `samples.read` reads them."""
+    """f at 200 pairs of directions, z up, in the format that `samples.read` reads."""
     wo, wi = pairs(material, PAIRS)
     if material.transmits:
         wi = directions.uniform(np.random.default_rng(2), PAIRS)

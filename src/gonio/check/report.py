@@ -1,4 +1,4 @@
-"""The judgment of a folder: submissions, their tasks, and marks as a suggestion."""
+"""The judgment of a folder: submissions, their tasks and suggested marks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xml.etree import ElementTree as xml
 from ..verify.ci.junit import clean
 from .finding import BY_HAND, ERROR, MISSING, RIGHT, WRONG, Finding
 
-PARTIAL = 0.5  # of the points, for a wrong result by a mistake that is known: the rest is right
+PARTIAL = 0.5  # fraction of the points for a result with a known mistake, since the rest of it is right
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Mark:
 
     @property
     def suggested(self) -> float | None:
-        """Points to give; None for what a person has to look at."""
+        """Suggested points; None if a person has to judge the work."""
         if self.finding.status in (BY_HAND, ERROR):
             return None
         if self.finding.status == RIGHT:
@@ -34,14 +34,14 @@ class Mark:
 
 @dataclass(frozen=True)
 class Submission:
-    """What one student handed in; `others` are files that belong to no task."""
+    """The work of one student; `others` are files that belong to no task."""
 
     name: str
     marks: Sequence[Mark]
     others: tuple[str, ...] = ()
 
     def best(self) -> dict[str, Mark]:
-        """The best file of each task, in the sheet's order."""
+        """The mark of the best file of each task, in the sheet's order."""
         best: dict[str, Mark] = {}
         for mark in self.marks:
             held = best.get(mark.task)
@@ -72,11 +72,11 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        """0 if all is right, 1 if something is wrong or missing, 2 if something could not be read."""
+        """0 if everything is right, 1 if something is wrong or missing, 2 if something could not be read."""
         return max((finding.exit_code for finding in self.findings), default=0)
 
     def without_solution(self) -> Report:
-        """The same without values and formulas of the solution."""
+        """The report without values and formulas of the solution."""
         hidden = [
             replace(one, marks=[replace(mark, finding=mark.finding.without_solution()) for mark in one.marks])
             for one in self.submissions
@@ -119,7 +119,7 @@ class Report:
 
 
 def junit(submissions: Sequence[Submission]) -> str:
-    """JUnit XML: a suite per submission, a case per file."""
+    """JUnit XML with one suite per submission and one case per file."""
     root = xml.Element("testsuites", {"name": "gonio check", **_counts([m for one in submissions for m in one.marks])})
     for one in submissions:
         suite = xml.SubElement(root, "testsuite", {"name": clean(one.name), **_counts(one.marks)})

@@ -1,4 +1,4 @@
-"""`gonio check` and `go.check`: the kind of work that was handed in, and its judge."""
+"""`gonio check` and `go.check`: recognize the kind of work that was handed in and judge it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .report import Mark, Report, Submission, junit
 
 @dataclass(frozen=True)
 class Work:
-    """What is judged and by what; the fields are the arguments of `check`."""
+    """The work to be judged and what it is judged by; the fields are arguments of `check`."""
 
     target: str | Path | BSDF
     against: str | BSDF | None = None
@@ -42,7 +42,7 @@ class Work:
 
     @property
     def is_material(self) -> bool:
-        """Whether it is a material, a class in a Python file, or a shader."""
+        """Whether the target is a material, a class in a Python file, or a shader."""
         if isinstance(self.target, BSDF):
             return True
         name = notation.split(self.text)[0]
@@ -50,7 +50,7 @@ class Work:
 
     @property
     def text(self) -> str:
-        """The target as text; for an adapter beside a shader, the shader."""
+        """The target as text; for the .toml adapter of a shader, the shader."""
         text = str(self.target)
         shader = text.removesuffix(".toml")
         return shader if shader != text and shaders.names_shader(shader) else text
@@ -61,14 +61,14 @@ class Work:
             return self.against
         if not self.against:
             raise InputError(
-                "no model to judge by", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
+                "no model to judge against", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
             )
         operands.kind_of(self.against, operands.MATERIALS, "MODEL")
         return notation.named(self.against)[0]
 
 
 class WorkKeywords(TypedDict, total=False):
-    """The types of `Work` as keywords, but for what is judged by what."""
+    """The types of the fields of `Work` as keywords, except `target` and `against`."""
 
     scene: str | Path | None
     up: str
@@ -89,7 +89,7 @@ def _named(work: Work) -> BSDF:
         return notation.named(work.text)[0]
     head, own = notation.split(work.text)
     if not shaders.names_shader(head):
-        raise InputError(f"--function given, and '{head}' is no shader", "--function", "leave it out")
+        raise InputError(f"--function given, but '{head}' is not a shader", "--function", "leave it out")
     named = shaders.with_options(head, [("function", work.function)])
     return notation.made(shaders.class_of(named), texts.assignments(own))[0]
 
@@ -106,12 +106,12 @@ def _picture(work: Work) -> Finding:
 def _table(work: Work) -> Finding:
     if work.against is not None and not isinstance(work.against, str):
         raise InputError(
-            "a table of E judged by a material", "MODEL", "give a masking term, such as schlick-ibl, or none"
+            "a table of E cannot be judged by a material", "MODEL", "give a masking term, such as schlick-ibl, or none"
         )
     return tables.check(tables.read(work.path), work.against or "")
 
 
-# Each kind of work: whether a target is of that kind, and its judge. The first that fits is chosen.
+# For each kind of work: whether a target is of that kind, and the function that judges it. The first match is used.
 JUDGES: tuple[tuple[Callable[[Work], bool], Callable[[Work], Finding]], ...] = (
     (lambda work: work.is_material, _class),
     (lambda work: work.suffix in sheet.ROWS, _rows),
@@ -131,7 +131,7 @@ def check(
     junit: str | Path | None = None,
     **work: Unpack[WorkKeywords],
 ) -> Finding | Report:
-    """Judge a student's own work, and name the probable mistake.
+    """Judge a student's own work and name the probable mistake.
 
         go.check("E.png").facts                                  # which k, flip, 1 - E, and how far off
         go.check("f.csv", go.OrenNayar(sigma=0.3), up="y").cause
@@ -141,15 +141,15 @@ def check(
     target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
                shader (.glsl, .wgsl, ...); a picture, with `scene`; a folder of these or of such folders, with `sheet`
     against    the material to judge by, also as text; for a table, the masking term that it must have
-    scene      the scene that a picture shows; with `sheet`, a folder of scenes by the names of pictures
+    scene      the scene that a picture shows; with `sheet`, a folder of scenes named like the pictures
     sheet      "hw4" or "lab2": the tasks and their points
     up         the axis along the normal in rows of directions: "z", "y" or "x"
     tolerance  relative difference of f that counts as equal; None is 2e-3 for rows, 1e-4 for a material
     hide_solution  leave out formulas and values of the solution
-    junit      a file for the verdicts as JUnit XML
-    function   the function of a shader that is judged, in place of the one that its adapter names
-    Returns a Finding, or for a folder a Report; both have `passed`, `exit_code` and `as_dict`.
-    Raises InputError for work that cannot be read; in a folder that is a finding, and the others are judged.
+    junit      path of a JUnit XML file for the verdicts
+    function   the function of a shader to judge, in place of the one that its adapter names
+    Returns a Finding, or a Report for a folder; both have `passed`, `exit_code` and `as_dict`.
+    Raises InputError for work that cannot be read; in a folder, that becomes a finding and the other files are judged.
     """
     if junit is not None:
         check_file(junit)
@@ -169,10 +169,10 @@ def _judge(work: Work, tasks: str | None) -> Finding | Report:
             )
         return sheet.check(work.path, tasks, None if work.scene is None else Path(work.scene), work.up)
     if tasks:
-        raise InputError(f"'{work.target}' is no folder", "--sheet", "give the folder of a submission, or of several")
+        raise InputError(f"'{work.target}' is not a folder", "--sheet", "give the folder of one or more submissions")
     judge = next((judge for accepts, judge in JUDGES if accepts(work)), None)
     if judge is None:
-        what = f"'{work.target}' is {'a PDF' if work.suffix == '.pdf' else 'nothing that can be judged'}"
+        what = f"'{work.target}' is {'a PDF, which' if work.suffix == '.pdf' else 'of a kind that'} cannot be judged"
         raise InputError(
             what, "TARGET", "give a table (.png), rows of f (.csv), FILE.py:CLASS, a shader, or a folder with --sheet"
         )

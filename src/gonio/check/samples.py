@@ -1,10 +1,10 @@
-"""Values of f from any program, as text: rows of wo, wi and f, judged pointwise against a material.
+"""Text files with values of f from any program: rows of wo, wi and f, compared with a material row by row.
 
     # wo.x wo.y wo.z   wi.x wi.y wi.z   f (one or three channels)
     0.36, -0.48, 0.8,  0.0, 0.6, 0.8,   0.1507
 
-Commas, semicolons, tabs or spaces separate the numbers; empty lines and lines that start with # are skipped, and a
-first line of names may head the table. Five columns are theta_o, phi_o, theta_i, phi_i in degrees, and f.
+Commas, semicolons, tabs or spaces separate the numbers; empty lines and lines that start with # are skipped, and the
+first line may name the columns. Five columns are theta_o, phi_o, theta_i, phi_i in degrees, and f.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from .mistakes import Values, f_of
 from .mistakes.empirical import with_cosine
 from .stated import Asked, degenerate
 
-ACCURACY = 2e-3  # relative: float32, printed with six digits, with angles by arc functions
-GRAZING = 1e-3  # cosine below which a quotient by it loses its digits
+ACCURACY = 2e-3  # relative; allows for float32, six printed digits and angles from inverse trigonometric functions
+GRAZING = 1e-3  # cosine below which a division by it is inaccurate
 UNIT = 1e-3  # largest deviation of a direction's length from 1
 _COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
-COVER = 0.99  # share of the rows that must agree; the others by ten times the accuracy
-_UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z: rotations
+COVER = 0.99  # fraction of the rows that must agree; the others must agree within ten times the accuracy
+_UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z, as rotations
 
 
 class Rows(NamedTuple):
-    """Directions (N, 3) with z up, values (N, 1 or 3), and the line of each row."""
+    """Directions (N, 3) with z up, values (N, 1 or 3), and the line number of each row."""
 
     wo: Values
     wi: Values
@@ -46,8 +46,8 @@ class Rows(NamedTuple):
 def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
     """Judge a file of values. Raises InputError for one that cannot be read.
 
-    If nobody gave parameters, those that explain the values are right, unless a known mistake explains them by the
-    defaults.
+    If no parameters are given, any parameters that explain the values are accepted, unless a known mistake explains
+    them with the defaults.
     """
     rows = read(path, up)
     accuracy = ACCURACY if accuracy is None else accuracy
@@ -65,8 +65,8 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
 
 
 def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF | None:
-    """The material with parameters that explain the values; None if there are none, or if they make it a simpler
-    one."""
+    """The material with parameters that explain the values; None if there are none, or if they reduce it to a simpler
+    model."""
     fine = np.minimum(rows.wo[:, 2], rows.wi[:, 2]) > GRAZING
     wo, wi, f = rows.wo[fine], rows.wi[fine], rows.f[fine]
     if not len(f) or np.any(f < 0.0) or not np.any(f):
@@ -84,7 +84,7 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
     if rows.f.shape[1] == 1:
         if np.any(np.ptp(expected, axis=1) > accuracy * expected.max(axis=1)):
             raise InputError(
-                "one column of f, and the material is colored", name, "give three columns: red, green, blue"
+                "one column of f given, but the material is colored", name, "give three columns: red, green, blue"
             )
         expected = expected[:, :1]
     fine = np.minimum(np.abs(rows.wo[:, 2]), np.abs(rows.wi[:, 2])) > GRAZING
@@ -125,7 +125,8 @@ def _mistake(rows: Rows, expected: Values, material: BSDF, fine: np.ndarray, acc
 
 
 def _has_cosine(rows: Rows, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
-    """Whether wrong values are nearer to f cos theta_i than to f: in more rows, or by the median."""
+    """Whether wrong values are nearer to f cos theta_i than to f: they agree in more rows, or in as many with a smaller
+    median difference."""
 
     def distance(right: Values) -> tuple[float, float]:
         error, _ = _error(rows.f, right, fine, accuracy)
@@ -139,7 +140,7 @@ def _over(f: Values, cosine: Values) -> Values:
 
 
 def _left_out(fine: np.ndarray) -> str:
-    """The rows that do not count, in words; "" if there are none."""
+    """The number of rows that do not count, in words; "" if there are none."""
     count = int(np.sum(~fine))
     return f"; {count} row{'s' if count > 1 else ''} at the horizon left out" if count else ""
 
@@ -150,7 +151,10 @@ def _agree(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -
 
 
 def _error(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> tuple[Values, int]:
-    """The relative difference of each row, and the row that is furthest off among those that are bright enough."""
+    """The relative difference of each row, and the row off the horizon with the largest one.
+
+    Values are not divided by less than 1e-3 of the brightest (99th percentile).
+    """
     size = np.maximum(np.abs(given), np.abs(expected))
     error = (np.abs(given - expected) / np.maximum(size, 1e-3 * np.percentile(size, 99.0) + 1e-30)).max(axis=1)
     return error, int(np.argmax(np.where(fine, error, -1.0)))
@@ -161,7 +165,7 @@ def _numbers(values: Values) -> str:
 
 
 def read(path: Path, up: str = "z") -> Rows:
-    """The rows of a file, with z up. Raises InputError, with the line, for anything else."""
+    """The rows of a file, with z up. Raises InputError, with the line, if it is malformed."""
     if up not in _UP:
         raise InputError(f"unknown axis '{up}'", "--up", "give the axis along the normal: z, y or x")
     try:
@@ -177,7 +181,7 @@ def read(path: Path, up: str = "z") -> Rows:
         hint = (
             "7 columns are wo, wi and f; 9 have f in three channels; 5 are theta_o, phi_o, theta_i, phi_i, f in degrees"
         )
-        raise InputError(f"{width} columns", where, hint)
+        raise InputError(f"{width} columns given", where, hint)
     values = text.table(table, width, where)
     lines = [line for line, _ in table]
     if width == 5:
@@ -188,14 +192,14 @@ def read(path: Path, up: str = "z") -> Rows:
 
 
 def _split(lines: list[str]) -> list[tuple[int, list[str]]]:
-    """The words of each row with its line; comments and a heading are skipped."""
+    """The line number and words of each row; comments and a heading are skipped."""
     table: list[tuple[int, list[str]]] = []
     for number, line in enumerate(lines, 1):
         words = [word for word in re.split(r"[,;\s]+", line.strip()) if word]
         if not words or words[0].startswith(("#", "//")):
             continue
         if not table and not _is_number(words[0]):
-            continue  # a line of names
+            continue  # the names of the columns
         table.append((number, words))
     return table
 

@@ -1,4 +1,4 @@
-"""The parameters that explain values of f, for a file that names none: least squares over a model's few numbers."""
+"""Find the parameters that explain the values of f in a file that names none, by least squares over a few numbers."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..material import BSDF, tree
 from ..material.parameters import Parameter
 from .mistakes import Values, f_of
 
-MOST = 3  # parameters; more of them explain anything
+MOST = 3  # most parameters; with more, almost any values can be explained
 _KINDS = ("float", "spectrum", "alpha")
-_STARTS = (1.0, 0.25, 4.0, 0.0625, 16.0)  # times a default: the width of a lobe has a narrow basin
-_LEAST, _LARGEST = 1e-6, 1e4  # a search by logarithms needs bounds
-_DIGITS = (2, 3, 4, 6)  # of the result: the roundest that are near enough
+_STARTS = (1.0, 0.25, 4.0, 0.0625, 16.0)  # multiples of the default; the width of a lobe has a narrow basin
+_LEAST, _LARGEST = 1e-6, 1e4  # bounds of the parameters, since the search is in logarithms
+_DIGITS = (2, 3, 4, 6)  # significant digits of the result, fewest first
 
 
 def candidates(material: BSDF, wo: Values, wi: Values, f: Values) -> Iterator[BSDF]:
-    """The material with the numbers that come nearest to values of f (N, 1 or 3), rounded and not.
+    """The material with the numbers that best fit values of f (N, 1 or 3), rounded to more and more digits.
 
-    Nothing for a model of more than `MOST` parameters that f depends on.
+    Yields nothing for a model whose f depends on more than `MOST` parameters.
     """
     names = _free(material, wo, wi)
     if not 0 < len(names) <= MOST:
@@ -44,7 +44,7 @@ def described(material: BSDF) -> str:
 
 
 def _free(material: BSDF, wo: Values, wi: Values) -> dict[str, Parameter]:
-    """The numbers that f depends on."""
+    """The numeric parameters that f depends on."""
     f = f_of(material, wo, wi)
     free: dict[str, Parameter] = {}
     for name, parameter in type(material).parameters().items():
@@ -59,7 +59,7 @@ def _free(material: BSDF, wo: Values, wi: Values) -> dict[str, Parameter]:
 def _nearest(
     material: BSDF, names: dict[str, Parameter], layout: list[tuple[str, int]], wo: Values, wi: Values, f: Values
 ) -> Values | None:
-    """The values of the parameters, one after another, with the smallest relative differences of f."""
+    """The values of the parameters, concatenated, that minimize the relative differences of f."""
     from scipy.optimize import least_squares  # imported late: few checks search
 
     size = np.abs(f) + 1e-3 * np.abs(f).max() + 1e-30
@@ -84,7 +84,7 @@ def _nearest(
 
 
 def _changed(material: BSDF, layout: list[tuple[str, int]], values: Values) -> BSDF | None:
-    """The material with other numbers; None where it does not allow them."""
+    """The material with other numbers; None if it does not allow them."""
     changes: dict[str, object] = {}
     at = 0
     for name, count in layout:

@@ -1,7 +1,8 @@
-"""The sheets of the courses, as tasks with points, and the judgment of what was handed in.
+"""The sheets of the courses, as tasks with points, and the judgment of submissions.
 
-A file belongs to the first task whose pattern its name fits. A file of values may name its parameters and its frame in
-comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the model and its terms are the task's. Code is not run.
+A file belongs to the first task whose pattern its name matches. A file of values may name its parameters and its frame
+in comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the task prescribes the model and its terms. Code is not
+run.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ LEFT_ALONE = (
     ".glsl", ".frag", ".vert", ".hlsl", ".wgsl", ".o", ".obj", ".exe", ".cmake", ".sln", ".vcxproj", ".json", ".toml",
     ".pdf", ".doc", ".docx", ".md", ".tex", ".html",
 )  # fmt: skip
-SPLIT = "A + B"  # of the split sum, which is E: one channel, or A in red and B in green
+SPLIT = "A + B"  # the table of the split sum, which is E: one channel, or A in red and B in green
 
 
 @dataclass(frozen=True)
 class Task:
     """One task of a sheet.
 
-    files  a pattern of names without suffix, in lower case
-    model  the material of files of values, with the task's terms; "" if there are none
-    forms  other models of Gonio's that can express the same material
+    files  a regular expression for file names without suffix, in lower case
+    model  the material of files of values, with the task's terms; "" if the task has no such files
+    forms  other models that can express the same material
     table  "E", "E_avg", "E, sampled by importance", or SPLIT; "" for a task without a table
     """
 
@@ -76,14 +77,14 @@ LAB2 = (
     ),
     Task("report", 4, r".*(report|readme|lab2|\u62a5\u544a).*"),
 )
-PICTURE = Task("picture", 0, "")  # of a scene, by whose name it is judged
+PICTURE = Task("picture", 0, "")  # a picture named after the scene that it shows
 SHEETS = {"hw4": HW4, "lab2": LAB2}
 
 
 def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -> Report:
     """Judge a folder, or each folder of a class. Raises InputError for an unknown sheet and for a folder without files.
 
-    scenes  a folder of scenes, or one scene; a picture with a scene's name is judged by it
+    scenes  a folder of scenes, or one scene; pictures are compared with the scene of the same name
     """
     if sheet not in SHEETS:
         raise InputError(f"unknown sheet '{sheet}'", "--sheet", did_you_mean(sheet, list(SHEETS)))
@@ -92,10 +93,10 @@ def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -
 
 
 def _submissions(folder: Path) -> list[Path]:
-    """The folder itself if it has files, else the folders in it."""
+    """The folder itself if it contains files, else the folders in it."""
     entries = sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
     if not entries:
-        raise InputError("an empty folder", str(folder), "give the folder of a submission, or of several")
+        raise InputError("the folder is empty", str(folder), "give the folder of a submission, or of several")
     folders = [entry for entry in entries if entry.is_dir()]
     return [folder] if any(entry.is_file() for entry in entries) or not folders else folders
 
@@ -111,7 +112,7 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
         (others if task is None else files_of[task.name]).append(path)
     tables_of = {task.table: files_of[task.name] for task in tasks if task.table}
     if not tables_of.get("E", [0]) and tables_of.get("E, sampled by importance"):
-        files_of["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it does what the first task asks for, and more
+        files_of["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it solves this task too
     own = _own_table(files_of.get("E(mu)", []))
     marks = [
         Mark(task.name, task.points, one)
@@ -125,7 +126,7 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
 
 
 def task_of(tasks: tuple[Task, ...], path: Path) -> Task | None:
-    """The first task whose pattern a file's name fits; None for sources and documents among the tables."""
+    """The first task whose pattern a file's name matches; None if that is a table and the file a source or document."""
     task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
     return None if task is not None and task.table and path.suffix.lower() in LEFT_ALONE else task
 
@@ -140,7 +141,7 @@ def _own_table(files: list[Path]) -> tables.Table | None:
 
 
 def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Path | None, up: str) -> Iterator[Finding]:
-    """A finding for each file of a task; for a task without files, one that says so."""
+    """One finding per file of a task; for a task without files, one that says so."""
     if not files:
         yield Finding("", "", MISSING)
     for path in files:
@@ -151,11 +152,11 @@ def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Pat
 
 
 def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, up: str) -> Finding:
-    """The judgment of one file of a task. Raises InputError for one that cannot be read."""
+    """The finding for one file of a task. Raises InputError for a file that cannot be read."""
     suffix = path.suffix.lower()
     scene = _scene_of(path, scenes)
     if task.table == SPLIT and scene is not None and suffix in PICTURES:
-        return pictures.check(path, scene)  # what was rendered by it
+        return pictures.check(path, scene)  # a rendering that uses the split sum
     if task.table and suffix in PICTURES:
         return _table(task, path, own)
     if task.table:
@@ -169,7 +170,7 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
 
 
 def _values(task: Task, path: Path, up: str) -> Finding:
-    """The judgment of values of f by the task's model, with the parameters that the file names."""
+    """The finding for values of f, judged by the task's model with the parameters that the file names."""
     up = stated.comments(path).get("up", up)
     try:
         asked = stated.for_task(path, (task.model, *task.forms))

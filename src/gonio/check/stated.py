@@ -1,10 +1,11 @@
-"""The model that values of f are judged by: what is asked for, with the parameters that the file itself names.
+"""The model that values of f are judged by: the one asked for, with the parameters that the file itself names.
 
     # model: oren-nayar(sigma=0.5)      a comment in the file
     # up: y
 
-On the command line the user's settings prevail over the line's. In a folder the model and its terms (distribution,
-masking, Fresnel's kind) are the sheet's, and the line gives numbers only: a file must not choose what it is judged by.
+On the command line, the user's settings take precedence over this line. In a folder, the sheet prescribes the model and
+its terms (distribution, masking, kind of Fresnel term), and the line gives only numbers: a file must not choose what it
+is judged by.
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ from .mistakes import f_of
 
 _COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
 _SAMPLING = "sampling"  # a choice that does not change f
-_EDGE = "edge"  # of `metal`: a number that replaces Schlick's F by another
+_EDGE = "edge"  # a parameter of `metal` that, unlike other numbers, changes the formula of F
 
 
 @dataclass(frozen=True)
 class Asked:
     """The material to judge by.
 
-    remark    what it was made of, in words; "" if the user named it completely
-    defaults  whether nobody named parameters, so that the file may have others
+    remark    where its parameters come from, in words; "" if the user named it completely
+    defaults  whether neither the user nor the file named parameters, so that the values may have others
     """
 
     material: BSDF
@@ -43,7 +44,7 @@ class Asked:
 
 
 class Line(NamedTuple):
-    """A model as the file's line names it: its class, and the settings by parameter."""
+    """The model that the file's line names: its class, and its settings by parameter name."""
 
     cls: type[BSDF]
     settings: dict[str, object]
@@ -54,7 +55,7 @@ class AnotherModelError(InputError):
 
 
 def comments(path: Path) -> dict[str, str]:
-    """The file's "model" and "up", as far as it names them; nothing for a file that cannot be read."""
+    """The "model" and "up" that the file's comments name, if any; empty for a file that cannot be read."""
     try:
         return dict(_COMMENT.findall(path.read_text(encoding="utf-8-sig", errors="replace")))
     except OSError:
@@ -62,15 +63,15 @@ def comments(path: Path) -> dict[str, str]:
 
 
 def for_command(path: Path, against: str | BSDF | None) -> Asked:
-    """The material of a command: the one that it names, with the line's settings where the command gives none; without
-    one, the line's. Raises InputError if neither names one."""
+    """The material of a command: the one that it names, with the line's settings for parameters that it does not give,
+    or else the one of the line. Raises InputError if neither names one."""
     if isinstance(against, BSDF):
         return Asked(against)
     text = comments(path).get("model", "")
     if not against:
         if not text:
             hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3, or a line '# model: oren-nayar(sigma=0.3)'"
-            raise InputError("no model to judge by", "MODEL", hint)
+            raise InputError("no model to judge against", "MODEL", hint)
         return Asked(notation.made(*_line(text, path.name))[0], f"judged by the file's line: {text}")
     operands.kind_of(against, operands.MATERIALS, "MODEL")
     cls, own = notation.taken_apart(against)
@@ -87,10 +88,10 @@ def for_command(path: Path, against: str | BSDF | None) -> Asked:
 
 
 def for_task(path: Path, models: tuple[str, ...]) -> Asked:
-    """The material of a sheet's task: its model and terms, with the parameters of the file's line.
+    """The material of a task: its model and terms, with the parameters of the file's line.
 
     models  forms of the same material, the usual one first
-    Raises AnotherModelError if the line names another model or other terms, and InputError if it cannot be read.
+    Raises AnotherModelError if the line names another model or other terms, InputError if it cannot be interpreted.
     """
     text = comments(path).get("model", "")
     if not text:
@@ -109,7 +110,8 @@ def for_task(path: Path, models: tuple[str, ...]) -> Asked:
 
 
 def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) -> str:
-    """Why values of a material show nothing of its model: its parameters make it a simpler one; "" if they do not."""
+    """The reason why values of a material say nothing about its model: its parameters reduce it to a simpler one; "" if
+    they do not."""
     f = f_of(material, wo, wi)
     lit = f[f[:, 0] > 0.0]
     if type(material).name != "lambert" and len(lit) and np.all(np.ptp(lit, axis=0) <= accuracy * lit.max(axis=0)):
@@ -126,7 +128,7 @@ def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) 
 
 
 def _line(text: str, where: str) -> Line:
-    """The model of a line. Raises InputError for code, which a file must not run, and for what is no material."""
+    """The model of a line. Raises InputError for code, which a file must not run, and for text that names no material."""
     if ".py" in text.lower():
         raise InputError(f"'{text}' is code, which is not run from a file", where, "name a model of Gonio's")
     try:
@@ -136,16 +138,15 @@ def _line(text: str, where: str) -> Line:
 
 
 def _without_preset(line: Line, own: Mapping[str, object]) -> dict[str, object]:
-    """The settings of a line without those that a preset among the others gives, and without its preset if they give a
-    value of it."""
+    """The settings of a line, without those that the preset in `own` sets."""
     preset = line.cls.presets().get(str(own.get("preset", "")))
     hidden = set(preset.values) if preset is not None else set()
     return {name: value for name, value in line.settings.items() if name not in hidden}
 
 
 def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
-    """The choices of the material that is asked for, by path. Raises AnotherModelError if the given one has others, or
-    another material inside; inside, a default is not taken for a choice."""
+    """The choices of the wanted material, by path. Raises AnotherModelError if the given one has different choices or
+    inner materials; a default of an inner material does not count as a choice."""
     inside = dict(tree.walk(given))
     terms: dict[str, object] = {}
     for path, inner in tree.walk(wanted):
@@ -165,7 +166,7 @@ def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
 
 
 def _with_defaults(material: BSDF, own: Mapping[str, object]) -> Asked:
-    """A material without the file's help; the remark lists its numbers if nobody gave any."""
+    """A material that the file does not describe; the remark lists its numbers if the user gave no settings."""
     numbers = {
         name: getattr(material, name)
         for name, parameter in type(material).parameters().items()

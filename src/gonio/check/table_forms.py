@@ -1,8 +1,8 @@
-"""Right and wrong tables of E over (roughness, mu), as the homework's programs would compute them.
+"""Right and wrong tables of E[roughness, mu], as programs for the homework would compute them.
 
 Every form is an integral over the same visible normals of GGX, so that forty of them cost hardly more than one:
 
-    E = mean over m of G w / G1(o),   w = 1, or what a mistake multiplies the integrand by
+    E = mean over m of G w / G1(o),   w = 1, or the factor by which a mistake changes the integrand
 
 Nodes are the centers of texels: mu = (j + 1/2) / N, roughness = (i + 1/2) / N.
 """
@@ -20,7 +20,7 @@ from ..energy.albedo.monte_carlo import hammersley
 from .finding import Mistake
 
 Values = NDArray[np.float64]
-POINTS = 256  # visible normals per node: an error of about 1e-3, a quarter of a gray level
+POINTS = 256  # visible normals per node, for an error of about 1e-3, a quarter of a gray level
 NODES = 24  # along each axis
 STRATA = 32  # along each axis of the square, as in the homework's cosine sampling
 _G = "the masking term G"
@@ -31,9 +31,9 @@ _INTEGRAND = "the integrand f cos / pdf"
 class Form(NamedTuple):
     """A table E[roughness, mu].
 
-    words    the form: "k = alpha / 2"
-    mistake  None for a right one
-    masking  Gonio's name of its masking term, "" if it has none
+    words    the form in words: "k = alpha / 2"
+    mistake  None if the form is right
+    masking  Gonio's name for its masking term, "" if it has none
     """
 
     words: str
@@ -43,13 +43,13 @@ class Form(NamedTuple):
 
 
 def nodes(size: int, count: int = NODES) -> NDArray[np.intp]:
-    """Some texels of an axis, the first and the last among them."""
+    """Indices of at most `count` evenly spaced texels of an axis, including the first and the last."""
     return np.unique(np.linspace(0, size - 1, min(count, size)).round().astype(np.intp))
 
 
 @functools.lru_cache(maxsize=8)
 def forms(size: int) -> tuple[Form, ...]:
-    """All forms at the nodes of a table of that size, right ones first."""
+    """All forms at the nodes of a table of the given size, right ones first."""
     at = (nodes(size) + 0.5) / size
     right = _with_width(at, at, at**2)
     tables = [
@@ -110,7 +110,7 @@ _WEIGHTS = {
 
 
 class _with_width:
-    """E by a masking term, for D of some widths: called with the name of a masking term."""
+    """E as a function of the name of the masking term, for D with the given alpha."""
 
     def __init__(self, roughness: Values, mu: Values, alpha: Values) -> None:
         self.roughness = roughness[:, None, None]
@@ -119,13 +119,13 @@ class _with_width:
         self.cos_i, self.o_m, self.n_m = self._reflected()
 
     def _reflected(self) -> tuple[Values, Values, Values]:
-        """Cosines of visible normals (Heitz2018) and of the light that they reflect."""
+        """n.i, o.m and n.m for visible normals m (Heitz2018) and the directions i that they reflect o to."""
         u = hammersley(POINTS)
         u1, u2 = u[:, 0][None, None], u[:, 1][None, None]
         sine = np.sqrt(1.0 - self.mu**2)
         x = self.alpha * sine
         length = np.sqrt(x**2 + self.mu**2)
-        sx, sz = x / length, self.mu / length  # the stretched view, in the plane of x and z
+        sx, sz = x / length, self.mu / length  # the stretched view direction, in the xz plane
         r, phi = np.sqrt(u1), 2.0 * math.pi * u2
         t1, t2 = r * np.cos(phi), r * np.sin(phi)
         s = 0.5 * (1.0 + sz)
@@ -187,7 +187,7 @@ class _with_width:
 
 
 class Weighting(NamedTuple):
-    """A way to average E over mu: its words, the mistake (None: right), and the weights of E, (roughness, mu)."""
+    """A way to average E over mu: in words, the mistake (None if right), and the weights of E, [roughness, mu]."""
 
     words: str
     mistake: Mistake | None
@@ -222,7 +222,7 @@ def weightings(size: int, columns: int) -> tuple[Weighting, ...]:
 
 @functools.lru_cache(maxsize=8)
 def columns_of(size: int) -> tuple[Form, ...]:
-    """The right forms of E at the rows of `nodes(size)` and at 64 values of mu, for averages."""
+    """The right forms of E in the rows of `nodes(size)` and at 64 values of mu, for averages."""
     at, mu = (nodes(size) + 0.5) / size, (np.arange(64) + 0.5) / 64
     right = _with_width(at, mu, at**2)
     return tuple(
@@ -247,7 +247,7 @@ def cosine_sampled(size: int, masking: str, floor: float) -> Values:
     cell = np.arange(STRATA)
     theta = 0.5 * np.arccos(1.0 - 2.0 * (cell[:, None] + jitter[0]) / STRATA).reshape(len(at), -1)
     phi = 2.0 * math.pi * ((cell + jitter[1]) / STRATA).reshape(len(at), -1)
-    cos_i, mu, r = np.cos(theta), at[:, None], at[:, None, None]  # other directions for each mu, the same for each row
+    cos_i, mu, r = np.cos(theta), at[:, None], at[:, None, None]  # each mu has its own directions, shared by all rows
     o_i = np.sqrt(1.0 - mu**2) * np.sin(theta) * np.cos(phi) + mu * cos_i
     cos_h2 = (mu + cos_i) ** 2 / (2.0 + 2.0 * o_i)
     D = r**4 / np.maximum(math.pi * (cos_h2 * (r**4 - 1.0) + 1.0) ** 2, floor)

@@ -1,7 +1,8 @@
-"""Tables of E and E_avg as pictures, such as the homework's: which form fits best, and how far off it is.
+"""Judge pictures of tables of E and E_avg, such as the homework's: which form fits best, and how far off it is.
 
-Distances are root mean squares in gray levels of 255. A form is identified from roughness 0.55 on, where cosine
-sampling has converged; below, a table by cosine sampling is noisy and too dark, which is no mistake.
+Distances are root mean squares in gray levels of 255. A form is identified by the rows of roughness 0.55 and above,
+where cosine sampling has converged. Below, a table computed by cosine sampling is noisy and too dark, which is not a
+mistake.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from .table_forms import Form, Values
 
 LEVELS = 255.0
 FITS = 3.0  # gray levels within which a form explains a table
-NOISY = 8.0  # the same for a table by random cosine-weighted directions
-CONVERGED = 0.55  # roughness from which cosine sampling with 1,024 directions has converged
-ROWS = 10.0  # gray levels within which a way to sample explains the means of rows of low roughness
-SURE = 1.1  # times as far off must the right forms be at least as a mistake in a noisy table, or it is only probable
-GRAIN = 0.3  # correlation of neighboring texels' errors below which they are noise
-NOISY_WEIGHT = 0.05  # of the distance over all rows
-WHITE = 0.95  # share of white texels beyond which no factor can be told
-UNLIKE = 0.6  # correlation with the nearest form below which a picture is no table of E
+NOISY = 8.0  # the same for a table computed with random cosine-weighted directions
+CONVERGED = 0.55  # lowest roughness at which cosine sampling with 1,024 directions has converged
+ROWS = 10.0  # gray levels within which a sampling method explains the means of rows of low roughness
+SURE = 1.1  # the right forms must be this many times as far off as a mistake, or the mistake is only probable
+GRAIN = 0.3  # correlation of the errors of neighboring texels below which they are noise
+NOISY_WEIGHT = 0.05  # weight of the distance over all rows
+WHITE = 0.95  # fraction of white texels above which a factor cannot be determined
+UNLIKE = 0.6  # correlation with the nearest form below which a picture is not a table of E
 SIZES = (16, 4096)
 _LAYOUT = "the layout: roughness along rows, mu from left to right"
 _STORED = "how the values are stored"
@@ -38,20 +39,20 @@ _STORED = "how the values are stored"
 
 @dataclass(frozen=True)
 class Table:
-    """A table as its file holds it: values (N, N), row 0 on top."""
+    """A table as stored in its file: values (N, N), row 0 at the top."""
 
     name: str
     values: Values
 
     @property
     def constant(self) -> bool:
-        """Whether it is constant along rows or columns, as E_avg is."""
+        """Whether the table is constant along rows or columns, as E_avg is."""
         deviations = [float(np.mean(np.std(self.values, axis=axis))) for axis in (0, 1)]
         return min(deviations) * LEVELS < 1.0
 
 
 class _Layout(NamedTuple):
-    """A way to lie in the picture: as words, whether it is allowed, and the values as [roughness, mu]."""
+    """A layout of the table in the picture: in words, the mistake (None if allowed), and the values [roughness, mu]."""
 
     words: str
     mistake: Mistake | None
@@ -59,7 +60,7 @@ class _Layout(NamedTuple):
 
 
 def _layouts(picture: Values) -> Iterator[_Layout]:
-    """E[roughness, mu] by each reading of a picture, the homework's first."""
+    """E[roughness, mu] for each layout of the picture, the homework's first."""
 
     def wrong(words: str) -> Mistake:
         return Mistake(words, _LAYOUT)
@@ -78,7 +79,7 @@ def _layouts(picture: Values) -> Iterator[_Layout]:
 
 
 class _Stored(NamedTuple):
-    """A way to store E: as words, whether it is a mistake, and the values."""
+    """A way to store E: in words, the mistake (None if right), and the stored values."""
 
     words: str
     mistake: Mistake | None
@@ -90,7 +91,10 @@ _SCALES = {"pi": np.pi, "1 / pi": 1 / np.pi, "2": 2.0, "1 / 2": 0.5, "4": 4.0, "
 
 
 def _stored(E: Values, scales: bool) -> Iterator[_Stored]:
-    """E as values of 0 to 1."""
+    """E in each way of storing it, as values in [0, 1].
+
+    scales  whether to include mistakes that scale E by a known factor
+    """
     clipped = np.clip(E, 0.0, 1.0)
     yield _Stored("", None, clipped)
     yield _Stored("the picture holds 1 - E", None, 1.0 - clipped)
@@ -111,12 +115,12 @@ def _stored(E: Values, scales: bool) -> Iterator[_Stored]:
 
 
 def _encoded(linear: Values) -> Values:
-    """IEC 61966-2-1."""
+    """Linear values encoded as sRGB (IEC 61966-2-1)."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1.0 / 2.4) - 0.055)
 
 
 class _Match(NamedTuple):
-    """A form, its storage and its layout, and the distance over converged rows."""
+    """A form, how it is stored and laid out, and its distance in the converged rows, in gray levels."""
 
     form: Form
     stored: _Stored
@@ -129,22 +133,22 @@ class _Match(NamedTuple):
 
 
 def read(path: Path, channels: int = 1) -> Table:
-    """The table in a picture, or in an array of an .npz. Raises InputError for anything else.
+    """The table in a picture or in an .npz array. Raises InputError for anything else.
 
-    channels  2 for a split sum: A in red and B in green, whose sum is the table; a gray picture holds the sum
+    channels  2 for a split sum, whose table is the sum of A in red and B in green; a gray picture holds the sum itself
     """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
-        raise InputError("a picture of 16 bits", path.name, "write 8 bits per channel, E * 255, as the homework does")
+        raise InputError("a 16-bit picture given", path.name, "write 8 bits per channel, E * 255, as the homework does")
     pixels = np.asarray(images.read(path, "linear").pixels, float)
     if np.all(np.isfinite(pixels)) and np.any(np.ptp(pixels, axis=2) > 1.5 / LEVELS):
         if channels == 2:
             return Table(path.name, pixels[..., 0] + pixels[..., 1])
-        raise InputError("a colored picture", path.name, "E with F = 1 has three equal channels")
+        raise InputError("a colored picture given", path.name, "E with F = 1 has three equal channels")
     return Table(path.name, pixels[..., 0])
 
 
 def _depth(path: Path) -> int:
-    """Bits per channel of a .png, by its header; 0 where there is none."""
+    """Bits per channel according to the header of a .png; 0 if there is none."""
     with contextlib.suppress(OSError):
         header = path.read_bytes()[:25]
         if len(header) == 25 and header[12:16] == b"IHDR":
@@ -153,10 +157,10 @@ def _depth(path: Path) -> int:
 
 
 def check(table: Table, expected: str = "", sampled: bool = False) -> Finding:
-    """Judge a table of E, or of E_avg if it is constant along a direction.
+    """Judge a table of E, or of E_avg if it is constant along an axis.
 
-    expected  the name of the masking term that was asked for; "" accepts the homework's two and Smith's
-    sampled   whether normals must have been sampled by importance, so that low roughness is free of noise
+    expected  the name of the required masking term; "" accepts the homework's two and Smith's
+    sampled   whether importance sampling of normals is required, so that low roughness is free of noise
     Raises InputError for a picture that holds no such table.
     """
     _check(table, expected)
@@ -164,7 +168,7 @@ def check(table: Table, expected: str = "", sampled: bool = False) -> Finding:
 
 
 def check_average(table: Table, own: Table | None, expected: str = "") -> Finding:
-    """Judge a table of E_avg by the student's own E, which may be wrong by itself."""
+    """Judge a table of E_avg by the right tables of E, or by the student's own, which may be wrong itself."""
     _check(table, expected)
     return _average(table, own, expected)
 
@@ -184,7 +188,7 @@ def _check(table: Table, expected: str) -> None:
             f"{bad} values are NaN or infinite", table.name, "a division by 0, such as n.v = 0, or 0 / 0 in D?"
         )
     if np.ptp(values) < 1.0 / LEVELS:
-        raise InputError(f"every pixel is {values.flat[0]:.3g}", table.name, "an empty picture: was it computed?")
+        raise InputError(f"every pixel is {values.flat[0]:.3g}", table.name, "the picture is empty: was it computed?")
     known = ["schlick-ibl", "schlick-direct", "smith-separable", "smith-correlated"]
     if expected and expected not in known:
         raise InputError(f"unknown masking term '{expected}' of a table", "MODEL", did_you_mean(expected, known))
@@ -204,7 +208,7 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     right = best.mistake is None
     limit = max(FITS, 1.3 * _noise(best.layout.values))
     random = _is_noise(residual) and (right or best.distance <= limit)
-    noise = random and all_rows <= (1.0 if right else 1.2) * best.distance  # as much at low roughness as at high
+    noise = random and all_rows <= (1.0 if right else 1.2) * best.distance  # equal at low and at high roughness
     fits = max(NOISY, limit) if right and noise else limit
     converged = all_rows <= FITS or noise or not low.any()
     facts = [
@@ -216,12 +220,12 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     if best.distance <= (NOISY if right else limit) and not converged:
         facts += _sampling(best, at, size, low, figures)
     if noise and best.distance > FITS:
-        facts.append("the rest is noise of random directions: more of them would show how near the mean is")
+        facts.append("the rest is noise of random directions: more of them would show how close the mean is")
     if best.distance > (NOISY if right and not converged else fits):
         facts.append("no form fits: the table is wrong in a way that is not known here")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     if np.mean(inside[~low] >= LEVELS - 1.0) > WHITE:
-        facts.append("nearly all is white: the values exceed 1, by a factor that cannot be told from white texels")
+        facts.append("nearly all texels are white: the values exceed 1, by a factor that white texels do not reveal")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     _check_encoding(table, best.stored)
     mistake = _certain(best, matches) or _unexpected(best.form, expected)
@@ -232,15 +236,15 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
 
 
 def _noise(values: Values) -> float:
-    """The noise of a table, gray levels (rms), by second differences over roughness from `CONVERGED` on, where E is
+    """The rms noise of a table in gray levels, from second differences along roughness above `CONVERGED`, where E is
     smooth at every mu."""
     rows = values[int(CONVERGED * len(values)) :] * LEVELS
     second = rows[2:] - 2.0 * rows[1:-1] + rows[:-2]
-    return float(np.sqrt(np.mean(second**2) / 6.0))  # 1 + 4 + 1 variances
+    return float(np.sqrt(np.mean(second**2) / 6.0))  # a second difference has 1 + 4 + 1 times the variance
 
 
 def _certain(best: _Match, matches: list[_Match]) -> Mistake | None:
-    """The mistake of the nearest match; only a probable one if a right form is about as near."""
+    """The mistake of the nearest match, called probable if a right form is about as near; None if it is right."""
     if best.mistake is None:
         return None
     right = min((one.distance for one in matches if one.mistake is None), default=np.inf)
@@ -250,18 +254,18 @@ def _certain(best: _Match, matches: list[_Match]) -> Mistake | None:
 
 
 def _is_noise(residual: np.ndarray) -> bool:
-    """Whether differences of neighboring texels are those of independent random numbers."""
+    """Whether the errors of neighboring texels are uncorrelated."""
     return float(np.corrcoef(residual[:, 1:].ravel(), residual[:, :-1].ravel())[0, 1]) < GRAIN
 
 
 def _check_encoding(table: Table, stored: _Stored) -> None:
-    """Raise InputError for a table with a screen's encoding."""
+    """Raise InputError for a table with sRGB encoding applied or removed."""
     if stored.mistake is not None and stored.words in ("encoded as sRGB", "decoded"):
         raise InputError(stored.mistake.words, table.name, "write E * 255 as it is, without gamma")
 
 
 def _unexpected(form: Form, expected: str) -> Mistake | None:
-    """A right form that was not asked for."""
+    """The mistake of a right form with another masking term than the expected one; None if there is none."""
     if not expected or form.masking == expected:
         return None
     asked = next(f.words for f in table_forms.forms(SIZES[0]) if f.masking == expected)
@@ -269,7 +273,7 @@ def _unexpected(form: Form, expected: str) -> Mistake | None:
 
 
 def _matches(picture: Values, forms: tuple[Form, ...], at: np.ndarray) -> list[_Match]:
-    """Every form in every layout, the nearest first; among those that are as near, the simplest."""
+    """The eight nearest combinations of form, storage and layout, best first, with a small penalty per mistake."""
     rows = (at + 0.5) / len(picture) >= CONVERGED
     matches: list[tuple[float, int, _Match]] = []
     layouts = [(one, one.values[np.ix_(at, at)]) for one in _layouts(picture)]
@@ -277,8 +281,8 @@ def _matches(picture: Values, forms: tuple[Form, ...], at: np.ndarray) -> list[_
         for stored, (layout, values) in itertools.product(_stored(form.values, form.mistake is None), layouts):
             faults = sum(one.mistake is not None for one in (form, stored, layout))
             distance = _rms(values[rows] - stored.values[rows]) * LEVELS
-            # One mistake more must bring the table nearer by half a gray level and a tenth. The noisy rows count
-            # little, but where the others are white they alone tell forms apart.
+            # An additional mistake must reduce the distance by about a tenth plus a quarter of a gray level. The noisy
+            # rows have a small weight, but if the others are white, only they distinguish the forms.
             cost = (distance + 0.5) * (1.0 + 0.1 * faults) + 0.25 * faults
             cost += NOISY_WEIGHT * _rms(values - stored.values) * LEVELS
             matches.append((cost, order, _Match(form, stored, layout, distance)))
@@ -287,13 +291,13 @@ def _matches(picture: Values, forms: tuple[Form, ...], at: np.ndarray) -> list[_
 
 
 def _check_likeness(table: Table, best: _Match, at: np.ndarray) -> None:
-    """Raise InputError for a picture of something else."""
+    """Raise InputError for a picture that is not a table of E."""
     values = best.layout.values[np.ix_(at, at)]
     rows = (at + 0.5) / len(table.values) >= CONVERGED
-    with np.errstate(all="ignore"):  # white everywhere
+    with np.errstate(all="ignore"):  # the correlation is 0 / 0 if all texels are white
         alike = np.corrcoef(values[rows].ravel(), best.stored.values[rows].ravel())[0, 1]
     if best.distance > NOISY and not alike > UNLIKE:
-        what = "this picture resembles no table of E: it is of something else"
+        what = "this picture does not resemble a table of E: it shows something else"
         raise InputError(what, table.name, "give the table, roughness along rows and mu along columns")
 
 
@@ -301,9 +305,9 @@ _FLOORS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 
 
 def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures: dict[str, float]) -> list[str]:
-    """What explains the rows of low roughness: cosine sampling, a floor of D's denominator, bytes that wrap.
+    """Sentences that explain the rows of low roughness: cosine sampling, a floor of D's denominator, bytes that wrap.
 
-    The samples are random, so that only means over rows can be compared.
+    The samples are random, so only means over rows can be compared.
     """
     invert = bool(best.stored.words)
     values = best.layout.values[np.ix_(at, at)][low].mean(axis=1)
@@ -327,7 +331,7 @@ def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures:
 
 
 def _wraps(E: Values) -> bool:
-    """Whether bytes wrap: single dark texels among bright ones."""
+    """Whether values above 255 have wrapped, leaving single dark texels among bright ones."""
     neighbors = np.stack([np.roll(E, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
     middle = np.median(neighbors, axis=0)
     bright = middle > 0.8
@@ -342,12 +346,13 @@ def _rms(difference: Values) -> float:
 
 
 def _average(table: Table, own: Table | None, expected: str) -> Finding:
-    """E_avg by each right E, or by the student's own, with each weighting, storage and layout."""
+    """Judge a table of E_avg: averages of each right E, and of the student's own, with every weighting, storage and
+    layout."""
     size = len(table.values)
     at = table_forms.nodes(size)
     if not table.constant:
         raise InputError(
-            "the picture varies along both axes, and E_avg has one value per row", table.name, "see E_avg.png"
+            "the picture varies along both axes, but E_avg has one value per row", table.name, "see E_avg.png"
         )
     across = float(np.mean(np.std(table.values, axis=0))) < float(np.mean(np.std(table.values, axis=1)))
     columns = table.values.mean(axis=0) if across else table.values.mean(axis=1)
@@ -384,7 +389,7 @@ def _average(table: Table, own: Table | None, expected: str) -> Finding:
 
 
 def _own(own: Table, size: int, at: np.ndarray) -> Iterator[tuple[str, str, Values]]:
-    """The student's E, by its own layout, at the rows of E_avg."""
+    """The student's E in each of the two allowed layouts, in the rows of E_avg, with its words and no masking term."""
     if own.constant or len(own.values) != size:
         return
     for layout in itertools.islice(_layouts(own.values), 2):

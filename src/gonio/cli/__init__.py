@@ -1,8 +1,8 @@
-"""The command line: thin verbs over the packages below it, without logic. One file per verb in `verbs`.
+"""The command line: thin verbs that call the packages below, without logic of their own. One file per verb in `verbs`.
 
-Nothing is imported at the top, so that every later import happens inside `main`, where Ctrl-C gives one line. `app`
-imports nothing heavy, so that `gonio --help` takes little more than Python and Typer: each verb imports what it needs
-when it runs. Errors are printed in one place, `app.run`.
+Nothing is imported at module level, so that every import happens inside `main`, where Ctrl-C prints a single line.
+`app` imports nothing heavy, so that `gonio --help` takes little longer than Python and Typer: each verb imports what it
+needs when it runs. Errors are printed in one place, `app.run`.
 
 Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C (143 by
 SIGTERM, 129 by SIGHUP).

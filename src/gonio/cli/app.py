@@ -25,14 +25,14 @@ _NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTIL
 
 
 def _styled(text: str) -> str:
-    """Help with bold headings and colored names. Typer's own way, by Rich, takes longer than all else together."""
+    """The help text with bold headings and colored names. Typer's own formatting, by Rich, takes longer than all else."""
     return _NAMES.sub("  \x1b[36m\\1\x1b[0m", _HEADINGS.sub("\x1b[1m\\g<0>\x1b[0m", text))
 
 
 class _Command(TyperCommand):
     def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
         parser = super().make_parser(ctx)  # type: ignore[arg-type]
-        from . import renamed  # the list of verbs needs none
+        from . import renamed  # imported late, since the list of verbs does not need it
 
         renamed.accept(parser, self.name or "")
         return parser
@@ -42,7 +42,7 @@ class _Command(TyperCommand):
 
 
 class _Verbs(TyperGroup):
-    """The verbs as commands, each made when it is asked for."""
+    """The verbs as commands, each created on demand."""
 
     def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]
         return [verb.name for verbs in _by_panel().values() for verb in verbs]
@@ -68,7 +68,7 @@ class _Verbs(TyperGroup):
 
 
 def _by_panel() -> dict[str, list[Verb]]:
-    """The verbs under the headings of the help, in its order."""
+    """The verbs by heading, in the order of the help."""
     panels: dict[str, list[Verb]] = {PICTURES: [], MATERIALS: [], SUPPORT: []}
     for verb in sorted(Verb.family.all().values(), key=lambda verb: verb.place):
         panels.setdefault(verb.panel, []).append(verb)
@@ -106,7 +106,7 @@ def gonio(
 
 
 def _fail(error: GonioError, as_json: bool) -> int:
-    """Print an error in three lines at most (what, where, hint), or as JSON; its exit code."""
+    """Print an error in at most three lines (what, where, hint), or as JSON; returns its exit code."""
     if as_json:
         parts = {"what": error.what, "where": error.where, "hint": error.hint, "code": error.code}
         print(json.dumps({"error": parts}))
@@ -124,13 +124,13 @@ def _fail(error: GonioError, as_json: bool) -> int:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-    """Print Gonio's own warnings in one line; those of libraries are for their authors."""
+    """Print Gonio's own warnings, one line each; warnings of libraries are shown only with --debug."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
 
 def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
-    """The exit code of the command; `ended` knows the signal where one came."""
+    """Run the command and return its exit code; `ended` holds the signal that ended it, if any."""
     given = sys.argv[1:] if arguments is None else arguments
     ended = ended or Ended()
     warnings.showwarning = _show_warning
@@ -147,7 +147,7 @@ def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
             streams.silence(sys.stdout, sys.stderr)
             return ended.code
         streams.silence(sys.stdout)
-        hint = "the files that the command wrote are there"
+        hint = "the files that the command wrote are in place"
         return _fail(MachineError(f"the output cannot be printed: {error.strerror}", "stdout", hint), as_json=False)
 
 
@@ -156,13 +156,13 @@ def _run(given: list[str], ended: Ended) -> int:
     try:
         check_current_folder()
         code = app(given or ["--help"], prog_name="gonio", standalone_mode=False)
-        if code == exit_code(signal.SIGINT):  # Typer's answer to a KeyboardInterrupt; what kept something exits itself
+        if code == exit_code(signal.SIGINT):  # Typer's result for a KeyboardInterrupt; renders exit themselves
             print(ended.line, file=sys.stderr)
             return ended.code
         return InputError.code if not given else code if isinstance(code, int) else 0
     except GonioError as error:
         return _fail(error, as_json)
-    except KeyboardInterrupt:  # between two things that Typer does
+    except KeyboardInterrupt:  # outside the code where Typer catches it
         print(ended.line, file=sys.stderr)
         return ended.code
     except (BrokenPipeError, streams.OutputError):
@@ -174,8 +174,8 @@ def _run(given: list[str], ended: Ended) -> int:
 
 
 def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
-    """The exit code of what is a fault of code that the user named, or else of Gonio, unless a signal came in the
-    middle of an import."""
+    """Print an unexpected error, as a fault of the user's code or else of Gonio, and return its exit code. If a signal
+    has arrived, such as in the middle of an import, report the signal instead."""
     if ended.number:
         print(ended.line, file=sys.stderr)
         return ended.code
@@ -185,13 +185,13 @@ def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
     located = cause if isinstance(cause, GonioError) else in_user_code(cause)
     if located is not None:
         return _fail(located, as_json)
-    if isinstance(error, OSError) and error.filename is not None:  # a file that is no more, or that nobody may read
+    if isinstance(error, OSError) and error.filename is not None:  # a file that was removed or is unreadable
         reason = error.strerror or type(error).__name__
         return _fail(InputError(f"cannot be used: {reason}", os.fsdecode(error.filename), "check the file"), as_json)
     if isinstance(error, MemoryError):
-        return _fail(MachineError("the memory does not suffice", "", "ask for less, such as a smaller --size"), as_json)
+        return _fail(MachineError("out of memory", "", "ask for less, such as a smaller --size"), as_json)
     what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
-    failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
+    failure = GonioError(what, "", "this is a bug in Gonio; run `gonio --debug ...` and report what it prints")
     failure.code = 3
     return _fail(failure, as_json)
 

@@ -1,4 +1,4 @@
-"""Completion in the shell, without loading Dr.Jit: materials, presets, laws, languages, ..."""
+"""Shell completion without loading Dr.Jit: materials, presets, laws, languages, ..."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def laws(incomplete: str) -> Offers:
 
 
 def presets(context: typer.Context, incomplete: str) -> Offers:
-    """The presets of the material that is named earlier on the line; without one, those of all."""
+    """The presets of the material named earlier on the line, or of all materials if none is."""
     from ..material import models
 
     first = next(iter(context.params.values()), None)

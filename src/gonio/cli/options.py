@@ -1,5 +1,5 @@
-"""Options and arguments that several verbs share, declared once: singly, or as a group of related ones, which a verb
-takes as one parameter."""
+"""Options and arguments that several verbs share, each declared once: individually, or in a group that a verb takes as
+one parameter."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 def output_option(metavar: str, text: str) -> OptionInfo:
-    """`-o`, the one name of what a verb writes: `Annotated[Path, output_option("FILE", "The sheet.")]`."""
+    """`-o`, the option for the output of a verb: `Annotated[Path, output_option("FILE", "The sheet.")]`."""
     return Option("-o", "--output", metavar=metavar, help=text)
 
 
 def samples_option(text: str) -> OptionInfo:
-    """`--samples`: random samples of anything but a pixel."""
+    """`--samples`, the number of random samples of anything except pixels."""
     return Option("--samples", metavar="N", help=text)
 
 
@@ -60,16 +60,16 @@ Spp = Annotated[int | None, render_option("spp")]
 Exposure = Annotated[str, render_option("exposure")]
 Timeout = Annotated[float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")]
 Checkpoint = Annotated[
-    Path | None, Option(metavar="FILE", help="Store intermediate sums there; resume from the file if it exists.")
+    Path | None, Option(metavar="FILE", help="Store intermediate sums in FILE; resume from it if it exists.")
 ]
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 class Options:
-    """Base of a group of options: its annotated fields, each with a default.
+    """Base class of groups of options: annotated fields, each with a default.
 
-    It works like a dataclass, but no methods are generated and compiled for each group: for twelve groups this took a
-    tenth of the time of `gonio --help`.
+    It works like a dataclass, but without generated methods: compiling those of twelve groups took a tenth of the time
+    of `gonio --help`.
     """
 
     def __init__(self, **values: object) -> None:
@@ -77,14 +77,14 @@ class Options:
 
 
 class Trust(Options):
-    """What a scene or a material's file may do."""
+    """Permissions of scene and material files."""
 
     allow_outside: Outside = False
     allow_code: Code = False
 
 
 class Reading(Options):
-    """How shaders that are named on the command line are read."""
+    """How shaders named on the command line are read."""
 
     define: Annotated[
         list[str] | None,
@@ -96,8 +96,8 @@ class Reading(Options):
     ] = None
 
     def shaders(self, texts: Sequence[str]) -> list[str]:
-        """The materials, with `define` and `adapter` as a part of the name of each that is a shader. Raises InputError
-        if these are given and there is none."""
+        """The materials as texts, in which the names of shaders include `define` and `adapter`. Raises InputError if
+        these are given without a shader."""
         from ..catalog import shaders
         from ..errors import InputError
 
@@ -106,7 +106,7 @@ class Reading(Options):
         heads = [shaders.head_in(one) for one in texts]
         if options and not any(heads):
             hint = f"name one, such as my.glsl ({', '.join(shaders.SUFFIXES)})"
-            raise InputError("a macro or an adapter's entry given, and no shader", "-D, --adapter", hint)
+            raise InputError("a macro or an adapter's entry given without a shader", "-D, --adapter", hint)
         if not options:
             return list(texts)
         return [
@@ -116,20 +116,20 @@ class Reading(Options):
 
 
 class Material(Reading):
-    """Parameters and preset of the materials that are named on the command line."""
+    """Parameters and preset of the materials named on the command line."""
 
     param: Annotated[
         list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="Set a parameter; repeatable.")
     ] = None
     preset: Annotated[
-        str, Option(metavar="NAME", help="A named preset, such as Au of conductor.", autocompletion=completion.presets)
+        str, Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets)
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
-        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share the parameters they have.
+        """The materials as texts, such as "conductor(preset=Au,alpha=0.3)". Each gets those parameters that it has.
 
-        accepted  the kinds that may stand there; materials alone if not given
-        Raises InputError for a word of another kind, and for a parameter that no material has.
+        accepted  the accepted kinds of operands; only materials by default
+        Raises InputError for an operand of another kind, and for a parameter that no material has.
         """
         from ..catalog import notation, operands, texts
 
@@ -150,7 +150,7 @@ class Material(Reading):
         return self.texts([model], accepted)[0]
 
     def settings(self) -> list[str]:
-        """ "NAME=VALUE" each, the preset first."""
+        """The settings as "NAME=VALUE", the preset first."""
         return [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
 
     def refuse(self, target: str) -> None:
@@ -159,12 +159,12 @@ class Material(Reading):
 
         self.shaders(())
         if self.settings():
-            what = f"parameters of a material given, and '{target}' is none"
+            what = f"parameters of a material given, but '{target}' is not one"
             raise InputError(what, "--param", "name a material, such as conductor, or leave the parameters out")
 
     def instead_of(self, scene: str, allow_code: bool = False) -> notation.Settings | None:
-        """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
-        is a scene. Raises InputError for parameters without a material."""
+        """The material given in place of a scene, such as "ward.py:Ward" or "conductor(preset=Au)"; None if it is a
+        scene. Raises InputError for parameters without a material."""
         from ..catalog import notation, operands
 
         if operands.kind_of(scene, {operands.Kind.SCENE, *operands.MATERIALS}, "SCENE") in operands.MATERIALS:
@@ -180,21 +180,21 @@ def _text(head: str, settings: Mapping[str, str], own: str = "") -> str:
 
 
 class Fitting(Material):
-    """What of a model is fitted: `param` and `preset` hold values, `free` releases them."""
+    """Which parameters of a model are fitted: `param` and `preset` fix values, `free` releases them."""
 
     free: Annotated[
-        list[str] | None, Option(metavar="NAME", help="Fit this parameter too, though it is 1; repeatable.")
+        list[str] | None, Option(metavar="NAME", help="Also fit this parameter, even if it is 1; repeatable.")
     ] = None
     grazing: Annotated[float, Option(metavar="DEG", help="Ignore values beyond this angle from the normal.")] = 80.0
 
     def fixed(self) -> dict[str, str]:
-        """Parameters that are held, by path, as texts."""
+        """The fixed parameters by path, as texts."""
         from ..catalog import notation
 
         return dict(map(notation.assignment, self.param or ()))
 
     def models(self, names: Sequence[str]) -> list[str]:
-        """The models as texts, with the preset where one is given. Raises InputError for a preset of a sum."""
+        """The models as texts, with the preset if one is given. Raises InputError for a preset of a sum."""
         names = self.shaders(names)
         if not self.preset:
             return list(names)
@@ -203,22 +203,22 @@ class Fitting(Material):
         for name in names:
             if "+" in name:
                 hint = f"name it in a part: -m 'lambert+conductor(preset={self.preset})'"
-                raise InputError(f"preset '{self.preset}' given, and '{name}' is a sum of materials", "--preset", hint)
+                raise InputError(f"preset '{self.preset}' given, but '{name}' is a sum of materials", "--preset", hint)
         if not names:
             raise InputError(f"preset '{self.preset}' given without a model", "--preset", "name a model with -m")
         return Material(preset=self.preset).texts(names)
 
 
 class Executor(Options):
-    """Who computes: this process, several processes of this machine, or a cluster."""
+    """Where parts are computed: in this process, in several processes on this machine, or on a cluster."""
 
-    workers: Annotated[int | None, Option(metavar="N", help="Compute with N processes of this machine.")] = None
+    workers: Annotated[int | None, Option(metavar="N", help="Compute with N processes on this machine.")] = None
     cluster: Annotated[
         str | None, Option(metavar="ADDRESS", help="Compute on a Dask cluster, such as tcp://host:8786.")
     ] = None
 
     def running(self) -> AbstractContextManager[object]:
-        """A context in which they compute."""
+        """A context manager that uses them inside its `with` block."""
         if self.workers is None and self.cluster is None:
             return nullcontext()
         from ..work.cluster import Cluster
@@ -227,7 +227,7 @@ class Executor(Options):
 
 
 class Rendering(RenderOptions, Options):
-    """How a scene is rendered, as the command line takes it: size and exposure are texts until `request`."""
+    """The options of a render as the command line takes them: size and exposure are texts until `request`."""
 
     def request(
         self,
@@ -255,7 +255,7 @@ class Rendering(RenderOptions, Options):
         )
 
 
-# size and exposure are read by `request`, whose errors say more than Typer's
+# size and exposure are parsed by `request`, whose errors say more than Typer's
 _TEXTS: dict[str, object] = {"size": str | None, "exposure": str}
 Rendering.__annotations__ = {
     field.name: Annotated[_TEXTS.get(field.name, get_args(_declared()[field.name])[0]), render_option(field.name)]

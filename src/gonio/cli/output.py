@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 def print_warnings(warnings: tuple[str, ...]) -> None:
-    """One line each, on stderr."""
+    """Print warnings on stderr, one line each."""
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
 
 
 class Bar:
-    """A progress bar on stderr: samples done, rate, time left; nothing where stderr is no terminal."""
+    """A progress bar on stderr: samples done, rate, time left; hidden if stderr is not a terminal."""
 
     def __init__(self, title: str, total: float | None = None) -> None:
         from rich.console import Console
@@ -33,7 +33,7 @@ class Bar:
         self._console = Console(stderr=True)
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}", style="cyan", markup=False),  # a material's text has brackets
+            TextColumn("{task.description}", style="cyan", markup=False),  # the text of a material contains brackets
             BarColumn(),
             TextColumn("{task.fields[state]}", markup=False),
             console=self._console,
@@ -59,11 +59,11 @@ class Bar:
         self.step(progress.done, progress.wanted, state)
 
     def step(self, done: int, total: int, state: str) -> None:
-        with contextlib.suppress(OSError):  # a terminal that has closed costs no picture
+        with contextlib.suppress(OSError):  # a closed terminal must not cost the picture
             self._bar.update(self._task, total=total, completed=done, state=state)
 
     def tell(self, text: str) -> None:
-        """A line above the bar."""
+        """Print a line above the bar."""
         with contextlib.suppress(OSError):
             self._console.print(text, markup=False, soft_wrap=True)
 
@@ -73,7 +73,7 @@ class Bar:
 
 
 def listing(*headings: str) -> Table:
-    """A table for the terminal; for `print_rich`."""
+    """A table for `print_rich`, with the given headings."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -84,7 +84,7 @@ def listing(*headings: str) -> Table:
 
 
 def print_intervals(names: Sequence[str], values: Iterable[float], intervals: Iterable[tuple[float, float]]) -> None:
-    """Fitted values with their 95 % intervals."""
+    """Print fitted values with their 95 % intervals."""
     table = listing("", "value", "95 % interval")
     for name, value, (low, high) in zip(names, values, intervals, strict=True):
         table.add_row(name, f"{value:.5g}", f"{low:.5g} to {high:.5g}")
@@ -97,14 +97,14 @@ def print_rich(what: RenderableType) -> None:
 
 
 def console(markup: bool = True) -> Console:
-    """Standard output in the width of the terminal; without a terminal nothing is truncated or wrapped."""
+    """A console on standard output, as wide as the terminal; without a terminal it has 200 columns."""
     from rich.console import Console
 
     return Console(markup=markup, emoji=False, width=None if sys.stdout.isatty() else 200)
 
 
 def print_tables(manifest: Mapping[str, Any], path: Path, as_json: bool) -> None:
-    """What a baked folder holds."""
+    """Print the contents of a baked folder."""
     if as_json:
         print(json.dumps({"path": str(path), **manifest}))
         return

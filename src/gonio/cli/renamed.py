@@ -1,7 +1,7 @@
 """Former spellings of options: each works for one release, with a warning that names the present one.
 
-`FORMER` is the only list of them. They are left out of the help, of the completion and of docs/options.md's tables by
-verb. Delete this module after one release.
+`FORMER` is the only list of them. They do not appear in the help, in shell completion or in the tables per verb of
+docs/options.md. Delete this module after one release.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ def _folder(path: str) -> str:
 
 
 class Former(NamedTuple):
-    """A former spelling of a verb: an option, or an argument in capitals; `new` likewise."""
+    """A former spelling and its replacement: each is an option of a verb, or an argument, in capitals."""
 
     verb: str
     old: str
     new: str
-    convert: Callable[[str], str] = str  # the value as the present spelling takes it
+    convert: Callable[[str], str] = str  # converts a value to the form that the present spelling takes
 
 
 FORMER = (
@@ -45,7 +45,7 @@ FORMER = (
 
 
 def warn(verb: str, old: str) -> None:
-    """Print the present name of a former spelling, on stderr."""
+    """Warn on stderr about a former spelling, with the present one."""
     former = next(one for one in FORMER if (one.verb, one.old) == (verb, old))
     example = "DIR/" if former.convert is _folder else ""
     new = f"{former.new} {example}".rstrip() if former.new.startswith("-") else f"the argument {former.new}"
@@ -53,7 +53,7 @@ def warn(verb: str, old: str) -> None:
 
 
 def accept(parser: Any, verb: str) -> None:
-    """Have the option parser of a verb take the former spellings too."""
+    """Let the option parser of a verb accept the former spellings too."""
     for former in FORMER:
         if former.verb == verb:
             option = _FormerOption(former, parser)
@@ -66,7 +66,7 @@ def accept(parser: Any, verb: str) -> None:
 
 
 def _accept_argument(parser: Any, option: _FormerOption) -> None:
-    """Have the parser take one word more than the verb has arguments, as the last one."""
+    """Let the parser accept one word more than the verb has arguments; the last word is the option's value."""
     process = parser._process_args_for_args
 
     def process_with_former(state: Any) -> None:

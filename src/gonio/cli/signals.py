@@ -1,6 +1,7 @@
 """How the command ends on a signal: by Ctrl-C, from batch systems and from closing terminals.
 
-A render stores its picture and handles signals itself (`render.passes.Interrupts`). All else ends with one line.
+A render stores its picture and handles signals itself (`render.passes.Interrupts`). All other commands end with one
+line.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ def exit_code(number: int) -> int:
 
 
 class Ended:
-    """The signal that has ended the command; 0 while none has."""
+    """The signal that ended the command; 0 if none has."""
 
     number = 0
 
     @property
     def line(self) -> str:
-        files = sys.modules.get("gonio.files")  # what has not been imported has written nothing
+        files = sys.modules.get("gonio.files")  # a module that was not imported has written nothing
         written = ", ".join(str(path) for path in files.written) if files else ""
         what = f"written before: {written}" if written else "nothing was written"
         return f"ended by {words(self.number or signal.SIGINT)}; {what}"
@@ -45,8 +46,8 @@ class Ended:
 
 @contextlib.contextmanager
 def at_once() -> Iterator[None]:
-    """Inside, a signal ends the process with one line: an import that an exception cuts in two can crash, or is taken
-    for a module that is missing."""
+    """Let signals end the process with one line inside the `with` block: an import that is interrupted by an exception
+    can crash, or look like a missing module."""
 
     def end(number: int, frame: FrameType | None) -> None:
         with contextlib.suppress(OSError):
@@ -59,7 +60,7 @@ def at_once() -> Iterator[None]:
 
 @contextlib.contextmanager
 def as_exceptions() -> Iterator[Ended]:
-    """Inside, a signal is a KeyboardInterrupt, so that files that were begun are removed and children ended."""
+    """Let signals raise KeyboardInterrupt inside the `with` block, so that partial files and children are removed."""
     ended = Ended()
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -72,13 +73,13 @@ def as_exceptions() -> Iterator[Ended]:
 
 @contextlib.contextmanager
 def _handled(end: signal._HANDLER) -> Iterator[None]:
-    """With this handler; what is ignored, as under nohup and in a shell's background, stays ignored."""
+    """Handle signals with `end` inside the `with` block; ignored signals, as under nohup, stay ignored."""
     before = {}
     try:
         for number in ENDING:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, end)
-    except ValueError:  # not in the main thread, which is where signals arrive
+    except ValueError:  # not the main thread, and only that one receives signals
         pass
     try:
         yield

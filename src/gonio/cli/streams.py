@@ -1,4 +1,4 @@
-"""Standard streams as the command needs them: open, and able to print the names of all files."""
+"""Standard streams that are open and can print any file name."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import TextIO
 
 
 class OutputError(OSError):
-    """What is printed cannot be written: the disk is full, or the output closed."""
+    """The standard output cannot be written: the disk is full, or the output is closed."""
 
 
 class _Output(io.TextIOWrapper):
-    """A standard output whose errors are told from those of files."""
+    """A standard output whose errors are distinguished from those of files."""
 
     def write(self, text: str) -> int:
         try:
@@ -30,21 +30,21 @@ class _Output(io.TextIOWrapper):
 
 
 def _told(error: OSError) -> OSError:
-    """The error as `OutputError`; a pipe that is closed is none."""
+    """The error as `OutputError`, unless it is a closed pipe."""
     return error if isinstance(error, BrokenPipeError) else OutputError(error.errno, error.strerror)
 
 
 def prepare() -> None:
-    """Open standard streams that are closed, as by `>&-`, and print bytes of file names that are no text as they are.
+    """Open standard streams that are closed, as by `>&-`, and print invalid text in file names as raw bytes.
 
-    Else the next file that is opened would be the standard output, and what is printed would go into it. Printing to a
-    closed output fails, as it does on a full disk.
+    Otherwise the next file that is opened would become the standard output and receive what is printed. Printing to a
+    closed output fails, as on a full disk.
     """
     for number, mode in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
             os.fstat(number)
         except OSError:
-            opened = os.open(os.devnull, mode)  # the lowest number that is free: this one
+            opened = os.open(os.devnull, mode)  # opens the lowest free number, usually this one
             if opened != number:
                 os.dup2(opened, number)
                 os.close(opened)
@@ -55,9 +55,9 @@ def prepare() -> None:
 
 
 def _stream(stream: TextIO | None, own: TextIO | None, number: int, kind: type[io.TextIOWrapper]) -> TextIO:
-    """The stream that prints to a file descriptor, in place of one that is closed or of Python's own.
+    """A stream that prints to a file descriptor, in place of a closed one or Python's own.
 
-    Any other stream is used as it is: a second wrapper would close its buffer when it is collected.
+    Any other stream is returned as it is: a second wrapper would close its buffer when garbage-collected.
     """
     if stream is None:
         raw = io.BufferedWriter(io.FileIO(number, "w", closefd=False))
@@ -74,7 +74,7 @@ def _stream(stream: TextIO | None, own: TextIO | None, number: int, kind: type[i
 
 
 def _replaced(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Bytes of a file's name as they are, and letters that the terminal's encoding lacks as escapes."""
+    """Invalid text in file names as raw bytes, and characters that the terminal's encoding lacks as escapes."""
     try:
         return codecs.lookup_error("surrogateescape")(error)
     except UnicodeError:
@@ -82,7 +82,7 @@ def _replaced(error: UnicodeError) -> tuple[str | bytes, int]:
 
 
 def silence(*streams: TextIO) -> None:
-    """Let what is left in the streams, and all that is still printed there, vanish."""
+    """Discard what is buffered in the streams and everything that is printed to them later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in streams:
         os.dup2(nowhere, stream.fileno())

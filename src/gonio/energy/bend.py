@@ -1,10 +1,10 @@
 """Transforms of mu in which albedo is smooth despite masking, for polynomials of the missing energy and for axes.
 
-Masking sets in where mu is a few alpha. With a bend b of a few alpha
+Masking sets in where mu is a few alpha. With a bend b of a few alpha,
 
     u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
 
-albedo is a smooth function of z in [0, 1] whatever the width, down to a limit at alpha -> 0.
+albedo is a smooth function of z in [0, 1] for any width, down to the limit alpha -> 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MIN_POWER = 1e-33  # of r, and the inverse of the maximum of z / r: the range of
 class Form(NamedTuple):
     """A transform of mu: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
 
-    w is alpha, or for schlick-direct 2 k.
+    w is alpha, or 2 k for schlick-direct.
     """
 
     squarings: int
@@ -56,7 +56,7 @@ FORMS = {
 
 
 def form_of(ndf: str, masking: str, side: str = "") -> Form:
-    """The form of a table: of a metal, or of one side of glass."""
+    """The form for a table: of a metal, or of one side of glass."""
     if not term(masking).smith:
         return FORMS["schlick-glass" if side else "schlick"]
     kind = "ggx" if distribution(ndf).falls_slowly else "narrow"
@@ -69,7 +69,7 @@ def knee(form: Form, masking: str, alpha: Scalar) -> Scalar:
 
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    """`knee` of an array."""
+    """`knee` for an array."""
     onset: Array = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
     return _bend(form, np.asarray(onset.numpy()).reshape(np.shape(alpha)))
 
@@ -88,7 +88,7 @@ def descent(form: Form, mu: Array, bend: Array) -> Array:
         mu, bend = sqr(mu), sqr(bend)
     ratio = bend * fall / (mu * (1.0 + bend))  # (1 - u) / u
     for _ in range(form.roots):
-        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the same of the root of u
+        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the same for the root of u
     return ratio
 
 
@@ -99,7 +99,7 @@ def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
 
 
 def cosine(form: Form, rise: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """mu at r: the inverse of `numpy_rise`."""
+    """mu for a given r: the inverse of `numpy_rise`."""
     power = 2**form.squarings
     bent, u = np.maximum(bend**power, 1e-300), rise**2**form.roots
     return np.clip(bent * u / ((1.0 - u) + bent), 0.0, 1.0) ** (1.0 / power)

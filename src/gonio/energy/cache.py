@@ -1,4 +1,4 @@
-"""A cache of computed tables in the user's cache folder, by a hash of their inputs.
+"""A cache of computed tables in the user's cache folder, keyed by a hash of their inputs.
 
 The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of the
 request and of the formulas behind it; the file contains the hash of its content. A truncated, altered or foreign file
@@ -73,7 +73,7 @@ def _store(path: Path, content: bytes) -> None:
 
 
 def _meaning(source: str) -> str:
-    """The meaning of a file to the interpreter: its syntax tree without docstrings and annotations."""
+    """What a file means to the interpreter: its syntax tree without docstrings and annotations."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
@@ -121,7 +121,7 @@ _PROCESS = f"{os.getpid()} {time.time_ns()}"
 
 
 def _path(key: tuple) -> tuple[Path, str]:
-    """(file, full name) of a key; its first entry is the type of the content."""
+    """(file, full name) for a key; its first entry is the type of the content."""
     name = hashlib.sha256((repr(key) + formulas()).encode()).hexdigest()
     return folder() / f"{key[0]}-{name[:32]}.npz", name
 

@@ -1,11 +1,11 @@
 """The difference between two materials: f over pairs of directions, and the albedo.
 
-    found = difference(go.OrenNayar(sigma=0.5), go.Lambert())
-    found.mean, found.largest, found.largest_at
+    result = difference(go.OrenNayar(sigma=0.5), go.Lambert())
+    result.mean, result.largest, result.largest_at
 
 f is compared at directions sampled by each material and by the cosine, a third each, so that narrow lobes are covered;
-each pair is weighted by the inverse density of this mixture. Perfectly specular parts have no f and count in the albedo
-only.
+each pair is weighted by the inverse density of this mixture. Perfectly specular parts have no f and enter only the
+albedo.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ VIEWS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)  # degrees of wo
 AZIMUTHS = 8  # per view, if a material is anisotropic
 PAIRS = 1 << 14  # directions of light per view
 GRAZING = 0.03  # smallest cosine of wi: f = eval / cos loses its digits within 1.7 degrees of the horizon
-FAINT = 0.01  # of the mean f at a view: below it a ratio is not visible
+FAINT = 0.01  # fraction of the mean f at a view below which a ratio is not visible
 METRICS = {
     "mean": "int |f_A - f_B| cos over int f_B cos, averaged over views",
     "largest": "the largest |f_A - f_B| over the larger of both, if either is over 1 % of the mean",
@@ -38,9 +38,9 @@ class View:
     """The comparison at one angle of wo.
 
     theta    degrees
-    mean     int |f_A - f_B| cos d wi over int f_B cos d wi, mean of the channels; inf where B is black
-    largest  of |f_A - f_B| / max(f_A, f_B)
-    wi       (theta, phi) of that direction, degrees; phi relative to wo
+    mean     int |f_A - f_B| cos d wi divided by int f_B cos d wi, mean of the channels; inf if B is black
+    largest  largest |f_A - f_B| / max(f_A, f_B)
+    wi       (theta, phi) of the direction at which it occurs, degrees; phi relative to wo
     f        f_A and f_B there, 1/sr, mean of the channels
     albedo   of A and of B, (2, channels)
     """
@@ -58,9 +58,9 @@ class Difference:
     """The comparison of two materials.
 
     views         the results at each angle of wo
-    known         the angles at which both are known; only these are compared
-    has_specular  whether either has perfectly specular parts, which count in the albedo only
-    metric        the metric that is judged, one of METRICS
+    known         the angles at which both materials are known; only these are compared
+    has_specular  whether either has perfectly specular parts, which enter only the albedo
+    metric        the metric to which the tolerance applies, one of METRICS
     tolerance     the largest value that passes; None passes all
     """
 
@@ -126,9 +126,9 @@ class Difference:
 def difference(
     a: BSDF, b: BSDF, metric: str = "mean", tolerance: float | None = None, pairs: int = PAIRS, seed: int = 1
 ) -> Difference:
-    """Compare f and albedo of A with those of B, at the angles where both are known.
+    """Compare f and albedo of A with those of B, at the angles at which both are known.
 
-    metric, tolerance  the metric that is judged, one of METRICS, and the largest value that passes
+    metric, tolerance  the metric to which the tolerance applies, one of METRICS, and the largest value that passes
     pairs              directions of light per view
     Raises InputError for an unknown metric, and if no view is known for both.
     """
@@ -177,8 +177,8 @@ def _view(
 
 
 def _directions(a: BSDF, b: BSDF, wo: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Directions of light, a third from each material and from the cosine, and the density of the mixture; 0 for those
-    from perfectly specular parts."""
+    """Directions of light, a third from each material and from the cosine, and the density of the mixture; the density
+    is 0 for samples of perfectly specular parts."""
     u = rng.random((len(wo), 3))
     both = a.transmits or b.transmits
     side = np.where(both & (u[:, 0] < 0.5), -1.0, 1.0)

@@ -1,1 +1,1 @@
-"""Materials fitted to measurements: `data` (what is fitted to), `parameters` (what moves), `solver`, `fit`."""
+"""Materials fitted to measurements: `data` (fitted values), `parameters` (free parameters), `solver`, `fit`."""

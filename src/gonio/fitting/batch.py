@@ -33,7 +33,7 @@ class Settings:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """The part of a cache key that they determine."""
+        """The part of a cache key that these settings determine."""
         return (self.lobes, self.metric, tuple(sorted(self.fixed.items())), self.free, self.grazing)
 
     def fit(self, cells: Data, model: str) -> Fit:
@@ -69,7 +69,7 @@ class Row:
 
 
 def files_of(named: Sequence[str]) -> list[str]:
-    """Paths of the named files and of all measurement files in named folders. InputError if there are none."""
+    """Paths of the named files and of all measurement files in named folders. Raises InputError if there are none."""
     paths: list[str] = []
     for text in named:
         folder = Path(os.path.expanduser(text))
@@ -103,7 +103,7 @@ def run(
     how = (tuple(models), *settings.key)
     job = parts.Parts("fit", how, tuple(files)) if len(files) > 1 else None
     if job is not None and job.found:
-        notice(f"{job.found} of {len(files)} files were fitted before")
+        notice(f"{job.found} of {len(files)} files were already fitted")
     rows: list[Row] = []
     for number, file in enumerate(files):
         report(number, len(files), Path(file).name)

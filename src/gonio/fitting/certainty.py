@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from ..measure.tables.base import Floats
 from .solver import BLOCK, Linearized
 
-NULL = 1e-8  # of the largest eigenvalue: float32 derivatives have relative errors of 1e-6
-PART = 1e-3  # squared component of a unit vector from which a parameter always counts as part of the direction
-LEAST = 1e-6  # and below which it never does
+NULL = 1e-8  # relative to the largest eigenvalue: float32 derivatives have relative errors of 1e-6
+PART = 1e-3  # squared component of a unit vector above which a parameter always belongs to the direction
+LEAST = 1e-6  # squared component below which it never does
 ROUNDED = 1e-6  # relative error of J^T J
 
 
 def undetermined_groups(hessian: Floats) -> list[list[int]]:
-    """Indices of undetermined parameters, grouped where the data determine only a combination, from J^T J (K, K).
+    """Indices of undetermined parameters, grouped if the data determine only a combination, from J^T J (K, K).
 
-    They have a part in the null space of J^T J, with parameters scaled to a unit diagonal; an eigenvalue counts as 0
-    within the rounding of float32 derivatives. That rounding also turns the null space, by its ratio to the next
-    eigenvalue: a part within it, or below LEAST, is none.
+    They have components in the null space of J^T J, with parameters scaled to a unit diagonal; an eigenvalue counts as
+    0 if it is within the rounding error of float32 derivatives. That error also rotates the null space, by its ratio to
+    the next eigenvalue: a component within this angle, or below LEAST, counts as 0.
     """
     size = np.sqrt(np.maximum(np.diag(hessian), 0.0))
     s = np.where(size > 0.0, size, 1.0)
@@ -35,7 +35,8 @@ def undetermined_groups(hessian: Floats) -> list[list[int]]:
 
 
 def connected(joined: NDArray[np.bool_]) -> list[list[int]]:
-    """Groups of indices that pairs join directly or by others, from a symmetric (K, K); those joined to themselves."""
+    """Groups of indices connected by a symmetric relation (K, K), directly or through others, from those with a true
+    diagonal."""
     left = set(np.flatnonzero(np.diag(joined)).tolist())
     groups: list[list[int]] = []
     while left:
@@ -74,9 +75,9 @@ class Certainty:
 
     @property
     def coupling(self) -> Floats:
-        """Correlation matrix for independent errors of equal size, (K, K): how far the data tell parameters apart. A
+        """Correlation matrix for independent errors of equal size, (K, K): how well the data distinguish parameters. A
         misfit that several parameters share correlates their values, but does not couple them. 0 for undetermined
-        parameters, whose entries in the pseudoinverse are rounding."""
+        parameters, whose entries in the pseudoinverse are rounding errors."""
         return _correlation(np.where(np.isfinite(np.diag(self.covariance)), self.inverse, 0.0))
 
 
@@ -90,7 +91,7 @@ def _correlation(covariance: Floats) -> Floats:
 
 
 def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int) -> tuple[Floats, Floats]:
-    """(J^T J (K, K), scores J^T r of each run (R, K)) of residuals in parts; `rows` assigns a run to each residual."""
+    """(J^T J (K, K), scores J^T r of each run (R, K)) for residuals in parts; `rows` assigns a run to each residual."""
     runs = int(rows.max()) + 1 if len(rows) else 1
     hessian, scores = np.zeros((count, count)), np.zeros((runs, count))
     for residual, jacobian, which in parts:
@@ -105,11 +106,11 @@ def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int
 def degrees_of_freedom(parts: Sequence[Linearized], rows: NDArray[np.int64], inverse: Floats) -> Floats:
     """Effective degrees of freedom of the standard errors of `certainty`, (K,): how many runs determine a parameter.
 
-    The variance of a parameter is estimated by a sum over runs, each about e_g chi^2 of one degree of freedom, where
-    e_g is the run's part in the variance for independent errors of equal size. The sum is about chi^2 of
+    The variance of a parameter is estimated by a sum over runs, each about e_g chi^2 with one degree of freedom, where
+    e_g is the run's contribution to the variance for independent errors of equal size. The sum is about chi^2 with
     (sum e_g)^2 / sum e_g^2 degrees of freedom (Satterthwaite1946).
 
-    inverse  of J^T J, (K, K)
+    inverse  inverse of J^T J, (K, K)
     """
     runs = int(rows.max()) + 1 if len(rows) else 1
     shares = np.zeros((len(inverse), runs))

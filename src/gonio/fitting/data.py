@@ -14,9 +14,9 @@ from ..measure.tables.base import Floats, Measurement, in_rgb
 from ..measure.tables.half_difference import HalfDifference, centres
 
 GRAZING = 80.0  # degrees: measurements beyond are unreliable, and papers exclude them (Ngan2005)
-SHARED = 0.01  # share of the values equal to the maximum from which the detector counts as saturated
+SHARED = 0.01  # fraction of the values equal to the maximum above which the detector counts as saturated
 HIGHLIGHT = 4.0  # times the median: a larger maximum belongs to a highlight, not to a diffuse material
-GRID = (60, 45, 36)  # half-vector and difference angles, for tables with another grid
+GRID = (60, 45, 36)  # cells in half-vector and difference angles, for tables with another grid
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Data:
     wo, wi  (N, 3) float64, above the surface
     value   f cos theta_i, (N, 3)
     row     index of the run of neighbors, (N,): errors of neighbors are correlated
-    out     number of excluded values of the table, by reason
+    out     number of values of the table that are excluded, by reason
     """
 
     wo: Floats

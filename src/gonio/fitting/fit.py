@@ -36,11 +36,11 @@ FEW = 6000  # values on which starting points are compared
 SOME = 60_000  # values on which the best solutions are refined
 SOLVED = 8  # starting points that are refined with the metric itself on few values
 ENDS = 3  # solutions that are refined to convergence
-SAME = 1e-4  # relative difference of costs from which two solutions count as distinct
+SAME = 1e-4  # relative difference of costs above which two solutions count as distinct
 NORMAL_95 = 1.96
-MANY = 1e6  # degrees of freedom from which the distribution is normal
-COLUMNS = ("value", "error", "low", "high")  # of a fit as a table
-TIED = 0.98  # correlation from which two parameters are reported
+MANY = 1e6  # degrees of freedom above which the distribution counts as normal
+COLUMNS = ("value", "error", "low", "high")  # columns of a fit as a table
+TIED = 0.98  # correlation above which two parameters are reported
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,15 @@ class Fit:
     correlation  (K, K)
     metric       name of the loss
     error        root mean square residual in that metric; for "relative", of the deviance
-    relative     mean |difference| over mean value of f cos theta_i
+    relative     mean |difference| divided by the mean value of f cos theta_i
     criterion    Bayesian information criterion: lower is better; it penalizes additional parameters
     count        number of fitted values
     notes        remarks on the quality of the fit
     seconds      duration of the fit
-    ranges       (K, 2), the least and the largest value that each number can have; None for any
+    ranges       (K, 2), the smallest and the largest possible value of each number; None if unbounded
     degrees      (K,), effective degrees of freedom of the standard errors; None for many
-    profiles     (K, 2), ends of 95 % intervals by the profile of the loss where value +- error does not hold, NaN
-                 elsewhere; None for none
+    profiles     (K, 2), ends of the 95 % intervals by the profile of the loss where value +- error does not hold, NaN
+                 elsewhere; None if there are none
     """
 
     material: BSDF
@@ -84,7 +84,7 @@ class Fit:
 
     @property
     def half_widths(self) -> Floats:
-        """Half widths of the symmetric 95 % intervals, (K,): by Student's t distribution where few runs determine a
+        """Half widths of the symmetric 95 % intervals, (K,), by Student's t distribution if few runs determine a
         number."""
         return quantiles(self.degrees) * self.errors
 
@@ -104,7 +104,7 @@ class Fit:
 
     @property
     def text(self) -> str:
-        """Notation of the material, accepted by every verb: "sum(a=lambert(albedo=...),b=conductor(...))"."""
+        """Notation of the material, accepted by every command: "sum(a=lambert(albedo=...),b=conductor(...))"."""
         return notation.written(self.material)
 
     def as_dict(self) -> dict[str, Any]:
@@ -148,7 +148,7 @@ class Fit:
         return pandas.DataFrame(columns, index=list(self.names))
 
     def to_csv(self, path: str | os.PathLike[str] | None = None) -> str:
-        """The same as comma-separated text, which is also written to a file if one is given."""
+        """The table of `to_frame` as comma-separated text, which is also written to a file if one is given."""
         rows = zip(self.names, self.values, self.errors, *self.interval.T, strict=True)
         lines = [",".join((name, *(repr(float(x)) for x in numbers))) for name, *numbers in rows]
         text = "\n".join([",".join(("name", *COLUMNS)), *lines]) + "\n"
@@ -187,19 +187,19 @@ def fit(
 ) -> Fit:
     """Fit the parameters of a material to measured values.
 
-        found = go.fit("gold.binary", "lambert+ggx")
-        found.material, found.values, found.errors
+        result = go.fit("gold.binary", "lambert+ggx")
+        result.material, result.values, result.errors
 
     data      a measurement file, a table, or `Data`
     model     anything that `go.material` takes, such as the sum "lambert+ggx"; the fit starts from its parameter values
-    lobes     number of copies of the last part in the sum
+    lobes     number of copies of the last term of the sum
     loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
     param     path -> value of parameters that stay fixed
-    free      paths of additional parameters to fit that stay fixed by default: scale factors of 1
+    free      paths of additional parameters to fit that are fixed by default: scale factors of 1
     grazing   degrees; values with a direction beyond this angle from the normal are excluded
     progress  called with a text that states the loss, after each start and at the end
-    The solver is Levenberg-Marquardt from several starts with different lobe widths, first on subsets, finally on all
-    values.
+    The solver is Levenberg-Marquardt from several starting points with different lobe widths, first on subsets, finally
+    on all values.
     Raises InputError for invalid files, models and paths.
     """
     started = time.perf_counter()
@@ -221,7 +221,7 @@ def fit(
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
     """The solution with the lowest cost over all starts. All starts are refined on few values with the logarithmic
-    metric, which is smooth everywhere, the best of them with the metric itself, and the best distinct solutions on all
+    metric, which is smooth everywhere; the best of these with the metric itself; and the best distinct solutions on all
     values."""
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
@@ -294,10 +294,10 @@ def notes_on(
     names: tuple[str, ...],
     undetermined: Sequence[Sequence[int]] = (),
 ) -> list[str]:
-    """Remarks that a reader needs to judge the values.
+    """Remarks that a reader needs to assess the values.
 
     unknown       whether the data do not determine a parameter, (K,)
-    coupling      correlations of the parameters for errors that are independent
+    coupling      correlations of the parameters for independent errors
     undetermined  groups of parameter indices of which the data determine at most a combination
     """
     notes, at = [], 0

@@ -23,7 +23,7 @@ from .solver import Problem, normal_equations
 from .starts import random_starts
 
 FIXED = {"ggx": ("k",), "beckmann": ("k",)}
-AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
+AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # eta and 1 / eta have the same reflectance
 GENERIC = 512  # directions at which the effects of parameters are compared
 
 
@@ -38,8 +38,8 @@ class Model(NamedTuple):
 def modelled(text: str, lobes: int = 1) -> Model:
     """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
 
-    lobes  number of copies of the last part in the sum
-    "ggx" and "beckmann" are microfacet lobes of that distribution with Schlick's Fresnel term of an index without
+    lobes  number of copies of the last term of the sum
+    "ggx" and "beckmann" are microfacet lobes of that distribution with Schlick's Fresnel term for an index without
     absorption, so only eta determines the color.
     """
     if lobes < 1:
@@ -65,7 +65,7 @@ def modelled(text: str, lobes: int = 1) -> Model:
 def moving_of(
     model: MaterialLike, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
 ) -> tuple[BSDF, list[Free]]:
-    """A model with the values of `fixed` set, and its free parameters; arguments as in `fit`."""
+    """A model with the values of `fixed` set, and its free parameters; for the arguments, see `fit`."""
     return moving_with_notes(model, lobes, fixed, free)[:2]
 
 
@@ -90,10 +90,10 @@ def without_duplicates(
 ) -> tuple[BSDF, list[Free], list[str]]:
     """(material, free parameters, notes) without redundant parameters.
 
-    Of parameters in several parts with the same effect, such as the albedos of two Lambert parts, one stays free, or
-    those in `wanted`. The others are fixed at 0 if the first keeps its effect without them.
-    Redundancy is detected by the null space of the derivatives at random parameters and random directions, where it can
-    only come from the form of the model.
+    If parameters of several parts have the same effect, such as the albedos of two Lambert parts, one of them stays
+    free, or those in `wanted`. The others are fixed at 0 if the first keeps its effect without them, else at their
+    values. Redundancy is detected by the null space of the derivatives at random parameters and random directions,
+    where it can only come from the form of the model.
     """
     parts = {one.path.rpartition(".")[0] for one in moving}
     if len(parts) < 2:

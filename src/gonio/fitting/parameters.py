@@ -25,9 +25,9 @@ M = TypeVar("M", bound=BSDF)
 class Free:
     """A free parameter.
 
-    path       in the tree of materials
+    path       path in the tree of materials
     kind       "float", "spectrum" or "alpha"
-    low, high  range
+    low, high  bounds of its range
     ratio      whether the solver steps its logarithm
     """
 
@@ -92,7 +92,7 @@ def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
 
 
 def inner_of(free: list[Free], numbers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values within all ranges, none of them at an end and no two alike; near `numbers` where a range is wide."""
+    """Values within all ranges, none of them at an end and no two alike; near `numbers` if a range is wide."""
     low, high, _ = ranges(free)
     reach = np.minimum(high - low, WIDE)
     begin = np.clip(numbers - 0.5 * reach, low, high - reach)

@@ -1,15 +1,15 @@
-"""Intervals by the profile of the sum of squares, where it is not the parabola that standard errors assume.
+"""Intervals from the profile of the sum of squares, where it is not the parabola that standard errors assume.
 
-The profile of a parameter at x is the least sum of squares of all fits in which the parameter is x (Venzon1988). Its
+The profile of a parameter at x is the smallest sum of squares of all fits in which the parameter is x (Venzon1988). Its
 95 % interval is the set of x at which the profile is less than
 
     t^2 s
 
 above the minimum, where t is the quantile of Student's distribution and s = V_kk / (J^T J)^-1_kk is the variance of
-correlated residuals of unequal size, relative to that of independent ones of size 1: along a parabola the ends are
-value +- t sqrt(V_kk), those of the standard error. Not a parabola: an index of refraction of 1, where the reflectance
-has no slope, so that J^T J tells nothing about it; a value at a bound of its range; a width that the data bound from
-one side only.
+correlated residuals of unequal size, relative to that of independent ones of size 1: for a parabola, the ends are
+value +- t sqrt(V_kk), those of the standard error. Profiles that are not parabolas arise from an index of refraction of
+1, where the reflectance has no slope, so that J^T J does not constrain it; from a value at a bound of its range; and
+from a width that the data bound from one side only.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from .certainty import Certainty, connected
 from .parameters import ranges
 from .solver import Residuals, solve
 
-STEPS = 6  # of the solver for each point of a profile; it begins at the solution of the point before
-POINTS = 14  # of a profile, on each side
+STEPS = 6  # solver steps for each point of a profile, starting at the solution for the previous point
+POINTS = 14  # points of a profile on each side
 NEAR = 0.005  # relative error of the square root of the rise at which an end is accepted
-UNEQUAL = 0.3  # relative difference of the rises at both ends from which a profile is computed
-FIRST = 0.02  # first step from a value without a finite standard error: part of the range, or of the logarithm's unit
-ALIKE = 0.999  # correlation from which parameters count as one: fits along their valley would be slow and tell nothing
-EXACT = 1e-3  # root mean square residual below which the rounding of 32 bits hides the rise of a sum over many values
-LARGE = 4e6  # derivatives of a problem from which only parameters without a finite standard error have a profile
+UNEQUAL = 0.3  # relative difference of the rises at the two ends above which a profile is computed
+FIRST = 0.02  # first step from a value without a finite standard error, relative to its range or the logarithm's unit
+ALIKE = 0.999  # correlation above which parameters count as one: fits along their valley would be slow and useless
+EXACT = 1e-3  # RMS residual below which 32-bit rounding hides the rise of a sum over many values
+LARGE = 4e6  # derivatives of a problem above which only parameters without a finite standard error get a profile
 SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
 
 
 class Costs(Residuals, Protocol):
-    """A least-squares problem whose sum of squares can be asked for alone."""
+    """A least-squares problem whose sum of squares can be evaluated by itself."""
 
     def cost(self, numbers: Floats) -> float: ...
 
@@ -45,15 +45,16 @@ def profiles(
 ) -> Floats:
     """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
 
-    Parameters of which the data determine only a combination, or nearly so, have no profile (NaN). Of a large problem
-    only those have one whose standard error is infinite: each profile solves it some fifty times.
+    Parameters of which the data determine only a combination, or nearly so, have no profile (NaN). In a large problem,
+    only parameters with an infinite standard error have one: each profile solves the problem some fifty times.
 
     numbers    solution, (K,)
     cost       its sum of squares
     sure       standard errors and the pseudoinverse of J^T J
-    quantiles  of Student's distribution, (K,)
+    quantiles  quantiles of Student's distribution, (K,)
     values     number of values that the problem explains
-    scale      mean squared residual: s if the data determine no parameter; else an undetermined one has the median s
+    scale      mean squared residual, used as s if the data determine no parameter; otherwise, an undetermined parameter
+               gets the median s
     """
     low, high, ratio = ranges(problem.free)
     ends = np.full((len(numbers), 2), np.nan)
@@ -79,13 +80,13 @@ def profiles(
 
 
 def _span(value: float, low: float, high: float) -> float:
-    """Length of a parameter's range, as far as it is a sensible unit."""
+    """Length of a parameter's range, if that is a sensible unit; else a multiple of its value."""
     return float(min(high - low, SPAN * max(1.0, abs(value))))
 
 
 def _is_even(problem: Costs, numbers: Floats, k: int, half: float, inverse: Floats, cost: float) -> bool:
-    """Whether the sum of squares rises alike towards both ends of value +- half, which lie within the range; the other
-    parameters follow along the parabola's valley."""
+    """Whether the sum of squares rises equally toward both ends of value +- half, which lie within the range; the other
+    parameters follow the valley of the parabola."""
     low, high, _ = ranges(problem.free)
     direction = inverse[:, k] / inverse[k, k]
     ends = [numbers - half * direction, numbers + half * direction]
@@ -102,7 +103,7 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
     sign = np.sign(bound - numbers[k])
     rise = level - cost
     inside, start, outside = 0.0, numbers, np.inf
-    roots = [(0.0, 0.0)]  # distances and sqrt of the rise over that wanted: nearly linear, 1 at the end
+    roots = [(0.0, 0.0)]  # distances, and sqrt of the rise divided by the wanted one: nearly linear, 1 at the end
     distance = min(step, abs(bound - numbers[k]))
     for _ in range(POINTS):
         at = start.copy()
@@ -121,7 +122,7 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
 
 
 def _next(roots: list[tuple[float, float]], inside: float, outside: float, most: float) -> float:
-    """The next distance: by the secant through the last two points, kept between the nearest points on both sides."""
+    """The next distance, by the secant through the last two points, between the nearest points on the two sides."""
     (a, fa), (b, fb) = sorted(roots)[-2:] if not np.isfinite(outside) else _bracket(roots, inside, outside)
     guess = b + (1.0 - fb) * (b - a) / (fb - fa) if fb > fa else np.inf
     if not np.isfinite(outside):

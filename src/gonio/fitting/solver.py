@@ -22,9 +22,9 @@ from .data import Data
 from .parameters import CHANNELS, Free, inner_of, ranges, start_of, with_drjit
 
 Array = backend.Array
-BLOCK = 1 << 13  # rows that BLAS sums at a time; it shares more among its threads, whose number changes the last bits
-SMALL = 1e-3  # of the largest value: "log" and "relative" are absolute below, relative above
-NEAR = 0.1  # relative difference under which a series is more accurate than the logarithm in float32
+BLOCK = 1 << 13  # rows that BLAS sums at a time; it splits more among its threads, whose number changes the last bits
+SMALL = 1e-3  # fraction of the largest value: "log" and "relative" are absolute below it, relative above
+NEAR = 0.1  # relative difference below which a series is more accurate than the logarithm in float32
 
 
 # --------------------------------------------------------------------------- metrics
@@ -50,24 +50,24 @@ def metric(name: str, value: Array, floor: Array) -> Array:
 
 
 def _size(value: Array) -> Array:
-    """|value| with a derivative of 1 at 0: that of `abs` is 0 there, so a color that reaches 0 would stay."""
+    """|value| with a derivative of 1 at 0: that of `abs` is 0 there, so a color that reaches 0 would stay at 0."""
     return backend.drjit().select(value < 0.0, -value, value)
 
 
 def deviance(model: Array, value: Array, floor: Array) -> Array:
-    """Residual r of a model f against a value v, r^2 = 2 rho, of the metric "relative".
+    """Residual r of a model f against a value v, r^2 = 2 rho, for the metric "relative".
 
     Iteratively reweighted least squares of (v - f) / (f + c) solve sum((v - f) / (f + c)^2 df) = 0. These are the
     quasi-likelihood equations for a standard deviation proportional to f + c (Wedderburn1974), whatever the noise
-    distribution: the true model is a root if v is unbiased. But they minimize nothing, and 0 is a root too. The
+    distribution: the true model is a root if v is unbiased. But they minimize nothing, and 0 is also a root. The
     function with that derivative is the deviance of the gamma distribution,
 
         rho = u - log(1 + u),  u = (v - f) / (f + c),
 
-    which is large for a model of 0. For u >= 1 (data twice the model, more than noise explains) rho is log(1 + u) plus
+    which is large for a model of 0. For u >= 1 (data twice the model, more than noise explains), rho is log(1 + u) plus
     a constant: its derivative is bounded there, like Huber's (Huber1964), and it is bounded at u = -1 anyway. So no
-    value has more influence than 1 / (f + c). For values under -c / 2 the derivative uses v + c, clamped to 0; the
-    constant is that of -c / 2, since no model is negative.
+    value has more influence than 1 / (f + c). For values below -c / 2, the derivative uses v + c, clamped to 0, and the
+    constant is that for -c / 2, since no model is negative.
     """
     dr = backend.drjit()
     size = _size(model)
@@ -86,7 +86,7 @@ def deviance(model: Array, value: Array, floor: Array) -> Array:
 
 # --------------------------------------------------------------------------- residuals and their derivatives
 
-# residuals (N,), derivatives (N, K), and the indices of the parameters of these
+# residuals (N,), derivatives (N, K), and the indices of the K parameters
 Linearized = tuple[NDArray[np.floating], NDArray[np.floating], list[int]]
 
 
@@ -129,7 +129,7 @@ class Problem:
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
-        """Groups of parameters that share one derivative: each by itself, or the three channels of a color."""
+        """Groups of parameters that share one derivative: a single one, or the three channels of a color."""
         groups: list[list[int]] = []
         at = 0
         for one in self.free:
@@ -140,7 +140,7 @@ class Problem:
 
     def _mix(self, channels: list[int]) -> bool:
         """Whether the first of a color's channels changes the values of the others: at the material's own values, or
-        within all ranges, since a tint of 0 hides that it mixes."""
+        at values inside all ranges, since a tint of 0 hides that it mixes."""
         if len(channels) == 1:
             return False
         dr, types = backend.drjit(), backend.types("float32")
@@ -231,13 +231,13 @@ class Problem:
 
 def floors_of(value: Floats) -> Floats:
     """Values per channel below which "relative" is absolute, (3,): a thousandth of the brightest values in the data.
-    Negative values are ignored: in measured files they lie in highlights whose color is out of gamut."""
+    Negative values are ignored: in measured files, they lie in highlights whose color is out of gamut."""
     brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
     return np.maximum(SMALL * brightest, 1e-6)
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
-    """Groups of parameters that share one derivative: each by itself, or the three channels of a color if they do not
+    """Groups of parameters that share one derivative: a single one, or the three channels of a color if they do not
     mix, which is tested at a few directions."""
     w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
     w[..., 2] = np.abs(w[..., 2]) + 0.1

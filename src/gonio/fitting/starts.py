@@ -54,10 +54,10 @@ def _is_width(one: Free) -> bool:
 
 
 def _of_width(one: Free, width: float) -> float:
-    """The value of a parameter at which a lobe has this width."""
+    """The value of a parameter that gives a lobe of this width."""
     if one.kind == "alpha":
         return width
-    return float(np.sqrt(width)) if _rough(one) else 2.0 / (width * width)  # a cosine's power of that width
+    return float(np.sqrt(width)) if _rough(one) else 2.0 / (width * width)  # the power of a cosine lobe of that width
 
 
 def _rough(one: Free) -> bool:

@@ -1,1 +1,1 @@
-"""Instruments that measure materials: a virtual goniometer, a photographed sphere, and fits to pictures."""
+"""Instruments that measure materials: a virtual goniometer, photographs of a sphere, and fits to pictures."""

@@ -39,11 +39,11 @@ from ..transport.integrators import Render, Settings
 
 Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20
-DARK = 0.05  # of the median brightness: residuals are absolute below, relative above
+DARK = 0.05  # fraction of the median brightness: residuals are absolute below, relative above
 TILE = 8  # pixels: errors within a tile are correlated
-SHOWN = 16  # samples of the picture that is shown over those of a step, so that its noise hides no difference
+SHOWN = 16  # samples of the final picture divided by those of a step, so that its noise hides no difference
 OTHER = 0x9E3779B9  # XOR mask between the seeds of picture and derivatives
-DEEPEST = 8  # segments of paths if the scene sets no depth
+DEEPEST = 8  # path segments if the scene sets no depth
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class PictureFit:
     errors       standard errors, (K,); inf for numbers that the picture does not determine
     correlation  (K, K)
     losses       mean squared relative difference before the first step and after each step
-    relative     mean |difference| over mean brightness
+    relative     mean |difference| divided by mean brightness
     wanted       the given picture, (H, W, 3)
     fitted       the picture rendered with the fitted values, (H, W, 3)
     notes        remarks on the quality of the fit
@@ -241,7 +241,7 @@ def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -
 
 
 class Problem:
-    """Residuals of a picture: (rendered - wanted) / (wanted + c), with their derivatives."""
+    """Residuals of a picture, (rendered - wanted) / (wanted + c), and their derivatives."""
 
     def __init__(
         self,

@@ -73,7 +73,7 @@ def models() -> dict[str, type[BSDF]]:
 
 
 def is_model(name: str) -> bool:
-    """Whether `model` finds a class of that name."""
+    """Whether there is a class of that name, as for `model`."""
     return bool(_key(name))
 
 

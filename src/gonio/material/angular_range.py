@@ -1,4 +1,4 @@
-"""The angles at which a material's values are known: all angles, except for tables of measurements that end earlier."""
+"""The angles at which a material's values are known: all, unless it is a table of measurements that ends earlier."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class AngularRange(NamedTuple):
 
     view     of wo from the normal
     light    of wi from the normal, on either side of the surface
-    azimuth  between both, 0 to 180
+    azimuth  between the two, 0 to 180
     """
 
     view: Ends = (0.0, 90.0)
@@ -25,7 +25,7 @@ class AngularRange(NamedTuple):
 
     @property
     def everything(self) -> bool:
-        """Whether the values are known at all angles."""
+        """Whether the range includes all angles."""
         return self == EVERYWHERE
 
     def within(self, other: AngularRange) -> AngularRange:

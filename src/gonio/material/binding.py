@@ -31,7 +31,7 @@ def bound_copy(material: M, values: Mapping[str, object], derived: object = None
 
 
 def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
-    """A bound copy with `convert(parameter, value)` for every number, inner materials' included."""
+    """A bound copy with `convert(parameter, value)` for every number, including those of inner materials."""
     values = {}
     for name, parameter in material.parameters().items():
         if parameter.inner:
@@ -42,7 +42,7 @@ def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
 
 
 def bind_to(material: M, types: backend.Types) -> M:
-    """A bound copy for Dr.Jit values of these types, with its derived values if they are the same for all rays. Those
+    """A bound copy for Dr.Jit values of these types, with its derived values if they are the same for all rays. Values
     derived from plain numbers are cached with the material, which is frozen."""
     copy = bind(material, lambda parameter, value: parameter.bind(value, types))
     if not material.derives:
@@ -62,7 +62,7 @@ def with_derived(material: M, derived: object) -> M:
 
 
 def evaluate_derived(material: Material, rays: int = 1) -> object:
-    """The derived values of a bound copy, evaluated. None if a parameter is being differentiated or varies over more
+    """The derived values of a bound copy, evaluated. None if a parameter is being differentiated or has values for more
     than `rays` rays, and while Dr.Jit records a loop, inside which nothing can be evaluated."""
     if not material.derives:
         return None
@@ -87,7 +87,7 @@ def _arrays(value: object) -> Iterator[object]:
 
 
 def values(material: Material) -> Iterator[Scalar | Vector]:
-    """The numeric values of a bound copy, inner materials' included."""
+    """The numeric values of a bound copy, including those of inner materials."""
     for leaf in tree.leaves(material):
         if leaf.parameter.numeric and leaf.value is not None:
             yield leaf.value
@@ -101,5 +101,5 @@ def shift(material: M, path: str, change: Callable[[Value], Value]) -> M:
 
 
 def _plain(material: Material) -> bool:
-    """Whether all numbers are plain ones; arrays could be modified by their owner."""
+    """Whether all numbers are plain numbers; arrays could be modified by their owner."""
     return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

@@ -1,9 +1,9 @@
-"""Many rows of NumPy arrays in and out of Dr.Jit, in the kernel that computes the results.
+"""Transfer of many rows between NumPy and Dr.Jit, in the kernel that computes the results.
 
 Rows are interleaved, x y z x y z. NumPy takes ten times as long to separate and convert their components, and to check
-that they are unit vectors, as the kernel that evaluates a metal; here that kernel does it, by all threads. It is
-another kernel than that of few rows, so it pays for many. Rows written by a kernel would take three times as long as
-separate components, which are therefore what a result consists of.
+that they are unit vectors, as the kernel takes to evaluate a metal; here the kernel does all this, on all threads. This
+kernel differs from the one for few rows and must be compiled separately, so it pays off for many rows only. Results
+consist of separate components, since a kernel would take three times as long to write interleaved rows.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from ..ops import backend
 
 MANY = 1 << 20  # rows
-UNIT = 1e-2  # tolerance of a direction's length: rounding and values typed by hand
+UNIT = 1e-2  # tolerance of a direction's length, for rounding errors and values typed by hand
 
 
 def vector_of(rows: np.ndarray, count: int, types: backend.Types) -> backend.Array:
@@ -45,9 +45,9 @@ def is_random(u: backend.Array) -> backend.Array:
 def to_numpy(
     values: Sequence[backend.Array], shape: tuple[int, ...], checks: Sequence[backend.Array]
 ) -> tuple[list[np.ndarray], list[bool]]:
-    """Each value in a shape, (*shape, size) for a vector, and whether each check holds in all rows, by one kernel.
+    """(each value as an array of a shape, (*shape, size) for a vector; whether each check holds in all rows).
 
-    A vector's array is a view whose components lie one after the other, as Dr.Jit has them.
+    One kernel computes everything. The array of a vector is a view of separate components, as Dr.Jit stores them.
     """
     dr = backend.drjit()
     dr.eval(values, checks)

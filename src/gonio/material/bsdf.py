@@ -1,7 +1,7 @@
 """The base of all materials: frozen declared parameters, pure formulas of them, and facts about the material.
 
     class Lambert(BSDF):
-        albedo: Colour = spectrum(0.5, "share of light that is reflected", high=1.0)
+        albedo: Colour = spectrum(0.5, "fraction of light that is reflected", high=1.0)
 
         @method
         def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 class StatedAlbedo(NamedTuple):
-    """An albedo by its authors: what states it, values (N, 3), and the error that they mean to allow."""
+    """An albedo stated by the authors of a model: its source, values (N, 3), and the error that they allow."""
 
     source: str
     value: NDArray[np.float64]
@@ -63,13 +63,13 @@ class BSDF(Material):
     """Base of every material. Subclasses are frozen dataclasses; `name` is derived from the class name by default.
 
     known_violations    law -> KnownViolation, for laws that the model violates by design (Phong: reciprocity, energy)
-    limits      what the model equals where one of its parts is switched off
+    limits      values at which a part of the model is switched off, and what the model then equals
     spelling    the file that a class was made from, by which texts name it; "" for classes written in Python
     only_rgb    whether eval returns red, green and blue regardless of the renderer's channels
     stochastic  whether eval, pdf and weight are random estimates whose expectation is the exact value
     reads_wavelengths  whether it needs the rays' wavelengths, as `wavelengths` of its bound copy
     reads_surface  whether it needs dp/du.x, dp/dv.x and dp/dv.y at a hit, as `surface` of its bound copy
-    fits_factors  whether fits free parameters whose default and maximum are 1, which elsewhere are redundant factors
+    fits_factors  whether fits vary parameters whose default and maximum are 1, in other models redundant factors
     lossless_tolerance  the largest loss allowed in a white furnace (F = 1, every albedo 1); None makes no claim
     """
 
@@ -132,9 +132,9 @@ class BSDF(Material):
 
         wo, wi  (N, 3) unit vectors away from the surface: toward the viewer, toward the light
         mode    "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
-        derivatives  of arrays: paths of parameters; the result is stacked: values, then their derivative by each
-        wavelengths  of arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are no spectrum
-        parameters   of tensors of PyTorch or JAX (wo, wi or these): path -> tensor, which receives gradients
+        derivatives  for arrays: paths of parameters; the result stacks the values and one derivative per path
+        wavelengths  for arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are not a spectrum
+        parameters   for tensors of PyTorch or JAX (wo, wi or these): path -> tensor, which receives gradients
         Returns (N, channels); for arrays of shape (..., 3), (..., channels); for tensors a tensor, on the device of wo.
         """
         raise NotImplementedError(f"{type(self).__name__} has no eval")
@@ -176,9 +176,9 @@ class BSDF(Material):
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
         """The parts of the light from wi to wo with known polarization: light scattered by single smooth facets. The
-        remainder of `eval` is unpolarized; by default all of it.
+        remainder of `eval` is unpolarized; by default, that is all light.
 
-        delta  lanes in which the two directions are joined by delta lobes; the values are then the lobes' weights
+        delta  rays whose two directions are joined by delta lobes; the values are then the weights of the lobes
         """
         return ()
 
@@ -227,8 +227,8 @@ class BSDF(Material):
 
     @property
     def back_differs(self) -> bool:
-        """Whether a surface that does not transmit, here or of an inner material, reflects from below too, with values
-        other than from above."""
+        """Whether a surface that does not transmit, that of an inner material included, also reflects from below, with
+        other values than from above."""
         return any(inner.back_differs for inner in tree.children(self).values())
 
     @property
@@ -238,12 +238,12 @@ class BSDF(Material):
 
     @property
     def microsurface(self) -> Microsurface | None:
-        """The rough surface that scatters the light, if the material is one; tables of its energy exist."""
+        """The rough surface that scatters the light, for which energy tables exist; None for other materials."""
         return None
 
     @property
     def interior(self) -> Interior | None:
-        """The medium behind a surface that transmits, or behind the first such inner material; else None."""
+        """The medium behind a surface that transmits, or behind the first inner material that does; else None."""
         interiors = (inner.interior for inner in tree.children(self).values())
         return next((interior for interior in interiors if interior is not None), None)
 
@@ -276,13 +276,13 @@ class BSDF(Material):
 
         mu, phi  cosine and azimuth of wo, (N,)
         inner    the albedo of an inner material, if known
-        nodes    of a quadrature that the material performs itself; None requests closed forms only
+        nodes    number of nodes for a quadrature by the material itself; None requests closed forms only
         """
         return None
 
     def stated_albedo(self, wo: NDArray[np.float64]) -> StatedAlbedo | None:
-        """The albedo that its authors use for it elsewhere, such as a fit by which they weight a base below it; the law
-        of energy compares it with the integral of `eval`. wo: (N, 3)."""
+        """The albedo that the authors of the model use elsewhere, such as a fit by which they weight a base below it,
+        for wo (N, 3); the law `energy` compares it with the integral of `eval`."""
         return None
 
     @classmethod
@@ -310,11 +310,11 @@ class BSDF(Material):
         return cls(**{**known[key].values, **parameters})
 
     def renderer_calls(self, seed: int) -> Iterable[Any]:
-        """A renderer's calls other than eval, pdf and sample, with results, for the verifier; by default none."""
+        """Calls of a renderer other than eval, pdf and sample, with results, for the verifier; by default none."""
         return ()
 
     def violations(self) -> dict[str, KnownViolation]:
-        """The laws that it violates with these parameters, sizes as numbers; inner materials' may have no effect."""
+        """The laws that it, or an inner material, violates with these parameters, with sizes as numbers."""
         violated: dict[str, KnownViolation] = {}
         for name, inner in tree.children(self).items():
             for law, one in inner.violations().items():
@@ -327,8 +327,8 @@ class BSDF(Material):
         return violated
 
     def lossless(self) -> Self:
-        """The lossless variant: every albedo 1 and F = 1, here and in inner materials; itself if nothing changes. The
-        loss that remains in a furnace is due to the lobe's shape. The variant of a bound copy is bound."""
+        """The lossless variant: every albedo 1 and F = 1, here and in inner materials; itself if nothing changes. Loss
+        that remains in a furnace is due to the shape of the lobe. The variant of a bound copy is bound."""
         values: dict[str, object] = {}
         for name, parameter in self.parameters().items():
             value = getattr(self, name)
@@ -346,7 +346,7 @@ class BSDF(Material):
 
     @property
     def derived(self) -> Value:
-        """The result of `derive`: stored in a bound copy if the same for all rays, else computed here per ray."""
+        """The result of `derive`: stored in a bound copy if it is the same for all rays, else computed here per ray."""
         return self.derive() if self._derived is None else self._derived
 
     def bind(self, types: backend.Types) -> Self:
@@ -441,7 +441,7 @@ BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), 
 
 def _guide(material: BSDF) -> Guide:
     """The guide of a material that defines `eval` alone."""
-    from . import guide_search  # only such a material needs it, and it costs 10 ms
+    from . import guide_search  # only such a material needs it, and the import takes 10 ms
 
     return guide_search.guide_of(material.plain)
 

@@ -37,7 +37,7 @@ DrJit: TypeAlias = Any  # a Dr.Jit value, whose type is not expressible
 
 
 MISSING: Any = object()
-EXTRAS = ("derivatives", "wavelengths", "parameters")  # of eval and pdf on arrays; sample has the last
+EXTRAS = ("derivatives", "wavelengths", "parameters")  # arguments of eval and pdf; sample has the last only
 
 
 class EvalMethod(Protocol):
@@ -233,7 +233,7 @@ def _on_numpy(
             if not ok:
                 _check_values(array, label, f"{name}: {label}")
     else:
-        backend.drjit().eval(parts)  # in one kernel: each part alone would repeat what they have in common
+        backend.drjit().eval(parts)  # in one kernel, since the parts have computations in common
         arrays = [backend.to_numpy(value, max(count, 1))[: count or None] for value in parts]
         arrays = [array[:0] for array in arrays] if count == 0 else arrays
     if len(shape) != 1 and not many:
@@ -249,11 +249,11 @@ def _on_tensors(
     parameters: Mapping[str, Given],
     extra: Mapping[str, Given],
 ) -> object:
-    """`eval`, `pdf` and `sample` on tensors of PyTorch or JAX."""
+    """`eval`, `pdf` and `sample` for tensors of PyTorch or JAX."""
     wo, other, mode, precision = arguments
     if not kind:
         hint = "give the values to the material: go.Conductor(alpha=0.2)"
-        raise InputError("parameters without tensors of PyTorch or JAX", f"{name}: parameters", hint)
+        raise InputError("parameters given without tensors of PyTorch or JAX", f"{name}: parameters", hint)
     if name not in ("eval", "pdf", "sample") or extra:
         what = f"tensors of PyTorch or JAX in {name}" + (f" with {next(iter(extra))}" if extra else "")
         raise InputError(what, name, "give NumPy arrays; eval, f, pdf and sample take tensors")
@@ -271,13 +271,14 @@ def _on_request(
     derivatives: Sequence[str] = (),
     wavelengths: ArrayLike | None = None,
 ) -> Floats:
-    """Values with their derivatives, or at wavelengths, on arrays."""
+    """Values with their derivatives, or values at wavelengths, for arrays."""
     wo, other, mode, precision = given
     if backend.is_drjit(wo):
-        what, hint = "derivatives or wavelengths of Dr.Jit values", "use dr.enable_grad on a parameter, or give arrays"
+        what = "derivatives or wavelengths requested for Dr.Jit values"
+        hint = "use dr.enable_grad on a parameter, or give arrays"
         raise InputError(what, name, hint)
     if len(derivatives) and wavelengths is not None:
-        raise InputError("derivatives and wavelengths together", name, "ask for one of them")
+        raise InputError("both derivatives and wavelengths given", name, "give one of them")
     types = backend.types(precision)
     first, second, shape = _rows(wo, other, name)
     count = math.prod(shape)
@@ -336,7 +337,7 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, t
 
 
 def _check_values(array: np.ndarray, label: str, where: str) -> None:
-    """Raise InputError for directions that are no unit vectors, and random numbers outside [0, 1]."""
+    """Raise InputError for directions that are not unit vectors and for random numbers outside [0, 1]."""
     if label != "u":
         _check_unit(array, where)
     elif not np.all((array >= 0.0) & (array <= 1.0)):  # NaN compares false

@@ -1,4 +1,4 @@
-"""What a material's constructor accepts beyond its declared parameters: Mitsuba's names of the two widths.
+"""Names that constructors of materials accept besides the declared parameters: Mitsuba's names of the two widths.
 
 go.Conductor(alpha_u=0.1, alpha_v=0.3)        alpha=(0.1, 0.3)
 """
@@ -15,15 +15,15 @@ WIDTHS = ("alpha_u", "alpha_v")  # along x and along y
 
 
 def with_pair(known: Mapping[str, object], given: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """The settings with `alpha_u` and `alpha_v` as the pair `alpha`, where a material has `alpha` and not these names.
+    """The arguments with `alpha_u` and `alpha_v` as the pair `alpha`, if the material has `alpha` but not these names.
 
-    Raises InputError for one without the other, and for both them and `alpha`.
+    Raises InputError for only one of the two, and for these together with `alpha`.
     """
     named = [name for name in WIDTHS if name in given and name not in known]
     if not named or "alpha" not in known:
         return dict(given)
     if len(named) == 1 or "alpha" in given:
-        what = f"{named[0]} alone given" if len(named) == 1 else "alpha given together with alpha_u and alpha_v"
+        what = f"only {named[0]} given" if len(named) == 1 else "alpha given together with alpha_u and alpha_v"
         raise InputError(what, where, "give alpha_u and alpha_v, the widths along x and y, or alpha")
     pair = tuple(given[name] for name in WIDTHS)
     both = ",".join(pair) if all(isinstance(width, str) for width in pair) else pair
@@ -31,14 +31,14 @@ def with_pair(known: Mapping[str, object], given: Mapping[str, Any], where: str)
 
 
 def accepted(construct: Callable[..., None]) -> Callable[..., None]:
-    """A constructor that takes the names of `with_pair`, and whose error for `preset` names the method."""
+    """A constructor that accepts the names of `with_pair`; for `preset`, its error suggests the method of that name."""
 
     @functools.wraps(construct)
     def __init__(self: Any, *args: Any, **given: Any) -> None:
         known, name = self.parameters(), type(self).__name__
         if "preset" in given and "preset" not in known and self.presets():
             hint = f"{name}.preset({given['preset']!r}, ...), or go.material({self.name!r}, preset=...)"
-            raise InputError("a preset is no parameter", name, hint)
+            raise InputError("a preset is not a parameter", name, hint)
         try:
             construct(self, *args, **with_pair(known, given, name))
         except InputError as error:

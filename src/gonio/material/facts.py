@@ -13,8 +13,9 @@ class KnownViolation(NamedTuple):
     """A law that a model violates by design.
 
     reason   why, as part of a sentence; the manual and the verifier print it
-    size     the largest violation, in the unit of the law's figure (of `energy`, the gain of the lossless variant): a
-             number, or a function of the model; 0 if the law holds with these parameters, math.inf if nothing bounds it
+    size     the largest violation, in the unit of the law's measured value (for `energy`, the gain of the lossless
+             variant): a number, or a function of the model; 0 if the law holds with these parameters, math.inf if
+             nothing bounds the violation
     certain  whether the violation is always present: the verifier then fails a model that satisfies the law
     """
 
@@ -24,7 +25,7 @@ class KnownViolation(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """Values at which a part of a model is switched off, and what this means; the law `limits` checks it.
+    """Values at which a part of a model is switched off, and the consequences, which the law `limits` tests.
 
         limits = (
             Limit({"coat_weight": 0.0}, mutes=("coat_*",)),
@@ -32,7 +33,7 @@ class Limit(NamedTuple):
         )
 
     values  the parameters that switch it off, by name; numbers within their ranges
-    mutes   patterns of the parameters that then change no value of `eval`, as in `fnmatch`
+    mutes   patterns, as in `fnmatch`, of the parameters that then have no effect on `eval`
     equals  function of the model with these values that returns the model without that part; None to state only `mutes`
     """
 
@@ -59,8 +60,8 @@ class Microsurface(NamedTuple):
 
     ndf, masking, fresnel  by name
     alpha, rotation        widths and rotation, as the parameters hold them
-    eta                    index inside over index outside, of a dielectric; None for a conductor
-    albedo                 factor on all light that leaves
+    eta                    index inside divided by index outside, for a dielectric; None for a conductor
+    albedo                 factor on all scattered light
     transmits              whether light is refracted into the material
     """
 
@@ -77,7 +78,7 @@ class Microsurface(NamedTuple):
 class Interior(NamedTuple):
     """The medium behind a surface.
 
-    eta         index inside, over that of vacuum if media are nested, else over that of the outside
+    eta         index inside, relative to vacuum if media are nested, else relative to the outside
     absorption  absorbed fraction per unit length (absorption coefficient)
     priority    where media overlap, the one with the highest priority is present
     """

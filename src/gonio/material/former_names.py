@@ -33,7 +33,7 @@ FORMER_NAMES = {
 
 
 def add_former_names(cls: type) -> None:
-    """Give the members of a class their names of Gonio 0.1 too."""
+    """Add the names of Gonio 0.1 to the members of a class."""
     for old, new in FORMER_NAMES.items():
         former = _FormerName(new)
         former.__set_name__(cls, old)

@@ -11,7 +11,7 @@ of a few angles of wo (and, if `eval` depends on them, azimuths of wo and values
 surface). It is bilinear between nodes, and a mixture of two slices between their angles. A fraction of the samples
 follows the cosine, to cover light that the nodes miss.
 
-`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly causes noise but no bias.
+`pdf` is the density of `sample`, whatever the tables contain: a guide that fits badly causes noise but no bias.
 `guide_search` computes the tables.
 """
 
@@ -41,7 +41,7 @@ from ..ops.backend import Array
 from ..optics.frame import half_vector, reflect
 from ..optics.warp import square_to_cosine_hemisphere
 
-ALMOST_ONE = 0.99999994  # the largest float32 under 1
+ALMOST_ONE = 0.99999994  # the largest float32 below 1
 
 
 class Lobe(NamedTuple):
@@ -81,7 +81,7 @@ class Lobe(NamedTuple):
         return x * scale, z * scale
 
     def chart_of(self, place: Place, wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
-        """(s, phi, dw / (ds dphi) at wi) of a direction above the surface, wo in the plane of x."""
+        """(s, phi, dw / (ds dphi) at wi) of a direction above the surface, for wo in the x-z plane."""
         v = half_vector(wo, wi) if self.chart == "half" else wi
         sine, cosine = self.axis(place)
         x, z = cosine * v.x - sine * v.z, sine * v.x + cosine * v.z
@@ -99,7 +99,7 @@ class Lobe(NamedTuple):
         return ops.log(1.0 + q / q0) * scale, phi, jacobian
 
     def direction(self, place: Place, wo: Direction, s: Scalar, phi: Scalar) -> Direction:
-        """The direction at (s, phi), wo in the plane of x; it may lie below the surface."""
+        """The direction at (s, phi), for wo in the x-z plane; it may lie below the surface."""
         q0, scale = fetch(self.scales, ops.zeros_like(s))
         q = minimum(q0 * (ops.exp(s / scale) - 1.0), self.q_max)
         radius, (sin_phi, cos_phi) = safe_sqrt(q * (1.0 - 0.25 * q)), sincos(phi)
@@ -125,7 +125,7 @@ class Lobe(NamedTuple):
 
     @function
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
-        """(s, phi) with the density of a slice: first s, from the integrals over phi, then phi at that s."""
+        """(s, phi) with the density of a slice: first s, from the integrals over phi, then phi for that s."""
         _, rows, columns = self.density.shape
 
         def row_below(row: Scalar) -> Scalar:
@@ -176,11 +176,11 @@ class Guide(NamedTuple):
     lobes      on wo's side, on the opposite side, or both; empty if nothing is scattered
     angles     number of slices over the angle of wo, from the normal to the horizon
     azimuths   number of slices over the azimuth of wo; 1 if `eval` is invariant under rotation
-    behind     whether slices for wo below the surface follow those for wo above; else both are equal
+    behind     whether slices for wo below the surface follow those for wo above; else the same slices serve for both
     above      whether anything is scattered toward a wo above the surface
-    below      likewise below the surface
+    below      the same for a wo below the surface
     axes       parameters that vary
-    shares     per slice: the fraction of the lobe on the opposite side
+    shares     per slice: the fraction of the light in the lobe on the opposite side
     cosine     fraction of samples that follow the cosine
     """
 
@@ -233,7 +233,7 @@ class Guide(NamedTuple):
         crosses = left < where(by_cosine, 0.5, fetch(self.shares, index)[0])
         chosen: Direction | None = None
         for lobe in self.lobes:
-            # both halves of the azimuth are equal: u2 selects one and is rescaled
+            # the two halves of the azimuth are equal: u2 selects one and is rescaled
             second = u.z if lobe.full else minimum(ops.abs(2.0 * u.z - 1.0), ALMOST_ONE)
             s, phi = lobe.draw(index, u.y, second)
             if not lobe.full:
@@ -322,7 +322,7 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
 
 
 def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
-    """The last node, at most the second-last of all, with `below` at most u."""
+    """The last node, up to the second to last of all, at which `below` is at most u."""
     node: Array = ops.zeros_like(u)
     step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
     while step:

@@ -20,12 +20,12 @@ ROWS, COLUMNS = 64, 17  # nodes of s, and of the azimuth over 180 degrees
 ROUND = 33  # nodes of the azimuth over 360 degrees, if `eval` is not invariant under rotation
 REFINEMENTS = 4  # of the tables toward smaller variance; further ones have no effect
 JUDGED = 4  # one of this many azimuths of wo is tested
-FINE = 2  # evaluations of `eval` per step between nodes, along both axes
+FINE = 2  # evaluations of `eval` per step between nodes, along each axis
 HORIZON = np.radians(89.7)  # replaces 90 degrees, where the value is 0
 COSINES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # candidate fractions of samples that follow the cosine
 NARROWEST = 1e-10  # q of lobes 1e-5 wide
 WIDTH_ANGLES = (0.12, 0.45, 0.75)  # angles of wo at which a lobe's width is measured, as fractions of 90 degrees
-PEAKS, ZOOMS = 801, 3  # directions in the plane of wo among which a lobe's peak is searched, and successive zooms
+PEAKS, ZOOMS = 801, 3  # directions in the plane of wo that are searched for a lobe's peak, and successive zooms
 WIDTH_SHARE = 0.2  # fraction of a lobe's light within q0
 MIN_MEAN = 0.25  # lower limit of the refinement, relative to the mean about a node: `eval` may peak between the points
 MIN_LIGHT = 1e-20  # light of a slice below which it counts as dark
@@ -52,7 +52,7 @@ class Chart:
     def direction(
         self, wo: tuple[Grid, ...], s: Grid, phi: NDArray[np.floating], center: tuple[Any, Any]
     ) -> tuple[tuple[Grid, ...], Grid]:
-        """(wi, dw / (ds dphi)), all above the surface."""
+        """(wi, dw / (ds dphi)) for wo above the surface; wi may lie below."""
         q = self.q0 * np.expm1(s * self.span)
         jacobian = 0.5 * self.span * (q + self.q0)
         radius = np.sqrt(np.maximum(q * (1.0 - 0.25 * q), 0.0))
@@ -160,7 +160,7 @@ class Slices:
             wo, self.s[:, None], self.phi, (center[:, 0, None, None], center[:, 1, None, None])
         )
         above = wi[2] > 0.0
-        both = 1.0 if self.full else 2.0  # both halves of the azimuth
+        both = 1.0 if self.full else 2.0  # the two halves of the azimuth
         light = np.where(above, self._side_light(material, chart.across, side, wo, wi) * jacobian * both, 0.0)
         cosine = np.where(above, wi[2] * jacobian * (both / np.pi), 0.0)
         shape = (len(angles), len(self.s), len(self.phi))
@@ -237,7 +237,7 @@ class Slices:
         return nodes
 
     def _width(self, name: str, across: bool, group: tuple[Any, float, float], centers: Grid) -> float | None:
-        """q that contains a small fraction of the light, from the narrowest lobe up; None if there is no light."""
+        """q within which the fraction `WIDTH_SHARE` of the light lies, averaged over angles; None without light."""
         material, azimuth, side = group
         chart = Chart(name, across, NARROWEST)
         q = np.geomspace(NARROWEST, chart.q_max, 320)
@@ -254,7 +254,7 @@ class Slices:
         return float(np.exp(np.mean(np.log(places)))) if places else None
 
     def _centers(self, name: str, material: Any, across: bool, side: float) -> Grid:
-        """Sine and cosine of the angle of a lobe's peak in the plane of wo, for each angle of wo."""
+        """Sine and cosine of the angle between a lobe's peak and the normal, for each angle of wo."""
         if name != "center":
             return np.tile([0.0, 1.0], (len(self.angles), 1))
         wo = tuple(x[:, None] for x in direction(np.minimum(self.angles, HORIZON), 0.0, 1.0))
@@ -268,7 +268,7 @@ class Slices:
         return np.concatenate([np.sin(middle), np.cos(middle)], axis=1)
 
     def _side_light(self, material: Any, across: bool, side: float, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid:
-        """Light for pairs of directions that are both given above the surface."""
+        """Light for pairs of directions, both of which are given as if above the surface."""
         return mean_light(material, (wo[0], wo[1], side * wo[2]), (wi[0], wi[1], (-side if across else side) * wi[2]))
 
 

@@ -1,4 +1,4 @@
-"""Test directions for a guide, and the values of `eval` at them: on which sides it is lit, and its symmetries."""
+"""The values of `eval` at test directions for a guide: the sides on which a material is lit, and its symmetries."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAME = 0.02  # relative difference below which two sides, or two azimuths, count
 
 
 class Guided(Protocol):
-    """What is asked of a material here."""
+    """The members of a material that are used here."""
 
     @property
     def transmits(self) -> bool: ...
@@ -30,7 +30,7 @@ def direction(angle: Grid, azimuth: float, side: float) -> tuple[Grid, Grid, Gri
 
 
 def mean_light(material: Guided, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid:
-    """Mean of |eval| over the channels, 0 where it is NaN."""
+    """Mean of |eval| over the channels; 0 where it is not finite."""
     types = backend.types("float32")
     shape = np.broadcast_shapes(*(np.shape(x) for x in (*wo, *wi)))
 
@@ -44,7 +44,7 @@ def mean_light(material: Guided, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> 
 
 
 def _pairs(side: float) -> tuple[Grid, Grid]:
-    """Pairs of directions to test, wo on one side: arbitrary, or near reflection, retro-reflection and transmission."""
+    """Pairs of test directions, wo on one side: arbitrary, or near reflection, retro-reflection and transmission."""
     rng = np.random.default_rng(7)
     wo, wi = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, PROBES, 3)))
     wo[:, 2] = side * np.abs(wo[:, 2])

@@ -1,4 +1,4 @@
-"""Computes a guide (`gonio.material.guide`): `eval` on a grid, in the chart that fits it best.
+"""Computation of a guide (`gonio.material.guide`): `eval` on a grid, in the chart that fits it best.
 
 Each suitable chart is tried: the resulting density is compared with `eval` at angles of wo midway between its slices,
 where it fits worst. The chart of smallest variance is chosen, together with the fraction of cosine-distributed samples
@@ -43,7 +43,7 @@ def guide_of(material: Material) -> Guide:
 
 
 def lend(material: Material, other: Material) -> None:
-    """Sample another material by this one's guide: right for any values, though noisier than by its own."""
+    """Let another material sample by this one's guide: correct for any values, though noisier than with its own."""
     if material.guided:
         vars(other)["_guide"] = guide_of(material)
 
@@ -74,7 +74,7 @@ def find(material: Any) -> Guide:
     varying = varying_parameters(material)
     counts = [VARYING if len(varying) == 1 else VARYING_TWO] * len(varying)
     steps = [np.linspace(0.0, 1.0, count) for count in counts]
-    # among the slices the first parameter's nodes are contiguous
+    # the slices of the first parameter's nodes are contiguous
     versions = [
         version(material, {one: float(t) for one, t in zip(varying, reversed(shares), strict=True)})
         for shares in itertools.product(*reversed(steps))
@@ -88,7 +88,7 @@ def of_values(values: Guided) -> Guide:
 
 
 def _search(versions: list[Any], axes: tuple[Axis, ...]) -> Guide:
-    """The guide of a uniform material, or of several versions of one along axes, the first the fastest."""
+    """The guide of a uniform material, or of versions of one along axes, the first of which varies fastest."""
     probed = versions[len(versions) // 2]
     above, below = (probe(probed, side) for side in (1.0, -1.0))
     lit = [side for side, values in ((1.0, above), (-1.0, below)) if np.any(values > 0.0)]

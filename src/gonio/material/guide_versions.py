@@ -68,7 +68,7 @@ def _ends(parameter: Parameter, value: Value) -> tuple[float, float] | None:
 
 
 def version(material: Any, places: dict[_Varying, float]) -> Any:
-    """The material with uniform values: chosen parameters at a position, others at the middle of their range."""
+    """The material with uniform values: some parameters at given positions, others at the middle of their range."""
     values: dict[str, Value] = {}
     for leaf in tree.leaves(material):
         ends = _ends(leaf.parameter, leaf.value)
@@ -95,7 +95,7 @@ def varying_parameters(material: Any) -> list[_Varying]:
 
 
 def _moved(one: Guided, other: Guided) -> float:
-    """The fraction of the light that is redistributed."""
+    """The fraction of the light that goes to other directions."""
     weights = []
     chart = Chart("half", False, MIDDLING)
     for material in (one, other):

@@ -46,7 +46,7 @@ class Material:
         return None
 
     def prepare(self) -> None:
-        """Compute tables and the like from the unbound parameters, which is impossible while a loop is recorded."""
+        """Compute tables from the unbound parameters, which is impossible while a loop is recorded."""
 
     @property
     def is_bound(self) -> bool:
@@ -304,9 +304,9 @@ class ChoiceParameter(Parameter):
 
 @dataclass(frozen=True)
 class IntegerParameter(ChoiceParameter):
-    """A whole number that shapes the code, held as text: a choice, in which every number of the range may be made.
+    """A whole number that shapes the code, stored as text: a choice that accepts every whole number of its range.
 
-    `choices` lists those that are tried: the first ones of a large range.
+    `choices` lists the numbers that are tried: the first ones of a large range.
     """
 
     @property
@@ -335,7 +335,7 @@ class IntegerParameter(ChoiceParameter):
             raise InputError(f"{str(value)[:40]} given, {self.range} expected", location)
 
 
-_LEAST, _MOST = 4, 16  # integers that are tried of a range without an end
+_LEAST, _MOST = 4, 16  # numbers that are tried: fewest, for a range without an end, and most
 
 
 class FlagParameter(Parameter):
@@ -349,7 +349,7 @@ class FlagParameter(Parameter):
 
 
 class FileParameter(Parameter):
-    """A file, by its path; the material reads it."""
+    """The path of a file, which the material reads."""
 
     kind = "file"
 
@@ -366,7 +366,7 @@ class MaterialParameter(Parameter):
 
     def check(self, value: object, location: str) -> None:
         if not isinstance(value, Material):
-            hint = "give an instance: go.material(...) makes one of a text, a file, a description or a class"
+            hint = "give an instance: go.material(...) makes one from a string, a file, a description or a class"
             raise InputError(f"{type(value).__name__} given, a material expected", location, hint)
 
 

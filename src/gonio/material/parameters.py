@@ -167,7 +167,7 @@ def flag(default: bool, doc: str) -> bool:
 
 
 def file(default: str | None = None, doc: str = "") -> Value:
-    """Declare a file of data, by its path; it shapes the code, so it is read when the material is made."""
+    """Declare the path of a data file; it shapes the code, so it is read when the material is constructed."""
     return _declare(FileParameter, default, doc)
 
 

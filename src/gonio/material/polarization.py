@@ -12,7 +12,7 @@ class Polarized(NamedTuple):
     """A part of the light scattered from one direction to another, with known polarization.
 
     value    its contribution to `eval`, or to a delta lobe's weight
-    normal   of the scattering facets, in the local frame, either side
+    normal   of the scattering facets, in the local frame, on either side
     matrix   the Mueller matrix of such a facet, in the plane of incidence, divided by its first entry
     """
 
@@ -21,5 +21,5 @@ class Polarized(NamedTuple):
     matrix: Diattenuation[Spectrum] | Diattenuation[Scalar]
 
     def times(self, factor: Scalar) -> Polarized:
-        """This part scaled by the fraction of its material in a mixture."""
+        """This part, scaled by the fraction of its material in a mixture."""
         return self._replace(value=self.value * factor)

@@ -17,7 +17,7 @@ M = TypeVar("M", bound=Material)
 def symbols(material: M, without: Iterable[str] = ()) -> M:
     """A copy bound to symbols, one per numeric parameter; an angle given as the plain number 0 has none.
 
-    without  paths of parameters that are off (`switched_off`) and remain plain numbers, so that code is omitted
+    without  paths of parameters that are off (`switched_off`) and remain plain numbers, so that their code is omitted
     """
     bound = binding.bind(material, lambda parameter, value: parameter.symbol(value))
     for path in without:

@@ -1,4 +1,4 @@
-"""More than values from one call: derivatives by parameters, and values at wavelengths.
+"""Derivatives with respect to parameters, and values at wavelengths, from one call.
 
 value, slope = gold.eval(wo, wi, derivatives=["alpha"])
 go.Dielectric("bk7", 0.1).eval(wo, wi, wavelengths=[450.0, 550.0, 650.0])     # (N, 3), one column per wavelength
@@ -20,15 +20,15 @@ from .parameters import Material
 
 CHANNELS = ("r", "g", "b")
 
-# values of a material, of which `eval` is a formula for Dr.Jit values: (bound material) -> Dr.Jit value
+# a call of one of a material's methods for fixed directions: (bound material) -> Dr.Jit value
 Formula = Callable[[Any], Any]
 
 
 def slopes(material: Material, paths: Sequence[str], formula: Formula, types: backend.Types) -> list[backend.Array]:
-    """The value of a formula, and its derivative by each parameter, in forward mode.
+    """The value of a formula, and its derivative with respect to each parameter, in forward mode.
 
-    paths  numbers and colors: "alpha", "base.albedo", or one channel of a color, "albedo.r". By a pair of widths or a
-           color as a whole all of its values move together
+    paths  numbers and colors: "alpha", "base.albedo", or one channel of a color, "albedo.r". For a pair of widths or a
+           whole color, all values change together
     Raises InputError for anything else.
     """
     results = [formula(binding.bind_to(material, types))]
@@ -56,7 +56,7 @@ def _leaf(material: Material, path: str) -> tuple[tree.Leaf[Any], int | None]:
     if channel in CHANNELS and above in leaves and leaves[above].parameter.kind == "spectrum":
         return leaves[above], CHANNELS.index(channel)
     hint = did_you_mean(str(path), list(leaves))
-    raise InputError(f"'{path}' is no number or color of {type(material).__name__}", "derivatives", hint)
+    raise InputError(f"'{path}' is not a number or color of {type(material).__name__}", "derivatives", hint)
 
 
 def at_wavelengths(
@@ -65,16 +65,16 @@ def at_wavelengths(
     """The values of a formula at each wavelength, one Dr.Jit float each.
 
     wavelengths  nm, in vacuum
-    Indices by name follow their dispersion, and films interfere, at each of them. Raises InputError for colors with
-    different channels: three numbers are no spectrum.
+    Dispersion of named indices and interference in films are included. Raises InputError for colors whose channels
+    differ, since three numbers are not a spectrum.
     """
     nm = np.atleast_1d(np.asarray(wavelengths, float))
     if nm.ndim != 1 or not nm.size or not np.all(np.isfinite(nm) & (nm > 0.0)):
-        raise InputError("wavelengths are positive numbers, (M,)", "wavelengths", "in nm, such as [450, 550, 650]")
+        raise InputError("wavelengths must be positive numbers, (M,)", "wavelengths", "in nm, such as [450, 550, 650]")
     for leaf in tree.leaves(material):
         if leaf.parameter.kind == "spectrum" and np.ptp(np.asarray(leaf.value, float), axis=-1).max(initial=0.0) > 0.0:
             hint = "give one number for each wavelength in turn; go.refractive_index has those of metals"
-            raise InputError(f"{leaf.path} has red, green and blue, which are no spectrum", "wavelengths", hint)
+            raise InputError(f"{leaf.path} is a color, which is not a spectrum", "wavelengths", hint)
     results = []
     for one in nm:
         at = {
@@ -89,6 +89,6 @@ def at_wavelengths(
 
 
 def _with_wavelengths(bound: Any, wavelengths: backend.Array) -> Any:
-    """The bound copy, inner materials' included, for rays of these wavelengths."""
+    """The bound copy for rays of these wavelengths, including its inner materials."""
     inner = {name: _with_wavelengths(one, wavelengths) for name, one in tree.children(bound).items()}
     return binding.bound_copy(bound, {**inner, "wavelengths": wavelengths}, bound._derived)

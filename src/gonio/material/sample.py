@@ -25,13 +25,13 @@ else:
 
 
 class Sample(NamedTuple, Generic[D, C, N, B]):
-    """A sampled direction with its weight; inside a material plain `Sample`, for callers typed by their arguments.
+    """A sampled direction with its weight. For callers, its types are those of their arguments.
 
     wi      sampled direction, unit
-    weight  eval / pdf; for a delta lobe, its reflectance over its probability; 0 where sampling failed
+    weight  eval / pdf; for a delta lobe, its reflectance divided by its probability; 0 where sampling failed
     pdf     density of wi, 1/sr; for a delta lobe, its discrete probability; 0 where sampling failed
     delta   whether wi was chosen from a delta lobe
-    eta     index on wi's side over index on wo's side: 1 for reflection
+    eta     index on wi's side divided by index on wo's side: 1 for reflection
 
     Shapes, for N rays: wi (N, 3), weight (N, channels), pdf, delta and eta (N,).
     """
@@ -44,7 +44,7 @@ class Sample(NamedTuple, Generic[D, C, N, B]):
 
     @staticmethod
     def of_density(wi: Direction, weight: Spectrum, pdf: Scalar) -> Sample:
-        """A reflection sampled from a finite density: no lane is a delta lobe, eta is 1."""
+        """A reflection sampled from a finite density: no ray is in a delta lobe, and eta is 1."""
         return Sample(wi, weight, pdf, never(pdf), ops.ones_like(pdf))
 
 

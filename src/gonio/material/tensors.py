@@ -40,9 +40,9 @@ class Call(NamedTuple):
     """A call of a material with arrays in place of tensors. `other` is wi, or the random numbers of "sample".
 
     material, name   the material, and "eval", "pdf" or "sample"
-    paths            the parameters that are given beside wo and `other`
+    paths            the parameters that are given besides wo and `other`
     mode, precision  as in `eval`
-    rows             function (wo, other, name) of the arrays (N, 3) of both and of the shape of the results
+    rows             function (wo, other, name) that returns both as arrays (N, 3), and the shape of the results
     """
 
     material: Material
@@ -73,8 +73,8 @@ class Call(NamedTuple):
         return results[self.name]
 
     def pullback(self, arrays: Sequence[np.ndarray], cotangents: Sequence[np.ndarray | None]) -> list[np.ndarray]:
-        """The gradients by wo, `other` and the parameters, in their shapes, of the sum of the results times their
-        cotangents; None for a result that has none."""
+        """The gradients of the sum of the results times their cotangents, with respect to wo, `other` and the
+        parameters, in their shapes. The cotangent of a result without gradients is None."""
         dr, types = backend.drjit(), backend.types(self.precision)
         first, second, shape = self.rows(arrays[0], arrays[1], self.name)
         count = math.prod(shape)
@@ -136,11 +136,11 @@ def _like(components: list[np.ndarray], given: np.ndarray) -> np.ndarray:
 
 
 def called(call: Call, kind: str, wo: Tensor, other: Tensor, parameters: Mapping[str, Tensor]) -> Any:
-    """The result as a tensor of the library `kind`, or a `Sample` of tensors, with gradients by all tensors."""
+    """The result as a tensor of the library `kind`, or a `Sample` of tensors, with gradients for all tensors."""
     known = {leaf.path for leaf in tree.leaves(call.material) if leaf.parameter.numeric}
     for path in parameters:
         if path not in known:
-            what = f"'{path}' is no number or color of {type(call.material).__name__}"
+            what = f"'{path}' is not a number or color of {type(call.material).__name__}"
             raise InputError(what, f"{call.name}: parameters", f"give some of {', '.join(sorted(known))}")
     results = (_by_torch if kind == "torch" else _by_jax)(call, [wo, other, *parameters.values()])
     return Sample(*results) if call.name == "sample" else results[0]

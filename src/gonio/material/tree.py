@@ -25,8 +25,8 @@ class Leaf(NamedTuple, Generic[M]):
 
     path       "alpha", "base.alpha"
     parameter  its declaration
-    value      what it holds
-    owner      the material that has it
+    value      its value
+    owner      the material to which it belongs
     """
 
     path: str
@@ -60,7 +60,7 @@ def walk(material: M, path: str = "") -> Iterator[tuple[str, M]]:
 
 
 def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
-    """Every parameter that does not hold a material, inner materials' included, in order of declaration."""
+    """Every parameter that does not hold a material, including those of inner materials, in order of declaration."""
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
         if parameter.inner:

@@ -45,7 +45,7 @@ def member(
 
 
 def member_name(value: object, where: str, family: members.Family[Any] | None = None) -> object:
-    """The name of a member given by a program: a class of a family or an instance of one, which is registered, or
+    """The name of a member that a program gives: a class of a family or an instance of one, which is registered, or
     FILE.py:NAME, relative to the file of the calling line. Any other value is returned unchanged.
 
     A text runs code only if a program's own line calls Gonio with it: not from scenes, pages or documents.
@@ -71,16 +71,16 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object
     """
     match = _CODE.fullmatch(text.strip())
     if match is None:
-        raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
+        raise InputError(f"'{text}' names no class in a file", where, "give FILE.py:CLASS, such as ward.py:Ward")
     try:
         path = ((folder or Path()) / Path(os.path.expanduser(match["file"]))).resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
-        raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
+        raise InputError(f"'{match['file']}' is not a file path: {error}", where, "give FILE.py:CLASS") from None
     module, name = module_of(path, where), match["name"]
     named = vars(module).get(name)
     if not isinstance(named, type) and not isinstance(getattr(named, "family", None), members.Family):
         own = [n for n, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__]
-        raise InputError(f"no class '{name}' in it", str(path), did_you_mean(name, own) if own else "it has none")
+        raise InputError(f"no class '{name}' in the file", str(path), did_you_mean(name, own) if own else "it has none")
     return named
 
 
@@ -90,7 +90,7 @@ _CONSTRUCTING = (
     "gonio.material.kinds",
     "gonio.material.parameters",
     __name__,
-)  # in constructors' stacks
+)  # modules in the call stack of a constructor
 
 
 def _folder_of_caller() -> Path | None:
@@ -161,7 +161,7 @@ def module_of(path: Path, where: str) -> ModuleType:
     except (OSError, ValueError) as error:
         raise InputError(f"no file '{path}'", where, str(getattr(error, "strerror", "") or "")) from None
     if source is None:
-        raise InputError(f"'{path}' is no file", where)
+        raise InputError(f"'{path}' is not a file", where)
     stamp = (about.st_mtime_ns, about.st_size)
     if path in _loaded and _loaded[path][0] == stamp:
         return _loaded[path][1]
@@ -199,7 +199,7 @@ def _located(error: BaseException, path: Path) -> GonioError:
         return InputError(error.what, f"{place}: {error.where}" if error.where else place, error.hint)
     text = str(error).strip().partition("\n")[0]
     if "before setting a variant" in text:  # a file of plugins: the verifier sets one
-        hint = f"a class of Mitsuba's is judged by its registered name: gonio verify {path.name}:NAME"
+        hint = f"to judge a Mitsuba BSDF, give its registered name: gonio verify {path.name}:NAME"
         return InputError(f"{type(error).__name__}: {text.partition('.')[0]}", place, hint)
     return InputError(f"{type(error).__name__}: {text}" if text else type(error).__name__, place, "the file must run")
 

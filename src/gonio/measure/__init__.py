@@ -15,7 +15,7 @@ from .tables.base import Measurement
 
 _read: dict[tuple[str, str], tuple[tuple[int, int], Measurement]] = {}
 SAMPLE = "sample"  # names the small table shipped with Gonio, made by docs/make_sample_table.py
-CACHED = 8  # tables in memory, the most recently used
+CACHED = 8  # tables kept in memory, the most recently used
 
 
 def suffixes() -> list[str]:
@@ -24,7 +24,7 @@ def suffixes() -> list[str]:
 
 
 def parted(file: str) -> tuple[str, str]:
-    """File and item of "FILE" or "FILE:ITEM", for files that hold several materials."""
+    """File and item from "FILE" or "FILE:ITEM", for files that hold several materials."""
     path, colon, item = file.rpartition(":")
     return (path, item) if colon and by_suffix(path) and not by_suffix(file) else (file, "")
 
@@ -50,7 +50,7 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
         hint = did_you_mean(path.suffix, suffixes())
         if path.suffix == ".json":
             hint = 'a fit is `gold.json` on the command line and {"type": "json", "file": "gold.json"} in a scene'
-        raise InputError(f"'{path.suffix}' is not a format of measurements", str(path), hint)
+        raise InputError(f"'{path.suffix}' is not a measurement format", str(path), hint)
     return next((one for one in formats if data is not None and one.fits(data)), formats[0])
 
 

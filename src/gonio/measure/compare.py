@@ -21,11 +21,11 @@ from .tables.base import Floats, Measurement
 PAIRS = 1 << 16
 ROUNDS = 16
 SURE = 0.03
-GRAZING = 0.03  # smallest cosine of view: within 1.7 degrees of the horizon every format extrapolates
+GRAZING = 0.03  # smallest cosine of the view: within 1.7 degrees of the horizon, every format extrapolates
 
 
 class Comparable(Protocol):
-    """What a difference is measured of."""
+    """An object that `difference` can compare."""
 
     @property
     def rgb(self) -> Callable[[Floats, Floats], Floats]: ...
@@ -36,11 +36,12 @@ class Comparable(Protocol):
 
 
 def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: int = 1) -> float:
-    """E |other - table| / E |table| of f cos theta_i, over views of even cosine and all light, mean of the channels.
+    """E |other - table| / E |table| of f cos theta_i, over views of uniform cosine and all light, mean of the channels.
 
-    The pairs are sampled by both tables' densities and by the cosine, a third each, so that narrow lobes count by their
-    energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the standard error
-    of the result is below `SURE` of it, or `ROUNDS` are done: a spike outside every density requires many.
+    The pairs are sampled by the densities of the two tables and by the cosine, a third each, so that narrow lobes count
+    by their energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the
+    relative standard error of the result is below `SURE`, or `ROUNDS` are done: a spike outside every density requires
+    many.
     """
     rng = np.random.default_rng([seed, 83])
     sums, squares, total = 0.0, 0.0, 0.0
@@ -55,7 +56,7 @@ def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: i
 def _round(
     table: Comparable, other: Comparable, pairs: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """|other - table| and |table| at random pairs, over their density."""
+    """|other - table| and |table| at random pairs, divided by their density."""
     types = backend.types("float64")
     mu, phi = rng.uniform(GRAZING, 1.0, pairs), rng.uniform(0.0, 2.0 * np.pi, pairs)
     sin = np.sqrt(1.0 - mu * mu)
@@ -83,12 +84,13 @@ class Converted:
     """A table in another format.
 
     path       the file
-    kind       of the table in it
+    kind       kind of the table in it
     resampled  whether its values were computed by evaluating the source; otherwise the numbers are the same
-    error      its distance from the source, see `difference`
+    error      its difference from the source, see `difference`
     size       bytes
-    resolution, reciprocity  how far the file lies from the source's reciprocal part, and that from the source: what
-               cells lose, and what a format loses that holds one value for a pair and its exchange; these overlap
+    resolution, reciprocity  the difference of the file from the source's reciprocal part, due to the size of the cells,
+               and that of this part from the source, due to a format with one value for a pair and its swapped pair;
+               these overlap
     """
 
     path: Path
@@ -104,7 +106,7 @@ class Converted:
 
 
 class ReciprocalPart:
-    """A table with one value f per pair and its exchange: least squares of both, as in `half_difference.sampled`."""
+    """A table with one value f per pair and its swapped pair, fitted to both as in `half_difference.sampled`."""
 
     def __init__(self, table: Measurement) -> None:
         self.draw, self.pdf, self._rgb = table.draw, table.pdf, table.rgb
@@ -142,12 +144,12 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi:
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """f of pairs, and of the same pairs with directions exchanged."""
+    """f of pairs, and of the same pairs with directions swapped."""
     return table.rgb(wo, wi) / wi[:, 2:], table.rgb(wi, wo) / wo[:, 2:]
 
 
 def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
-    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 if the table is reciprocal."""
+    """E |f(wo, wi) - f(wi, wo)| / E f over cosine-distributed pairs: 0 if the table is reciprocal."""
     rng = np.random.default_rng([1, 84])
     u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
     wo, wi = (

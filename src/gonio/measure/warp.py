@@ -4,11 +4,11 @@
     place, pdf = warp.sample(slices, u, v)
     place, pdf = warp.invert(slices, x, y)           # the numbers that `sample` would have needed
 
-Between nodes the density is bilinear. A slice is one density with integral 1; a mixture of slices, such as the two
+Between nodes, the density is bilinear. A slice is one density with integral 1; a mixture of slices, such as the two
 nearest angles of view, is given as pairs (slice, weight) with weights that sum to 1: it is sampled by the mixed
 cumulative sums, so that `sample` and `invert` are exact inverses of each other (Dupuy2018, sec. 4.3).
 
-Rows are selected first, by the marginal of y; then x in the mixed row. Both densities are piecewise linear with
+Rows are selected first, by the marginal of y; then x in the mixed row. The two densities are piecewise linear with
 quadratic cumulative sums; the root is computed in the form that is also valid for a constant density.
 """
 
@@ -82,7 +82,7 @@ class Warp:
 
     @function
     def pdf(self, slices: Slices, x: Scalar, y: Scalar) -> Scalar:
-        """The density at a point; the nearest edge's outside the square."""
+        """The density at a point; outside the square, that at the nearest edge."""
         row, ty = _cell(y, self.rows)
         column, tx = _cell(x, self.columns)
         near, far = (
@@ -131,7 +131,7 @@ class Warp:
 
 
 def search(below: Callable[[Scalar], Scalar], count: int, wanted: Scalar) -> Scalar:
-    """The last of nodes 0 .. count - 2 at which a monotonic sum is <= `wanted`, by bisection."""
+    """The last of the nodes 0 .. count - 2 at which a monotonic sum is <= `wanted`, by bisection."""
     index = wanted * 0.0
     step = 1 << max((count - 2).bit_length() - 1, 0)
     while step and count > 2:
@@ -162,7 +162,7 @@ def _mix(low: Scalar, high: Scalar, t: Scalar) -> Scalar:
 
 
 class Nodes:
-    """An axis with unevenly spaced nodes, at least two, or one that stands for all."""
+    """An axis with unevenly spaced nodes: at least two, or a single one that stands for all coordinates."""
 
     def __init__(self, stem: str, nodes: NDArray[np.floating]) -> None:
         self.count = len(nodes)

@@ -172,7 +172,7 @@ def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
 @overload
 def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
 def fma(a: Value, b: Value, c: Value) -> Value:
-    """a b + c: in float32 fused and rounded once; in float64, the oracle, product and sum are rounded as in NumPy."""
+    """a b + c: in float32 fused and rounded once; in float64, the reference, each is rounded as in NumPy."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
@@ -189,7 +189,7 @@ def clamp(x: T, low: T | float, high: T | float) -> T:
 
 
 def rsqrt(x: T) -> T:
-    """1 / sqrt(x); in float32 by the processor's estimate and one step of Newton's method, within 2 ulp."""
+    """1 / sqrt(x); in float32 by the processor's estimate and one Newton step, within 2 ulp."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
@@ -257,7 +257,7 @@ def dot(a: V, b: V) -> Scalar:
         return graph.emit("dot", "float", a, b)
     if is_single(a):
         return drjit().dot(a, b)
-    # float64 is the oracle: each product is rounded, so that NumPy gets the same bits from the recorded graph
+    # float64 is the reference: each product is rounded, so that NumPy computes identical bits from the recorded graph
     total = a[0] * b[0]
     for i in range(1, len(a)):
         total = total + a[i] * b[i]
@@ -294,7 +294,7 @@ def mean(spectrum: Spectrum) -> Scalar:
     """Mean over the channels of a spectrum, as a float."""
     if isinstance(spectrum, Node):
         return graph.emit("mean", "float", spectrum)
-    # not Dr.Jit's mean, which writes the number of lanes into the kernel and so recompiles it for every array size
+    # not Dr.Jit's mean, which writes the number of lanes into the kernel and would recompile it for every array size
     return drjit().sum(spectrum, axis=0) * (1.0 / len(spectrum))
 
 
@@ -305,8 +305,8 @@ def max_component(spectrum: Spectrum) -> Scalar:
     return drjit().max(spectrum, axis=0)
 
 
-if not TYPE_CHECKING:  # a type checker would accept every misspelt name
-    # in shaders and NumPy
+if not TYPE_CHECKING:  # a type checker would accept every misspelled name
+    # names of these functions in shaders and NumPy
     _ELSEWHERE = {"max": "maximum", "min": "minimum", "select": "where", "length": "norm", "clip": "clamp"}
 
     def __getattr__(name: str) -> object:

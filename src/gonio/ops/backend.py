@@ -1,4 +1,4 @@
-"""Dr.Jit arrays: the array types in use, and the conversion from and to NumPy.
+"""Dr.Jit arrays: the array types in use, and conversion from and to NumPy.
 
 Dr.Jit is imported here and, outside `render`, nowhere else.
 """
@@ -53,7 +53,7 @@ def get_precision() -> Precision:
 
 @lru_cache
 def drjit() -> ModuleType:
-    """The module Dr.Jit, imported by the first computation."""
+    """The module Dr.Jit, imported on first use."""
     import drjit as dr
 
     return dr
@@ -63,11 +63,11 @@ def check_kernels() -> None:
     """Raise MachineError if other users may change the folder of compiled kernels, which Dr.Jit runs."""
     named, home = os.environ.get("DRJIT_CACHE_DIR"), os.environ.get("HOME")
     if not (named or home):
-        return  # Dr.Jit keeps no kernels then
+        return  # without a home directory Dr.Jit stores no kernels
     folder = Path(named) if named else Path(str(home), ".drjit")
     if folder.is_dir() and files.changeable_by_others(folder):
         hint = f"chmod go-w '{folder}', or set DRJIT_CACHE_DIR to a folder of your own"
-        raise MachineError("other users may change the kernels that Dr.Jit keeps and runs", str(folder), hint)
+        raise MachineError("other users may change the kernels that Dr.Jit caches and runs", str(folder), hint)
 
 
 @lru_cache
@@ -89,7 +89,7 @@ def _types(backend: str, double: bool) -> Types:
 
 
 def types(precision: Precision | None = None) -> Types:
-    """The CPU types of a precision, since small arrays are computed there; None for the current precision."""
+    """The CPU types of a precision, None for the current one; small arrays are computed on the CPU."""
     precision = _precision if precision is None else precision
     if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "precision", 'give "float32" or "float64"')
@@ -115,7 +115,7 @@ _formula: ContextVar[type | None] = ContextVar("formula", default=None)  # type 
 
 @contextlib.contextmanager
 def formula_of(directions: object) -> Iterator[None]:
-    """Declare the directions on which the formula inside the `with` block runs."""
+    """Declare the directions for which the formula inside the `with` block is evaluated."""
     before = _formula.set(type(directions))
     try:
         yield
@@ -132,8 +132,8 @@ def in_formula(number: float) -> Array:
 def float_of(value: object, kind: Types) -> Array:
     """A number or an array of shape (N,) as a Dr.Jit float.
 
-    A number becomes an evaluated array of one entry instead of a literal: a literal would be compiled into the kernel,
-    and every new value would compile it again.
+    A number becomes an evaluated array of one entry instead of a literal, which would be compiled into the kernel and
+    recompile it for every new value.
     """
     dr = drjit()
     if is_drjit(value):
@@ -175,7 +175,7 @@ def to_numpy(value: Array, count: int) -> np.ndarray:
     if not dr.is_array_v(value):
         return np.full(count, value)
     if dr.is_vector_v(value):
-        # per component: Dr.Jit would join them in a kernel that contains the number of rows as a literal
+        # one component at a time: Dr.Jit would join them in a kernel that contains the number of rows as a literal
         dr.eval(value)
         parts = [np.asarray(component.numpy()) for component in value]
         count = max(count, *(part.shape[-1] for part in parts))  # parameters may have more rows than the directions

@@ -43,7 +43,7 @@ NUMPY: dict[str, Callable] = {
     "dot": lambda a, b: sum(a[i] * b[i] for i in range(len(a))),
     "mean": lambda a: np.mean(a, axis=0),
     "max_component": lambda a: np.max(a, axis=0),
-    # steps of the logarithm and the exponential in shaders
+    # used by the logarithm and the exponential in shaders
     "exponent": lambda x: np.frexp(x)[1] - 1.0,
     "scaled": lambda x, e: np.ldexp(x, np.asarray(e, int)),
 }

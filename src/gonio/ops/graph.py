@@ -45,7 +45,7 @@ class ForbiddenOperator(RecordingError):
     """A Python operator with no meaning on a value, or a different one: `if`, `and`, `**`."""
 
 
-foreign = ""  # "file:line" of the text that is being read, if values come from no Python code
+foreign = ""  # "file:line" of the text that is being read, if the values do not come from Python code
 
 
 def _source_line() -> str:
@@ -65,7 +65,7 @@ def _logical(op: str) -> Callable[[Node, object], Node]:
 class Node:
     """One value in a recorded function: an operation, its arguments, its type and its source line.
 
-    name  of the Python variable that held it, or ""; inside a tuple or dict with its key, "result.bend"
+    name  name of the Python variable that held it, or ""; with the key inside a tuple or dict, "result.bend"
     """
 
     __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
@@ -76,7 +76,7 @@ class Node:
         self.source = _source_line()
         self.name, self.depth = "", 1000
         self.index = len(function.nodes)
-        # otherwise the variables of all calling frames would be searched
+        # otherwise the variables of all calling frames would have to be searched
         if function.names is not None and _stack[-1][1] is function:
             function.names.search()
         function.nodes.append(self)
@@ -172,8 +172,8 @@ class Graph:
     """Recorded functions in order of definition; `entry` is the last.
 
     replacements  operation -> a vocabulary function to record instead, for languages without the operation
-    single        whether it is recorded for 32 bits, see `ops.is_short`
-    named         whether values get the names of the variables that hold them, nine tenths of the time of a recording
+    single        whether it is recorded for 32 bits; see `ops.is_short`
+    named         whether values get the names of the variables that hold them, which takes nine tenths of the time
     """
 
     def __init__(
@@ -260,7 +260,7 @@ def type_of(value: object) -> str:
 
 
 def widest(*values: object) -> str:
-    """The type of an elementwise operation: floats broadcast over one wider type."""
+    """The type of an elementwise operation: floats broadcast to the one wider type."""
     types = {type_of(v) for v in values} - {"float"}
     if len(types) > 1:
         raise RecordingError(f"an operation mixes {' and '.join(sorted(types))}", _source_line())
@@ -314,7 +314,7 @@ def first_free(name: str, used: Container[str]) -> str:
 
 
 def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: bool = False) -> Value:
-    """Record a call of a `@function`; defines it first if this combination of argument types is new.
+    """Record a call of a `@function`, which is defined first if this combination of argument types is new.
 
     constants  results that are plain numbers remain plain numbers
     """
@@ -322,7 +322,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: boo
     bound.apply_defaults()
     graph, _ = _stack[-1]
     for argument, value in bound.arguments.items():
-        if type(value) is float:  # recorded as an argument; otherwise each number would define another function
+        if type(value) is float:  # recorded as an argument; otherwise each number would define a new function
             bound.arguments[argument] = emit("constant", "float", static=value)
     key = (python_function, *(static_key(value, Node) for value in bound.arguments.values()))
     function = graph._known.get(key)
@@ -356,8 +356,11 @@ def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: boo
 
 @contextlib.contextmanager
 def unnamed() -> Iterator[None]:
-    """Values recorded meanwhile get no names: the variables of an interpreter say nothing about its program, and to
-    search them takes nine tenths of the time. Functions that are defined meanwhile keep their own."""
+    """A context in which the current function records values without names.
+
+    The variables of an interpreter say nothing about the program that it runs, and searching them takes nine tenths of
+    the time. Values of functions that are defined inside the context are named as usual.
+    """
     function = _stack[-1][1] if _stack else Function("outer", "", "")
     names, function.names = function.names, None
     try:
@@ -422,7 +425,7 @@ def results_of(function: Function, arguments: Sequence[Value]) -> list[Value]:
     remaining = iter(arguments)
     for node in function.nodes:
         args = [values[arg] if isinstance(arg, Node) else arg for arg in node.args]
-        for arg in node.args:  # arrays that are needed no more make room for the next
+        for arg in node.args:  # arrays that are no longer needed are freed
             if isinstance(arg, Node) and last.get(arg) is node:
                 values.pop(arg, None)
         if node.op == "parameter":

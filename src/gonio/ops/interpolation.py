@@ -11,7 +11,7 @@ from .types import Scalar
 
 
 def inset(x: Array, count: int) -> Array:
-    """The coordinate whose values 0 and 1 fall on the first and last texel center of an axis of `count` texels."""
+    """x scaled so that 0 and 1 fall on the first and last texel centers of an axis of `count` texels."""
     return x * ((count - 1) / count) + 0.5 / count
 
 

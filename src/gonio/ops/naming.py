@@ -28,11 +28,12 @@ class LocalNames:
 
     def __init__(self, function: Any, node: type[Any], outermost: CodeType) -> None:
         self.function, self.node, self.outermost = function, node, outermost
-        # for each frame, the outermost first, what need not be searched again, by id; the reference keeps it alive
+        # for each frame, outermost first, the objects that need not be searched again, by id; references keep them
+        # alive
         self._searched: list[tuple[FrameType, dict[int, object]]] = []
 
     def search(self) -> None:
-        """Name what is held now. Called for every new value, so that variables bound by earlier lines still exist."""
+        """Name the values that variables hold now. Called for every new value, while earlier variables still exist."""
         frames = []
         frame: FrameType | None = sys._getframe(1)
         while frame is not None and frame.f_code is not self.outermost:
@@ -56,7 +57,7 @@ class LocalNames:
     def _search_parts(self, depth: int, value: Any, path: tuple, done: dict[int, object]) -> bool:
         """Name the values inside a variable, in the order and with the paths of `structure.flatten`.
 
-        Returns whether they stay what they are: a list or a dictionary may be changed, and is searched every time.
+        Returns whether they cannot change: lists and dictionaries can, so they are searched every time.
         Paths are built only when a value is named.
         """
         if id(value) in done:

@@ -43,7 +43,7 @@ def flatten(value: object, name: str, kind: type[Any]) -> Iterator[tuple[str, Va
 
 
 def rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple[type, ...]) -> Value:
-    """The same structure with each value of a kind replaced."""
+    """The same structure with each value of the kind replaced."""
     if isinstance(value, kind):
         return replace(value)
     if isinstance(value, tuple | list):
@@ -57,7 +57,7 @@ def rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple
 
 
 def static_key(value: Value, kind: type[Any]) -> object:
-    """The parts of an argument other than values that determine the recording: names, flags, classes, plain numbers."""
+    """The parts of an argument, besides values, that determine the recording: names, flags, classes, plain numbers."""
     if isinstance(value, kind):
         return value.type
     if isinstance(value, tuple | list):

@@ -4,8 +4,8 @@
     e, = lookup(table, roughness, mu)
 
 Coordinates lie in [0, 1]; texel j of an axis of n has its center at (j + 1/2) / n. Values are linear in each coordinate
-between centers and constant beyond the first and last. This is a GPU texture with clamped edges, so bakes, Dr.Jit and
-shaders agree. To put nodes on both ends of an axis, use `inset`.
+between centers and constant beyond the first and last. This is the rule of a GPU texture with clamped edges, so bakes,
+Dr.Jit and shaders agree. To put nodes on the two ends of an axis, use `inset`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Table:
 
 
 def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
-    """Every channel, channels first: the interpolation rule in NumPy float64."""
+    """Every channel at a point, channels first: the interpolation rule in NumPy float64."""
     points = np.broadcast_arrays(*[np.asarray(x, dtype=float) for x in coordinates])
     cells, places = [], []
     for x, count in zip(points, table.shape, strict=True):

@@ -1,6 +1,6 @@
 """The types of values, for readers, editors and type checkers. Nothing here runs.
 
-Inside a material every value is a Dr.Jit array with one entry per ray, or a symbol while the material is recorded. Both
+Inside a material every value is a Dr.Jit array with one entry per ray, or a symbol while the material is recorded; both
 have the operators below. The actual Dr.Jit type depends on device, precision and variant, so these classes state only
 the meaning: a `Scalar`, a `Mask`, a `Direction`, a `Spectrum`. They are never instantiated and never tested for; only
 the type checker enforces them.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 Mode: TypeAlias = Literal["radiance", "importance"]
 Precision: TypeAlias = Literal["float32", "float64"]
 
-# A value whose type is known to Dr.Jit only, or a symbol, in code that must distinguish them
+# A Dr.Jit value, whose type only Dr.Jit knows, or a symbol, in code that must distinguish the two
 Value: TypeAlias = Any
 
 

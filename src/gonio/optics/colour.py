@@ -21,7 +21,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def observer(nm: Floats) -> Floats:
-    """The color-matching functions x, y, z of the CIE 1931 observer, (3, N) (Wyman2013, table 1)."""
+    """The CIE 1931 color-matching functions x, y, z at wavelengths in nm, (3, N), as fitted in Wyman2013, table 1."""
 
     def bell(center: float, low: float, high: float) -> Floats:
         return np.exp(-0.5 * ((nm - center) * np.where(nm < center, low, high)) ** 2)
@@ -36,7 +36,10 @@ WAVELENGTHS = np.arange(380.0, 781.0, 10.0)  # nm, of D65
 
 
 def weights(nm: Floats) -> Floats:
-    """Linear sRGB per unit reflectance at equally spaced wavelengths under D65, (N, 3); a flat one is gray."""
+    """Weights, (N, 3), of a reflectance at equally spaced wavelengths, nm, that sum to its linear sRGB color under D65.
+
+    A flat reflectance gives gray.
+    """
     light = np.interp(nm, WAVELENGTHS, D65, left=0.0, right=0.0)
     rgb = (observer(nm) * light).T @ XYZ_TO_RGB.T
     chromaticity: Floats = rgb / rgb.sum(axis=0)

@@ -1,7 +1,7 @@
 """The dependence of a refractive index on the wavelength: formulas and tables.
 
-Formulas take the wavelength in micrometers, as published; the public interface uses nanometers. A formula holds only
-where it was fitted, so its range is part of it.
+Formulas take the wavelength in micrometers, as published; the public interface uses nanometers. A formula is valid only
+where it was fitted, so each has a range.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ..errors import InputError
 
 Floats: TypeAlias = NDArray[np.float64]
 
-SODIUM = 589.3  # nm, the middle of the D lines: the wavelength of a glass's single index
-VISIBLE = (400.0, 700.0)  # nm; wavelengths outside contribute 0.3 % of the luminance of daylight
+SODIUM = 589.3  # nm, the mean of the D lines, at which the index of a glass is quoted
+VISIBLE = (400.0, 700.0)  # nm; other wavelengths contribute 0.3 % of the luminance of daylight
 ALL = (0.0, np.inf)
 
 
@@ -30,7 +30,7 @@ class RefractiveIndex(NamedTuple):
 
 @dataclass(frozen=True)
 class Dispersion:
-    """An index as a function of the wavelength.
+    """A refractive index as a function of the wavelength.
 
     low, high  range of validity, nm
     """
@@ -39,12 +39,12 @@ class Dispersion:
     high: float
 
     def at(self, wavelength: Floats) -> RefractiveIndex:
-        """The index at wavelengths in nm, all in range."""
+        """The complex index at wavelengths in nm, all of which must be in range."""
         eta = np.asarray(self.eta(wavelength / 1000.0), float)
         return RefractiveIndex(eta, np.zeros_like(eta))
 
     def eta(self, wavelength: Floats) -> Floats:
-        """The real part at wavelengths in micrometers."""
+        """The real part of the index at wavelengths in micrometers."""
         raise NotImplementedError
 
 
@@ -133,7 +133,7 @@ class OpticalConstants:
 
     name    the name by which it is selected
     title   a description
-    curve   the index by wavelength
+    curve   the index as a function of the wavelength
     source  the reference
     """
 
@@ -144,25 +144,26 @@ class OpticalConstants:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Range of wavelengths in which it is known, nm."""
+        """Range of wavelengths in which the index is known, nm."""
         return self.curve.low, self.curve.high
 
     @property
     def disperses(self) -> bool:
-        """Whether it depends on the wavelength."""
+        """Whether the index depends on the wavelength."""
         return not isinstance(self.curve, Constant)
 
     def at(self, wavelength: float | list[float] | Floats, outside: str = "refuse") -> RefractiveIndex:
-        """The index at wavelengths (nm, in vacuum), as arrays of their shape.
+        """The index at vacuum wavelengths in nm, as arrays of the same shape.
 
-        outside  handling of wavelengths out of range: "refuse", or "level" for the value at the nearer end
+        outside  for wavelengths out of range: "refuse" raises an error, "level" uses the value at the nearer end
+        Raises InputError for wavelengths that are refused or not positive, and where the formula gives no real index.
         """
         given = np.asarray(wavelength, np.float64)
         low, high = self.range
         if outside not in ("refuse", "level"):
             raise InputError(f"'{outside}' given, refuse or level expected", "outside")
         if given.size and not np.all(np.isfinite(given) & (given > 0.0)):
-            raise InputError("a wavelength that is not a positive number", "wavelength", "give nanometers")
+            raise InputError("a wavelength is not a positive number", "wavelength", "give nanometers")
         wrong = given[(given < low) | (given > high)]
         if wrong.size and outside == "refuse":
             hint = "in nanometers" if high >= 20.0 * wrong.flat[0] else 'outside="level" uses the value at the end'

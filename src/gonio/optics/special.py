@@ -38,21 +38,21 @@ def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 @function
 def erfinv(x: Scalar) -> Scalar:
-    """Inverse error function on (-1, 1): Giles2010's polynomial, relative error about 4e-7.
+    """Inverse error function on (-1, 1) by the polynomial of Giles2010; relative error about 4e-7.
 
-    This is float32 precision; in float64 a step of Newton's method follows, error 1e-12 up to |x| = 1 - 1e-7.
+    This is the precision of float32; in float64 a Newton step reduces the error to 1e-12 up to |x| = 1 - 1e-7.
     """
     w = -log((1.0 - x) * (1.0 + x))
     center = w < 5.0
     t = where(center, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
-    # outside a formula `where` between two plain numbers has 32 bits, so the choice is between sums
+    # outside a formula, `where` between two plain numbers returns 32 bits, so it selects between sums
     value = where(center, _CENTER[0] * t + _CENTER[1], _TAIL[0] * t + _TAIL[1])
     for a, b in zip(_CENTER[2:], _TAIL[2:], strict=True):
         value = where(center, value * t + a, value * t + b)
     y = value * x
     if is_short(x):
         return y
-    # exp(y^2) magnifies the rounding of erf: farther out the polynomial is more accurate
+    # exp(y^2) magnifies the rounding error of erf: farther out the polynomial is more accurate
     return where(abs(y) < 4.5, y - (erf(y) - x) * exp(sqr(y)) * (0.5 * SQRT_PI), y)
 
 
@@ -60,9 +60,9 @@ def erfinv(x: Scalar) -> Scalar:
 def gaussian_ramp(a: Scalar) -> Scalar:
     """int_-inf^a (a - x) exp(-x^2) dx / sqrt(pi) = a (1 + erf a) / 2 + exp(-a^2) / (2 sqrt(pi)), for a >= 0.
 
-    The integral over a Gaussian's slopes below a. In float32 a rational function, within 8e-8 of it: with erf and exp
-    Beckmann's pdf took 1.8 times as long. The coefficients were fitted for Gonio by least squares of the relative error
-    at 4000 Chebyshev points, reweighted toward the largest; from a = 4 on the value is a, within 2e-10.
+    The integral over the slopes of a Gaussian below a. In float32 it is a rational function with an error of 8e-8: with
+    erf and exp, Beckmann's pdf took 1.8 times as long. The coefficients were fitted for Gonio by least squares of the
+    relative error at 4000 Chebyshev points, reweighted toward the largest; from a = 4 on the value is a, within 2e-10.
     """
     if not is_short(a):
         return 0.5 * a * (1.0 + erf(a)) + (0.5 / SQRT_PI) * exp(-sqr(a))
@@ -79,7 +79,7 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 @function
 def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
-    """cos(theta)^p, from the squared sine if that is below 0.1: near 1 a cosine is rounded too coarsely for large p.
+    """cos(theta)^p, from the squared sine if it is below 0.1: near 1 the cosine is too coarsely rounded for large p.
 
     log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)); the first omitted term is below 1e-18.
     """
@@ -93,7 +93,7 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
 
 @function
 def exprel(x: V) -> V:
-    """(e^x - 1) / x, 1 at x = 0: up to |x| = 1/2 by its series, whose first omitted term is below 2e-17 of it."""
+    """(e^x - 1) / x, 1 at x = 0: up to |x| = 1/2 by its series, whose first omitted term is below 2e-17 of the sum."""
     t = clamp(x, -0.5, 0.5)
     series = 1.0 + t * (1.0 / 13.0)
     for n in range(12, 1, -1):
@@ -128,9 +128,9 @@ def power_quantile(area: Scalar, q: Scalar) -> Scalar:
 
 @function
 def log_share(q: Scalar, p: Scalar) -> Scalar:
-    """log q of a fraction, with p = 1 - q given: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
+    """log q of a fraction q, given p = 1 - q too: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
 
-    The first omitted term of the series is below 4e-10 of its value.
+    The first omitted term of the series is below 4e-10 of the sum.
     """
     t = minimum(p, 0.5)
     z = t / (t - 2.0)

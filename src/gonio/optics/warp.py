@@ -37,13 +37,13 @@ def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
 
 @function
 def square_to_power_lobe_pdf(cos_theta: Scalar, p: Scalar) -> Scalar:
-    """(p + 1) / (2 pi) cos(theta)^p above, 0 below; 1/sr."""
+    """(p + 1) / (2 pi) cos(theta)^p above the horizon, 0 below; 1/sr."""
     return (p + 1.0) * (0.5 * ops.inv_pi) * ops.pow(cos_theta, p)
 
 
 @function
 def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
-    """(axis.w)^p, from the distance of the two: near the peak their dot product has no digits left for large p."""
+    """(axis.w)^p, from their distance: near the peak the dot product is rounded too coarsely for large p."""
     off = w - axis
     versine = 0.5 * dot(off, off)
     return power_of_cosine(dot(axis, w), versine * (2.0 - versine), p)
@@ -51,7 +51,7 @@ def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
 
 @function
 def to_frame(axis: Direction, w: Direction) -> Direction:
-    """w, given relative to +z, relative to a unit axis; the basis is discontinuous only at axis = -z (Duff2017)."""
+    """w taken from the frame of +z to that of a unit axis; the basis is discontinuous only at axis = -z (Duff2017)."""
     side = ops.copysign(ops.ones_like(axis.z), axis.z)
     a = -1.0 / (side + axis.z)
     b = axis.x * axis.y * a

@@ -1,5 +1,5 @@
-"""Denoise pictures with Intel Open Image Denoise, which is installed with Gonio on platforms where pyoidn has a
-wheel."""
+"""Denoising of pictures with Intel Open Image Denoise, which is installed with Gonio on platforms for which pyoidn has
+a wheel."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _HINT = f"{INSTALL}, or leave --denoise out"
 
 
 def available() -> str:
-    """The version of the installed pyoidn, "" if there is none; nothing is loaded."""
+    """The version of the installed pyoidn, "" if there is none; does not load it."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -22,7 +22,7 @@ def available() -> str:
 
 
 def require() -> None:
-    """Raise MachineError if OIDN is missing; called before a render, so that no time is lost."""
+    """Raise MachineError if OIDN is missing; to be called before a render, so that no time is lost."""
     if not available():
         raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _HINT)
 
@@ -31,8 +31,8 @@ def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndar
     """The denoised picture: (H, W, 3) float32, linear, unbounded above.
 
     albedo  surface color in [0, 1], noisy or not; preserves texture edges
-    normal  shading normals in [-1, 1]; preserves geometric edges; needs `albedo` (a rule of OIDN)
-    Biased: fine detail may be removed as noise. Values that are not finite are replaced by 0.
+    normal  shading normals in [-1, 1]; preserves geometric edges; OIDN requires `albedo` with it
+    The result is biased: fine detail may be removed as noise. Values that are not finite are replaced by 0.
     Raises MachineError if OIDN is missing or fails, InputError for arrays of other shapes.
     """
     color = _checked("image", image, np.asarray(image).shape)

@@ -1,6 +1,6 @@
-"""Exposure of a picture for a screen: stops, given or derived from the picture's luminance, and what they clip.
+"""Exposure of a picture for a screen: stops, given or derived from the picture's luminance, and a check for clipping.
 
-Pictures are linear RGB, float32, (H, W, 3); 1 is white at 0 stops, and each stop doubles.
+Pictures are linear RGB, float32, (H, W, 3); 1 is white at 0 stops, and each stop doubles the brightness.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..errors import InputError
 RGB = NDArray[np.float32]
 Exposure = float | Literal["auto"]
 
-MAX_CLIPPED = 0.01  # fraction of clipped pixels without a warning: highlights and lamps may clip
-WHITE = 1.1  # a white furnace is 1 plus noise, and clipping that loses nothing visible
+MAX_CLIPPED = 0.01  # largest fraction of clipped pixels without a warning: highlights and lamps may clip
+WHITE = 1.1  # above 1, since a white furnace is 1 plus noise, and clipping that loses nothing visible
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # weights of linear sRGB (IEC 61966-2-1)
 
 
 def parse(text: str) -> Exposure:
-    """Parse stops such as "-1.5", or "auto". InputError for anything else."""
+    """Parse stops such as "-1.5", or "auto". Raises InputError for anything else."""
     try:
         return check("auto" if text == "auto" else float(text))
     except ValueError as error:
@@ -32,7 +32,7 @@ def parse(text: str) -> Exposure:
 
 
 def check(exposure: Exposure) -> Exposure:
-    """The exposure, or an InputError if it is invalid."""
+    """The exposure. Raises InputError if it is invalid."""
     if isinstance(exposure, str) and exposure == "auto":
         return exposure
     if not (isinstance(exposure, int | float) and abs(exposure) <= 100):
@@ -42,10 +42,10 @@ def check(exposure: Exposure) -> Exposure:
 
 
 def stops(exposure: Exposure, *pictures: RGB) -> float:
-    """The exposure in stops; "auto" is the brightest, in tenths of stops, at which 1 % of the lit pixels clip.
+    """The exposure in stops; "auto" is the brightest, in tenths of stops, at which at most 1 % of the lit pixels clip.
 
-    A lamp or a sky may cover more of a picture than that, and would darken everything else. Therefore the mean of log
-    luminance is at most 2 stops below middle gray, which Reinhard2002 puts at 18 % of white.
+    A lamp or a sky may cover more of a picture than that and would darken everything else. The exposure is therefore at
+    least such that the mean of log luminance is 2 stops below middle gray, which Reinhard2002 puts at 18 % of white.
     Black pixels are ignored; entirely black pictures get 0. Several pictures get one exposure.
     """
     if exposure != "auto":
@@ -86,5 +86,5 @@ def _without_clipping(pixels: RGB) -> float:
 
 
 def _in_tenths(exposure: float) -> float:
-    """Rounded down, since a brighter picture would clip more."""
+    """The exposure in tenths of stops, rounded down, since a brighter picture would clip more."""
     return math.floor(10 * exposure + 1e-4) / 10

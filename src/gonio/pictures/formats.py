@@ -1,7 +1,7 @@
 """Decoding of untrusted picture files.
 
-The header of a file (sizes, chunks, attributes) is checked against its length before a C++ library reads it. Radiance
-files are decoded here, since Mitsuba's reader writes past its buffer if run lengths are wrong.
+The header of a file (sizes, chunks, attributes) is checked against the file's length before a C++ library reads it.
+Radiance files are decoded here, since Mitsuba's reader writes past its buffer if run lengths are wrong.
 
     kind = formats.kind_of(content)
     values, integers = formats.decode(path, content, kind)      # (H, W, channels)
@@ -23,7 +23,7 @@ from ..bridge.faults.exr_threads import file_threads
 from . import openexr
 from .openexr import Claimed, Unreadable
 
-# DEFLATE, the densest compression here, expands a byte to at most 1032. A file that claims more is rejected.
+# DEFLATE, the densest compression here, expands a byte to at most 1032 bytes. A file that claims more is rejected.
 MAX_EXPANSION = 1032
 MAX_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
 MAX_SIDE = 1 << 20  # limit of libpng
@@ -37,7 +37,7 @@ _MAGIC = {
 
 
 def kind_of(content: bytes) -> str | None:
-    """ "PNG", "JPEG", "OpenEXR" or "RGBE", by its first bytes; None for any other format."""
+    """The format by its first bytes, "PNG", "JPEG", "OpenEXR" or "RGBE"; None for any other."""
     return next((kind for magic, kind in _MAGIC.items() if content.startswith(magic)), None)
 
 
@@ -49,7 +49,7 @@ def check(content: bytes, kind: str) -> Claimed:
         if kind == "OpenEXR":
             openexr.check_blocks(content)
     except (struct.error, IndexError):
-        raise Unreadable("it is cut off in its header") from None
+        raise Unreadable("it is truncated in its header") from None
     return claimed
 
 
@@ -64,20 +64,20 @@ def _check_size(claimed: Claimed, length: int) -> None:
 
 
 class Decoded(NamedTuple):
-    """Values (H, W, channels), row 0 on top; integer formats (`integers`) are scaled to [0, 1]."""
+    """Values (H, W, channels), row 0 on top; those of integer formats (`integers`) are scaled to [0, 1]."""
 
     values: NDArray[np.float32]
     integers: bool
 
 
 def decode(path: Path, content: bytes, kind: str) -> Decoded:
-    """The values of a file with that content. Raises Unreadable."""
+    """The values of a file with that content. Raises Unreadable if it is damaged."""
     claimed = check(content, kind)
     if kind == "RGBE":
         return Decoded(_radiance(content, claimed), False)
     mi = engine.load()
     try:
-        # By file instead of a stream of its content: Mitsuba's memory streams read beyond their end.
+        # From the file instead of a stream of its content: Mitsuba's memory streams read beyond their end.
         with file_threads():
             values = np.array(mi.Bitmap(mitsuba_path(path), getattr(mi.Bitmap.FileFormat, kind)))
     except (RuntimeError, ValueError) as error:  # UnicodeDecodeError among them
@@ -120,10 +120,10 @@ def png_chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
     at, kind = 8, b""
     while kind != b"IEND":
         if at + 12 > len(content):
-            raise Unreadable("it is cut off")
+            raise Unreadable("it is truncated")
         length, kind = struct.unpack(">I4s", content[at : at + 8])
         if length > len(content) - at - 12:
-            raise Unreadable("it is cut off")
+            raise Unreadable("it is truncated")
         yield kind, content[at + 8 : at + 8 + length]
         at += 12 + length
 
@@ -138,7 +138,7 @@ def _jpeg(content: bytes) -> Claimed:
             continue
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack(">HH", content[at + 5 : at + 9])
-            # Huffman codes take a bit for a block of 64 pixels at least, 1/16 of what DEFLATE could make of them
+            # Huffman codes take at least one bit per block of 64 pixels, 1/16 of the limit for DEFLATE
             return Claimed(width, height, 16 if marker < 0xC8 else 1)
         at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
     raise Unreadable("its header is damaged")
@@ -149,8 +149,8 @@ _MAX_HEADER = 1 << 16  # bytes
 
 
 def _resolution(content: bytes) -> re.Match[bytes] | None:
-    """The resolution line after the first empty line. Mitsuba uses the first such line anywhere in the file: a file
-    with another one in its header, including one that only Mitsuba accepts, is rejected."""
+    """The resolution line after the first empty line. Mitsuba uses the first such line anywhere in the file, so a file
+    with another one in its header, even one that only Mitsuba would accept, is rejected."""
     empty = content.find(b"\n\n", 0, _MAX_HEADER)
     if empty < 0 or re.search(rb"-Y[^\n]*\+X", content[:empty]):
         return None
@@ -163,7 +163,7 @@ def _rgbe(content: bytes) -> Claimed:
         raise Unreadable("it has no line '-Y height +X width' after its header")
     if b"FORMAT=32-bit_rle_xyze" in content[: resolution.start()]:
         raise Unreadable("its colors are XYZ, which is not supported")
-    # a run of 127 equal bytes takes two
+    # a run of 127 equal bytes takes two bytes
     return Claimed(int(resolution[2]), int(resolution[1]), 1)
 
 
@@ -183,15 +183,15 @@ def _radiance(content: bytes, claimed: Claimed) -> NDArray[np.float32]:
         if np.any(np.all(rgbe[:, :, :3] == 1, axis=2)):  # marks a run of the old style
             raise Unreadable("it has old-style run lengths, which are not supported")
     else:
-        raise Unreadable("it is cut off")
+        raise Unreadable("it is truncated")
     scale = np.ldexp(np.float32(1.0), rgbe[..., 3].astype(np.int32) - (128 + 8))
     scale[rgbe[..., 3] == 0] = 0.0
     return np.multiply(rgbe[..., :3], scale[..., None], dtype=np.float32)
 
 
 def _runs(data: memoryview, width: int, height: int) -> NDArray[np.uint8]:
-    """Run-length coded scanlines of four planes: a count above 128 repeats the next byte, another copies as many
-    bytes."""
+    """Decode run-length coded scanlines of four planes: a count above 128 repeats the next byte, any other copies as
+    many bytes."""
     lines = np.empty((height, 4 * width), np.uint8)
     start = bytes((2, 2, width >> 8, width & 255))
     at = 0
@@ -217,7 +217,7 @@ def _runs(data: memoryview, width: int, height: int) -> NDArray[np.uint8]:
                         at += 1 + count
                     filled += count
     except (IndexError, ValueError) as error:
-        raise error if isinstance(error, Unreadable) else Unreadable("it is cut off") from None
+        raise error if isinstance(error, Unreadable) else Unreadable("it is truncated") from None
     return lines.reshape(height, 4, width).transpose(0, 2, 1)
 
 

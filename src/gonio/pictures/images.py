@@ -1,8 +1,8 @@
 """Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written completely or not at all.
 
-A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. A PNG holds a screen's values: times
-2^exposure, clamped, sRGB-encoded, 8 bit. The settings are stored in EXR attributes, PNG text chunks, comment lines
-of the Radiance header, or an array named `metadata` in an .npz.
+A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. A PNG holds a screen's values: multiplied by
+2^exposure, clamped, sRGB-encoded, 8 bits. The settings are stored in EXR attributes, PNG text chunks, comment lines of
+the Radiance header, or an array named `metadata` in an .npz.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Number = TypeVar("Number", bound=np.generic)
 Metadata = Mapping[str, Value]
 
 SUFFIXES = PICTURE_SUFFIXES
-_PREFIX = "gonio."  # distinguishes Gonio's attributes from the format's own
+_PREFIX = "gonio."  # distinguishes Gonio's attributes from those of the format
 
 _KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
 
@@ -53,13 +53,13 @@ class Picture:
 
 
 def check_writable(path: str | Path) -> Path:
-    """The file `path` will become (links followed), or an InputError before hours are spent on it."""
+    """The file to be written, with links followed. Raises InputError for an invalid path, before hours are spent."""
     _suffix(path)
     return files.check_file(path)
 
 
 def _suffix(path: str | Path) -> str:
-    """The suffix of a picture's file, in lower case. Raises InputError for one that no picture has."""
+    """The suffix of a picture's file, in lower case. Raises InputError for an unknown one."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
@@ -71,9 +71,9 @@ def _suffix(path: str | Path) -> str:
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format of its suffix, completely or not at all.
 
-    exposure  stops; PNG only, since the other formats keep radiance as it is
-    Raises InputError for what is no picture, or no picture's name; InputError or MachineError where it cannot be
-    written, which says where the picture is instead.
+    exposure  stops; PNG only, since the other formats store radiance unchanged
+    Raises InputError for an invalid picture or file name. If the file cannot be written, raises InputError or
+    MachineError, which names the file in which the picture was saved instead.
     """
     suffix = _suffix(path)
     if np.iscomplexobj(pixels):
@@ -81,11 +81,11 @@ def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, expos
     picture = np.ascontiguousarray(pixels, dtype=np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
-    # Names of files are bytes on some systems; no format can hold those that are no text.
+    # File names are bytes on some systems; no format can store those that are not valid text.
     settings = {key: encodable(value) if isinstance(value, str) else value for key, value in (metadata or {}).items()}
     try:
         content = _encoded(suffix, picture, settings, exposure)
-    except Exception as error:  # whatever a library says: the picture must not be lost
+    except Exception as error:  # whatever a library raises: the picture must not be lost
         array = _npz_bytes(picture, {})
         rescued = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
         hint = "nothing was written" if rescued is None else f"it is kept as {rescued}: `gonio convert` reads that"
@@ -104,7 +104,7 @@ def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> 
 
 
 class Shown(NamedTuple):
-    """How a picture was written: the stops of a .png, None for other formats; and a notice for the user, or ""."""
+    """How a picture was written: exposure of a .png in stops, None for other formats; a notice for the user, or ""."""
 
     exposure: float | None
     notice: str
@@ -113,7 +113,7 @@ class Shown(NamedTuple):
 def write_exposed(
     path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0
 ) -> Shown:
-    """Write a picture as `write` does, with an exposure that may be "auto"; the notice says what a screen clips."""
+    """Write a picture as `write` does, with an exposure that may be "auto"; a notice reports clipping."""
     if Path(path).suffix.lower() != ".png":
         write(path, pixels, metadata)
         notice = f"{Path(path).suffix} stores radiance: --exposure applies to .png"
@@ -124,7 +124,7 @@ def write_exposed(
 
 
 def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:
-    """Write a picture in the format of the suffix, with its settings; a .png at `exposure`, in stops.
+    """Write a picture, with its settings, in the format of the output's suffix; a .png at `exposure`, in stops.
 
     A .png as source is decoded from sRGB; clipped values stay clipped. Raises InputError as `read` and `write` do.
     """
@@ -135,7 +135,7 @@ def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure
 
 
 def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:
-    """Convert linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
+    """Convert linear radiance to 8-bit screen values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
     x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
     return (encoded * 255 + 0.5).astype(np.uint8)
@@ -147,11 +147,11 @@ def from_screen(values: NDArray[np.floating]) -> RGB:
 
 
 def png_bytes(values: NDArray[np.uint8] | NDArray[np.uint16], metadata: Metadata | None = None) -> bytes:
-    """An RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks; of 16 bits where they are uint16."""
+    """An RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks; 16 bits per channel if the values are uint16."""
     height, width = values.shape[:2]
     bits = 8 * values.dtype.itemsize
     rows = np.frombuffer(values.astype(f">u{bits // 8}").tobytes(), np.uint8).reshape(height, -1)
-    # Filter 2 (difference to the row above, modulo 256) halves the size of smooth pictures.
+    # Filter 2 (difference from the row above, modulo 256) halves the size of smooth pictures.
     difference = np.diff(rows, axis=0, prepend=np.uint8(0))
     filtered = np.concatenate([np.full((height, 1), 2, np.uint8), difference], axis=1)
 
@@ -167,7 +167,7 @@ def png_bytes(values: NDArray[np.uint8] | NDArray[np.uint16], metadata: Metadata
         [
             b"\x89PNG\r\n\x1a\n",
             chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)),
-            *([chunk(b"sRGB", b"\0")] if bits == 8 else []),  # 16 bits hold what a camera measured
+            *([chunk(b"sRGB", b"\0")] if bits == 8 else []),  # 16-bit pictures hold values measured by a camera
             *(text(_PREFIX + key, _one_line(value)) for key, value in (metadata or {}).items()),
             chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
             chunk(b"IEND", b""),
@@ -215,9 +215,9 @@ ENCODINGS = ("srgb", "linear")
 def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 
-    encoding  of a .png: "srgb" for pictures, or "linear" for data such as a table, read as stored
+    encoding  encoding of a .png: "srgb" for pictures, or "linear" for data such as a table, read as stored
     An .npz holds `radiance` (or one array only). Gray pictures get three equal channels.
-    Raises InputError for a file that is missing, empty, damaged, of another format, or claims more pixels than its
+    Raises InputError for a file that is missing, empty, damaged, of another format, or that claims more pixels than its
     bytes can hold.
     """
     if encoding not in ENCODINGS:
@@ -286,7 +286,7 @@ def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
 
 
 def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
-    """The texts and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
+    """The strings and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
     numbers = {"int": "<i", "float": "<f", "double": "<d"}
     for name, kind, value in openexr.attributes_of(content):
         if kind == "string":

@@ -1,9 +1,9 @@
 """Differences between two pictures: RMSE, relMSE, mean ratio, and FLIP.
 
-All take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP predicts the
-differences that a person sees when flipping between the two: contrast sensitivity of the eye, color distance, edges
-and points, each after [Andersson2020]; for pictures of high dynamic range after [Andersson2021], the largest over the
-exposures at which the reference can be shown.
+All metrics take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP predicts
+the differences that a person sees when flipping between the two: contrast sensitivity of the eye, color distance, edges
+and points, each as in [Andersson2020]; for pictures of high dynamic range, as in [Andersson2021], the largest value
+over the exposures at which the reference can be shown.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..errors import InputError, did_you_mean
 
 Floats = NDArray[np.floating]
 
-# The assumed desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m [Andersson2020, section 6].
+# The assumed display: a monitor with 3840 pixels in 0.7 m, viewed from 0.7 m [Andersson2020, section 6].
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
 
-# relMSE divides by r^2 + this, so that a black reference pixel does not dominate the mean; with radiances near
-# one, it limits the weight of a pixel to 100.
+# relMSE divides by r^2 plus this, so that a black reference pixel does not dominate the mean; it limits the weight of a
+# squared difference to 100.
 RELATIVE_FLOOR = 0.01
 
 
@@ -43,7 +43,7 @@ READ_AS = {
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The metric and the largest value that passes; None lets any value pass."""
+    """The metric and the largest value that passes; with None, any value passes."""
 
     metric: str = "relmse"
     most: float | None = None
@@ -57,8 +57,8 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of `gonio compare`; `exposures` are the stops that HDR-FLIP spans, None for LDR; `encoding` is how
-    .png files were read, None if there were none."""
+    """The results of `gonio compare`; `exposures` are the first and last stop of HDR-FLIP, None for LDR; `encoding` is
+    how .png files were read, None if there were none."""
 
     rmse: float
     relmse: float
@@ -80,7 +80,7 @@ class Comparison:
         return {**asdict(self), **judged}
 
     def rows(self) -> dict[str, str]:
-        """The figures as text, by name."""
+        """The results as text, by name."""
         kind = "LDR" if self.exposures is None else "HDR, {:+.1f} to {:+.1f} EV".format(*self.exposures)
         rows = {
             "RMSE": f"{self.rmse:.6g}",
@@ -141,7 +141,7 @@ def mean_ratio(test: Floats, reference: Floats) -> float:
 
 
 def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()) -> Comparison:
-    """All metrics; `hdr` False compares both pictures as shown on a screen, clamped to [0, 1]."""
+    """All metrics; with `hdr` False, FLIP compares the pictures as shown on a screen, clamped to [0, 1]."""
     _pair(test, reference)
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
@@ -155,8 +155,9 @@ def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolera
 
 
 # --- FLIP ------------------------------------------------------------------------------------------------
-# Not NVIDIA's wheel `flip-evaluator`, whose version 1.7 supports neither Python 3.14 nor Linux on ARM. Both agree: over
-# the 16 pictures of examples/, with 20 % of noise, the means differ by at most 7e-6 and pixels by 4e-5 (it is float32).
+# NVIDIA's wheel `flip-evaluator` is not used, since version 1.7 supports neither Python 3.14 nor Linux on ARM. The two
+# agree: for the 16 pictures of examples/, with 20 % noise, the means differ by at most 7e-6 and pixels by 4e-5 (the
+# wheel computes in float32).
 
 _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Andersson2020]
     [
@@ -185,10 +186,10 @@ _SENSITIVITY = (
 def flip_map(test: Floats, reference: Floats, hdr: bool = True, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Floats:
     """FLIP per pixel, (H, W), 0 to 1.
 
-    With `hdr` False both pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True
-    both are tone mapped (ACES) at several exposures, and every pixel gets its largest value [Andersson2021, eq. 6];
-    the exposures depend on the reference alone (see `exposure_range`).
-    Not symmetric in HDR: swapping the pictures changes the exposures.
+    With `hdr` False, the pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True, they are
+    tone mapped (ACES) at several exposures, and every pixel gets its largest value [Andersson2021, eq. 6]; the
+    exposures depend on the reference alone (see `exposure_range`).
+    HDR-FLIP is not symmetric: swapping the pictures changes the exposures.
     """
     a, b = _pair(test, reference)
     if not hdr:
@@ -219,7 +220,7 @@ def exposure_range(reference: Floats) -> tuple[float, float]:
     luminance = np.maximum(np.asarray(reference, np.float64), 0) @ _XYZ_FROM_RGB[1]
     if luminance.max() <= 0:
         return 0.0, 0.0  # a black reference is compared at exposure 0
-    # A picture with a black median would need unlimited stops: 2^-23 of the peak is below float32's resolution.
+    # A black median would need infinitely many stops; 2^-23 of the peak is at the limit of float32's resolution.
     median = max(float(np.median(luminance)), float(luminance.max()) * 2.0**-23)
     return math.log2(x_max / luminance.max()), math.log2(x_max / median)
 
@@ -245,7 +246,7 @@ def _from_opponent(ycc: Floats) -> Floats:
 
 
 def _hunt_lab(rgb: Floats) -> Floats:
-    """L*a*b* with the Hunt adjustment: brighter colors appear more saturated, a and b scale by 0.01 L."""
+    """L*a*b* with the Hunt adjustment: a and b are multiplied by 0.01 L, as brighter colors appear more saturated."""
     t = rgb @ _XYZ_FROM_RGB.T / _WHITE
     delta = 6 / 29
     x, y, z = np.moveaxis(np.where(t > delta**3, np.cbrt(t), t / (3 * delta**2) + 4 / 29), -1, 0)
@@ -276,7 +277,7 @@ def _color_distance(test: Floats, reference: Floats, pixels_per_degree: float) -
 
 
 def _contrast_filter(channel: Floats, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float) -> Floats:
-    """The eye's blur, a normalized sum of two separable Gaussians."""
+    """A channel blurred as by the eye, with a normalized sum of two separable Gaussians."""
     widest = max(b for row in _SENSITIVITY for b in (row[1], row[3]))
     radius = math.ceil(3 * math.sqrt(widest / (2 * math.pi**2)) * pixels_per_degree)
     x = np.arange(-radius, radius + 1) / pixels_per_degree
@@ -292,7 +293,7 @@ def _contrast_filter(channel: Floats, a1: float, b1: float, a2: float, b2: float
 
 
 def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
-    """The larger of the edge and the point difference [Andersson2020, eq. 4]."""
+    """The larger of the edge difference and the point difference [Andersson2020, eq. 4]."""
     sigma = 0.5 * _FEATURE_WIDTH * pixels_per_degree
     radius = math.ceil(3 * sigma)
     x = np.arange(-radius, radius + 1, dtype=np.float64)
@@ -311,7 +312,7 @@ def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float)
 
 
 def _filtered(channel: Floats, down: Floats, right: Floats) -> Floats:
-    """Correlate with the outer product of a column and a row filter; border pixels are repeated outward.
+    """Correlate with the outer product of a column filter and a row filter; border pixels are repeated outward.
 
     Correlation and convolution differ by a reflection; only the edge detector is odd, and only its absolute value
     is used.

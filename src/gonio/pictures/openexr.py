@@ -1,6 +1,7 @@
 """The layout of untrusted OpenEXR files: header, table of offsets, and blocks ("OpenEXR File Layout", openexr.com).
 
-The library allocates what a file states before it has read it, so all of it is compared with the file's length.
+The library allocates the sizes that a file states before it has read the data, so all of them are compared with the
+file's length.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
-MAX_CHANNELS = 1024  # some files have one per object
+MAX_CHANNELS = 1024  # some files have one channel per object
 
 
 class Unreadable(ValueError):
@@ -19,7 +20,7 @@ class Unreadable(ValueError):
 
 
 class Claimed(NamedTuple):
-    """Claims of a header: pixels, and the smallest number of uncompressed bits per pixel."""
+    """The claims of a header: size in pixels, and the smallest number of uncompressed bits per pixel."""
 
     width: int
     height: int
@@ -56,8 +57,8 @@ def claimed(content: bytes) -> Claimed:
     return Claimed(width, height, bits)
 
 
-# Sizes of attribute types in bytes (OpenEXR, "File layout"). The library reads that many whatever size the file states,
-# and interprets the misaligned rest as names and sizes of blocks to allocate.
+# Sizes of attribute types in bytes (OpenEXR, "File layout"). The library reads that many, whatever size the file
+# states, and would then interpret misaligned data as names and sizes of blocks to allocate.
 _EXR_BYTES = {
     kind: size
     for size, kinds in {
@@ -80,7 +81,7 @@ _EXR_BYTES = {
 
 
 def attributes_of(content: bytes) -> Iterator[tuple[str, str, bytes]]:
-    """Name, type and value of each attribute of an OpenEXR file's (first) header. Raises Unreadable."""
+    """Name, type and value of each attribute in the (first) header of an OpenEXR file. Raises Unreadable."""
     version = _version(content)
     if version & ~0x1EFF:
         raise Unreadable(f"it is of an unknown version of OpenEXR, {version:#x}")
@@ -98,7 +99,7 @@ def _version(content: bytes) -> int:
 
 
 def _header(content: bytes, at: int) -> Iterator[tuple[str, str, bytes, int]]:
-    """Name, type and value of each attribute from `at` on, and where the next one begins."""
+    """Name, type and value of each attribute from `at` on, and the position of the next."""
     while content[at]:
         texts = []
         for _ in range(2):  # name and type
@@ -121,15 +122,15 @@ def _header(content: bytes, at: int) -> Iterator[tuple[str, str, bytes, int]]:
 
 # ---------------------------------------------------------------------- blocks
 
-_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # in a block, by compression
-MIN_BLOCK = 1 << 19  # pixels that a block may have in a picture of any size: the library holds a dozen of them
+_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # lines in a block, by compression
+MIN_BLOCK = 1 << 19  # pixels that a block may have whatever the picture's size; the library holds a dozen blocks
 
 
 def check_blocks(content: bytes) -> None:
-    """Raise Unreadable where a table of offsets, or the size that a block states, exceeds the file."""
+    """Raise Unreadable if a table of offsets, or the size that a block states, exceeds the file."""
     version, at = _version(content), 8
     several = bool(version & 0x1000)
-    parts: list[dict[str, bytes]] = []  # the attributes of each
+    parts: list[dict[str, bytes]] = []  # attributes of each part
     while not parts or (several and content[at]):
         entries = list(_header(content, at))
         parts.append({name: value for name, _, value, _ in entries})
@@ -139,7 +140,7 @@ def check_blocks(content: bytes) -> None:
         tiled = "tiles" in attributes if several else bool(version & 0x200)
         count = _tiles(attributes) if tiled else _line_blocks(attributes)
         if count > (len(content) - at) // 8:
-            raise Unreadable("it is cut off in its table of blocks")
+            raise Unreadable("it is truncated in its table of blocks")
         before = (4 if several else 0) + (16 if tiled else 4)  # the part and the place of a block
         offsets = struct.unpack(f"<{count}Q", content[at : at + 8 * count])
         at += 8 * count
@@ -148,7 +149,7 @@ def check_blocks(content: bytes) -> None:
             if not at <= offset <= len(content) - before - 4:
                 raise Unreadable("its table of blocks is damaged")
             if not 0 <= struct.unpack("<i", content[start - 4 : start])[0] <= len(content) - start:
-                raise Unreadable("it is cut off, or states a block that is longer than the file")
+                raise Unreadable("it is truncated, or states a block that is longer than the file")
 
 
 def _window(attributes: dict[str, bytes]) -> tuple[int, int]:
@@ -185,6 +186,6 @@ def _tiles(attributes: dict[str, bytes]) -> int:
     elif kind == 1:  # a pyramid
         both = levels(max(width, height))
         pairs = list(zip(sides(width, both), sides(height, both), strict=True))
-    else:  # every level along with every one across
+    else:  # every vertical level with every horizontal level
         pairs = list(product(sides(width, levels(width)), sides(height, levels(height))))
     return sum(-(-w // across) * -(-h // along) for w, h in pairs)

@@ -1,4 +1,4 @@
-"""Checks of the files that a Mitsuba scene refers to: pictures, meshes and volumes that Mitsuba opens by itself."""
+"""Checks of the files that a Mitsuba scene refers to: pictures, meshes and volumes that Mitsuba opens itself."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_BYTES = 1 << 30  # of a file
 
 
 def check_file(path: Path) -> None:
-    """Raise Unreadable for a damaged file of a known kind that Mitsuba will open by itself."""
+    """Raise Unreadable for a damaged file of a known kind that Mitsuba will open itself."""
     if path.stat().st_size > MAX_BYTES:
         raise Unreadable(f"it is larger than {MAX_BYTES >> 20} MiB")
     mitsuba_path(path)
@@ -29,7 +29,7 @@ def check_file(path: Path) -> None:
                 try:
                     checked(content)
                 except (struct.error, IndexError):
-                    raise Unreadable("it is cut off in its header") from None
+                    raise Unreadable("it is truncated in its header") from None
         return
     if kind in ("RGBE", "OpenEXR"):  # while a scene is loaded, an unreadable EXR may end the process
         decode(path, content, kind)
@@ -71,7 +71,7 @@ def _tga(content: bytes) -> None:
     _fits(content, 18 + text, width * height * depth // 8)
 
 
-# Flags of a serialized mesh: numbers per vertex of each optional attribute; and that numbers have 64 bits
+# Flags of a serialized mesh: numbers per vertex for each optional attribute, and whether numbers have 64 bits
 _ATTRIBUTES = {0x1: 3, 0x2: 2, 0x8: 3}
 _DOUBLE = 0x2000
 _MAX_NAME = 1 << 16
@@ -79,7 +79,7 @@ _CHUNK = 1 << 20
 
 
 def _serialized(content: bytes) -> None:
-    """Mitsuba's own meshes: each an uncompressed header and a zlib stream; their offsets are at the end of the file."""
+    """Mitsuba's serialized meshes: an uncompressed header and a zlib stream each, with their offsets at the end."""
     version = struct.unpack_from("<H", content, 2)[0]
     if version not in (3, 4):
         raise Unreadable(f"it is of version {version}, 3 or 4 expected")
@@ -118,7 +118,7 @@ def _serialized_mesh(packed: bytes, named: bool) -> None:
 
 
 class _Inflated:
-    """A zlib stream decompressed piece by piece, so that memory is not allocated for false claims."""
+    """A zlib stream that is decompressed piece by piece, so that no memory is allocated for false claims."""
 
     def __init__(self, packed: bytes) -> None:
         self.zlib, self.packed, self.ready = zlib.decompressobj(), packed, b""

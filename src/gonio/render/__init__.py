@@ -29,14 +29,14 @@ def render(
     gradient: Sequence[str] = (),
     **options: Unpack[RenderKeywords],
 ) -> RGB:
-    """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
+    """Render a scene, or a material on a ball, to a (height, width, 3) float32 picture: linear radiance, row 0 on top.
 
         picture = go.render("examples/phong", spp=64, overrides={"shapes.1.material.p": 16})
         picture = go.render("gold.json")        # the result of a fit, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
     scene          a scene's folder or .json, a Mitsuba .xml, or a material, as `go.material` takes it, which is shown
-                   on a ball; an option below that is None takes the scene's value
+                   on a ball; an option below that is None has the scene's value
     output         file to write: .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
@@ -48,19 +48,20 @@ def render(
     spectral       trace wavelengths instead of red, green and blue: glass disperses, and lamps have their spectra
     threads        CPU cores to use; None uses all
     timeout        seconds after which the render stops and returns the picture so far
-    denoise        run Open Image Denoise over the result
-    exposure       brightness of a .png in stops; "auto" chooses it by the picture's luminance
+    denoise        denoise the result with Open Image Denoise
+    exposure       brightness of a .png in stops; "auto" chooses it from the picture's luminance
     allow_outside  allow the scene to read files outside its folder
     allow_code     allow the scene to run materials in Python files, "ward.py:Ward", and native Mitsuba plugins in its
                    folder `plugins`
     overrides      values by their paths in the scene, as in `gonio study`; a value may be a material
     checkpoint     file for the sums so far, written every few seconds; if it exists, the render continues from it, with
-                   bit-identical results. None writes it beside the output if the render takes more than a minute
+                   bit-identical results. None writes one next to the output if the render takes more than a minute
     until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
-                   pixel (65,536 if None); warns if they did not suffice
-    gradient       paths of numbers and colors of materials; the result is the picture and its derivative by each,
-                   (1 + paths, height, width, 3). "....albedo.r" is one channel of a color. Equal materials are one
-    Warns (GonioWarning) of suspicious scenes, of a .png that clips, and when it continues from a checkpoint.
+                   pixel (65,536 if None); warns if these do not suffice
+    gradient       paths of numbers and colors of materials; the result is the picture and its derivative with respect
+                   to each, (1 + paths, height, width, 3). "....albedo.r" is one channel of a color. Shapes with equal
+                   materials are differentiated together
+    Warns (GonioWarning) about suspicious scenes, about a .png that clips, and when it continues from a checkpoint.
     Raises InputError, MachineError.
     """
     from .request import Request
@@ -85,7 +86,7 @@ def _path(named: str | Path | None) -> Path | None:
 
 
 def _shown(scene: MaterialLike, allow_code: bool) -> tuple[Path, BSDF | None]:
-    """The path of a scene and None, or a material's name and the material, which may be given as text."""
+    """(path of a scene, None), or (name of a material, the material), which may be given as text."""
     from ..catalog import notation, operands
     from ..catalog.material import material
 
@@ -113,8 +114,8 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None writes the output of the original request, if it named one: at its place if that
-                lies in the checkpoint's folder, else under its name beside the checkpoint, with a warning
+    output      file to write; None writes the output of the original request, if it named one: to that file if it lies
+                in the checkpoint's folder, else to a file of that name next to the checkpoint, with a warning
     spp         samples per pixel in all; None uses those of the original request
     allow_code  allow the scene to run the Python files that it names
     Raises InputError if the checkpoint is damaged or if anything that the picture depends on has changed.

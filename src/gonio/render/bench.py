@@ -2,7 +2,8 @@
 
     gonio doctor --bench
 
-Both are timed alternately, so that other load affects both alike; the best of several rounds counts, after compilation.
+The two are timed alternately, so that other load affects them equally. The result is the best of several rounds after
+compilation.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from types import ModuleType
 from ..bridge import engine
 from ..bridge.types import BSDFPlugin, PluginDict, Scene
 
-LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU finishes a million before Python launches the next kernel
+LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU would finish a million before Python launches the next kernel
 SIZE, SPP = {"llvm": 256, "cuda": 1024}, 16
 ROUNDS = 5
 _ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at three wavelengths, as in benchmarks
@@ -23,7 +24,7 @@ _ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at t
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table: millions per second by Gonio and by Mitsuba; `gonio` is 0 for a task of Mitsuba alone."""
+    """A row of the table: millions per second of Gonio and of Mitsuba; `gonio` is 0 if only Mitsuba has the task."""
 
     what: str
     gonio: float
@@ -98,7 +99,7 @@ def _best(dr: ModuleType, count: int, *tasks: Callable[[], None]) -> list[float]
 
 
 def _scene(mi: ModuleType, bsdf: str, size: int) -> Scene:
-    """A golden ball on a gray floor under a square lamp."""
+    """A gold ball on a gray floor under a square lamp."""
     to = mi.ScalarTransform4f
     gold: PluginDict = {"type": bsdf, "alpha": 0.2}
     gold |= {name: {"type": "rgb", "value": value} for name, value in (("eta", _ETA), ("k", _K))}

@@ -1,8 +1,9 @@
 """Checkpoints of a render: the sums so far, and hashes of everything else that the picture depends on.
 
 A render that continues from a checkpoint is bit-identical to an uninterrupted one, since samples are summed in the same
-order. This holds only if nothing else has changed. The file therefore contains hashes of the scene, of every
-file that it names, of the settings, of Gonio's own code, and the processor or GPU; an error names whatever has changed.
+order. This holds only if nothing else has changed. The file therefore contains hashes of the scene, of every file that
+it names, of the settings and of Gonio's own code, and the name of the processor or GPU; an error names whatever has
+changed.
 """
 
 from __future__ import annotations
@@ -28,19 +29,19 @@ from .prepare import Prepared
 from .request import MAX_COUNT, Request
 from .request_json import STRICT, described, request_of, validated
 
-INTERVAL = 3.0  # seconds between checkpoints: together with a pass and the writing, less than 5 s of work can be lost
+INTERVAL = 3.0  # seconds between checkpoints; including a pass and the writing, less than 5 s of work can be lost
 MAX_COST = 0.015  # fraction of the time; if writing costs more, checkpoints are written less often
-LONG_JOB = 60.0  # seconds that a job must take before an automatic checkpoint is written
-SUFFIX = ".checkpoint"  # of an automatic checkpoint, appended to the picture's name
+LONG_JOB = 60.0  # seconds that a job must be expected to take before an automatic checkpoint is written
+SUFFIX = ".checkpoint"  # suffix of an automatic checkpoint, appended to the picture's name
 KIND = "render"
 
 
 def load(path: Path) -> kept.Kept:
-    """The checkpoint in a file, or the previous one if it is damaged. Raises InputError if there is none, and for facts
-    that do not describe a render."""
+    """The checkpoint in a file, or the previous one if that is damaged. Raises InputError if there is none, or if it is
+    not a checkpoint of a render."""
     saved = kept.read(path)
     if saved.facts.get("kind") != KIND:
-        raise InputError("this is no checkpoint of a render", str(path), "give one that `gonio render` has written")
+        raise InputError("this is not a checkpoint of a render", str(path), "give one that `gonio render` has written")
     validated(_Facts, saved.facts, str(path))
     return saved
 
@@ -71,7 +72,7 @@ class Keeper:
     """Writes checkpoints during a render, in a separate thread.
 
     path       the file; None writes nothing
-    temporary  the checkpoint is automatic: it is written only once the job is expected to take more than `LONG_JOB`
+    temporary  whether the checkpoint is automatic: written only once the job is expected to take more than `LONG_JOB`
                seconds, and removed after the picture has been written
     long       seconds to use instead of `LONG_JOB`
     """
@@ -122,7 +123,7 @@ class Keeper:
         self._begin()
 
     def end(self, stopped: bool) -> None:
-        """Write a last checkpoint, so that the render can be continued later or to more samples."""
+        """Write a last checkpoint, so that the render can be continued later, or to more samples."""
         self.close()
         if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
             self._begin()
@@ -169,7 +170,7 @@ class Keeper:
         except GonioError as error:
             self.error = error
         except OSError as error:
-            self.error = InputError(f"no checkpoint: {error.strerror or error}", str(self.path))
+            self.error = InputError(f"the checkpoint cannot be written: {error.strerror or error}", str(self.path))
         self._cost = before + (time.thread_time() - began) / (os.cpu_count() or 1)
 
 
@@ -180,9 +181,9 @@ def default_path(output: Path) -> Path:
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
     """Continue from a checkpoint that an earlier run of the same render left. Returns a notice, and whether the
-    checkpoint is an automatic one.
+    checkpoint is automatic.
 
-    temporary  no checkpoint was requested: one that does not fit is removed, and the notice says so
+    temporary  whether no checkpoint was requested; one that does not fit is then removed, with a notice
     """
     if not kept.exists(path):
         return "", temporary
@@ -191,7 +192,7 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
         check(saved.facts, prepared.sources.identity(), str(path))
         done = int(saved.facts["done"])
         if done > prepared.spp:
-            what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are asked for"
+            what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are requested"
             raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
         restore(prepared.render, saved, str(path))
     except InputError as error:
@@ -199,18 +200,18 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
             raise
         kept.remove(path)
         return f"{path} is not used, and removed: {error.what}", temporary
-    text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
+    text = f"continues from {path}: {done} of {prepared.spp} samples per pixel are done"
     if "lanes" in saved.arrays:
         share = float(np.mean(saved.arrays["lanes"] >= prepared.spp))
-        text = f"goes on from {path}: {share:.0%} of the pixels are done"
+        text = f"continues from {path}: {share:.0%} of the pixels are done"
     return text, temporary or bool(saved.facts.get("temporary"))
 
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
-    """The request of a checkpoint with the options of `gonio resume` (output, spp, timeout, threads), and a notice of
-    where its picture is written.
+    """The request of a checkpoint with the options of `gonio resume` (output, spp, timeout, threads), and a notice
+    about where its picture is written.
 
-    writes  the picture will be written, under the scene's name for it if the original request named no output
+    writes  whether the picture will be written, to the file that the scene names if the original request named none
     """
     saved = load(path)
     if saved.facts["request"] is None:
@@ -233,7 +234,7 @@ def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = Fa
 
 def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
     """Where the picture of an untrusted checkpoint is written: the file that it names if that lies in the checkpoint's
-    folder, else one of that name beside the checkpoint; and a notice of that."""
+    folder, else one of that name next to the checkpoint, with a notice about it."""
     folder = checkpoint.absolute().parent
     try:
         inside = output.resolve().is_relative_to(folder.resolve())
@@ -244,5 +245,5 @@ def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
         placed = folder / (output.name or "picture.exr")
         notice = f"the picture goes to {placed}: the checkpoint names {output}, outside its folder; -o writes it there"
     if placed.absolute() in (checkpoint.absolute(), default_path(checkpoint.absolute())):
-        raise InputError("the checkpoint itself has the picture's name", str(checkpoint), "name another file with -o")
+        raise InputError("the checkpoint has the picture's name", str(checkpoint), "name another file with -o")
     return placed, notice

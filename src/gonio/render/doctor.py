@@ -1,7 +1,7 @@
 """The rendering software of this machine: what is installed, what is missing, and how to install it.
 
-Dr.Jit aborts the whole process if an LLVM or a driver is incompatible, so that no error can be reported.
-Therefore every trial runs in a separate process.
+If an LLVM or a driver is incompatible, Dr.Jit aborts the whole process, and no error can be reported. Therefore every
+trial runs in a separate process.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..pictures import denoise
 from ..spirv.compiler import INSTALL
 from ..spirv.compiler import compiler as shader_compiler
 
-# Traces rays by Embree or OptiX, evaluates a Gonio material and compiles a kernel: all that a render needs.
+# Traces rays with Embree or OptiX, evaluates a Gonio material and compiles a kernel: all that a render needs.
 _TRIAL = """
 from gonio.bridge import engine
 mi = engine.load({device!r})
@@ -53,7 +53,7 @@ class Report:
     """All findings, the outcome of the trial on each device, and whether this machine can render at all."""
 
     findings: tuple[Finding, ...]
-    devices: dict[str, str]  # device -> "" where it works, else what went wrong
+    devices: dict[str, str]  # device -> "" if it works, otherwise the problem
 
     @property
     def can_render(self) -> bool:
@@ -69,7 +69,7 @@ class Report:
 
 
 def examine() -> Report:
-    """Examine everything; takes a few seconds, most of them in the trials."""
+    """Examine the machine; takes a few seconds, most of them in the trials."""
     findings = [
         Finding("ok", "Gonio", f"{__version__}, Python {platform.python_version()}, {platform.platform(terse=True)}"),
         _package("mitsuba", "Mitsuba", "pip install mitsuba"),

@@ -1,4 +1,4 @@
-"""Running a prepared render to its sample count, in this process or on workers, with checkpoints."""
+"""Running a prepared render up to its sample count, in this process or on workers, with checkpoints."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def execute(
 ) -> tuple[str, Keeper]:
     """Advance a render to its sample count, continuing an earlier run if there is a checkpoint.
 
-    Returns the reason for the end, as `run` does, and the keeper of the checkpoints, whose `remove` is to be called
-    when the picture has been written.
+    Returns why it ended, as `run` does, and the writer of the checkpoints, whose `remove` is to be called after the
+    picture has been written.
 
     temporary  path of an automatic checkpoint, used for long jobs whose request names none
-    long       seconds from which a job counts as long; a minute if None
-    tell       called at the start with a notice if a checkpoint was found
+    long       seconds above which a job counts as long; a minute if None
+    tell       called at the start with a notice if there is a checkpoint
     """
     from . import tiles
 
@@ -85,15 +85,15 @@ def execute(
 
 
 def _goal(prepared: Prepared) -> int | Callable[[], int]:
-    """Samples per pixel to reach: a number, or for a render until an error a function that knows it by then."""
+    """Samples per pixel to reach: a number, or, for a render until an error, a function that returns it."""
     from ..transport import until
 
     render = prepared.render
     if not isinstance(render, until.Until):
         return prepared.spp
     if executor.current().remote:
-        what = "workers render parts of a picture, and its error is that of the whole"
-        raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
+        what = "workers render parts of a picture, but the error is that of the whole picture"
+        raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp instead")
     return lambda: render.goal
 
 
@@ -116,7 +116,7 @@ def execute_all(
     interrupted: Callable[[], object] = lambda: False,
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
-    """Run several renders at once by the current executor; `finished` is called with the index of each that is done."""
+    """Run several renders at once on the current executor; `finished` is called with the index of each that is done."""
     from ..transport import integrators
     from . import tiles
 

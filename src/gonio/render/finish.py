@@ -26,11 +26,11 @@ class Result:
     """The result of a render.
 
     spp         samples per pixel that were rendered
-    stopped     "", "interrupt" or "timeout"
+    stopped     why it ended early, "interrupt" or "timeout"; "" if it did not
     exposure    exposure of a .png, in stops
     error       estimated relMSE of the picture, if it was rendered until an error was reached
-    signal      number of the signal that interrupted it, 0 if none did
-    checkpoint  file from which it can be continued, None if there is none
+    signal      number of the signal that interrupted it; 0 if none did
+    checkpoint  file from which it can be continued; None if there is none
     """
 
     output: Path
@@ -52,7 +52,7 @@ class Result:
 
 
 def estimated(prepared: Prepared) -> tuple[float | None, str]:
-    """The estimated relMSE of a picture rendered until an error is reached; a warning if it is too large."""
+    """(estimated relMSE of a picture rendered until an error is reached, a warning if it is too large)."""
     wanted = prepared.request.until_error
     if wanted is None:
         return None, ""
@@ -62,7 +62,7 @@ def estimated(prepared: Prepared) -> tuple[float | None, str]:
     if not math.isfinite(error):
         return None, "too few samples to estimate the relMSE"
     done = f"{prepared.render.done} samples per pixel"
-    return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
+    return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was requested"
 
 
 @exclusive
@@ -79,7 +79,7 @@ def render_to_file(
     tell    called at the start with a notice if an earlier run left a checkpoint
     """
     started = time.perf_counter()
-    with Interrupts(notice) as interrupts:  # before the imports: one that is interrupted can crash
+    with Interrupts(notice) as interrupts:  # before the imports, since an interrupted import can crash
         prepared = prepare(request, writes=True)
         interrupts.check()
         checkpoint = checkpoints.default_path(prepared.output)

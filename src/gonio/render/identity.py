@@ -1,4 +1,4 @@
-"""The inputs of a picture, whose hashes let a checkpoint detect any change."""
+"""The inputs of a picture, whose hashes let a checkpoint detect changes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Sources:
     """The inputs of a picture.
 
     text     returns the scene as it is rendered, including overrides, as text; slow for large scenes
-    files    the files that the scene names, by those names
+    files    the files that the scene uses, by their names in the scene
     how      integrator, sampler, seed and all other settings
     version  versions of Gonio, Mitsuba and Dr.Jit
     device   processor or GPU, and its compiler
@@ -55,7 +55,7 @@ def _device(mi: ModuleType) -> str:
 
 
 def check(saved: Facts, identity: Mapping[str, str], where: str) -> None:
-    """Raise InputError that names the first input that has changed."""
+    """Raise an InputError that names the first input that has changed."""
     before = saved.get("identity")
     before = before if isinstance(before, dict) else {}
     for name in [*identity, *before]:

@@ -1,8 +1,8 @@
 """The options of a render, shared by requests, `go.render`, `go.study` and the command line.
 
-`RenderOptions` declares them, with their help texts. `RenderKeywords` repeats their types for type checkers of
-`**options`, since Python cannot derive them from a class. This module imports nothing large, as `gonio render --help`
-reads it.
+`RenderOptions` declares them, with their help texts. `RenderKeywords` repeats their types for type checks of
+`**options`, since Python cannot derive them from a class. This module imports nothing large, since
+`gonio render --help` loads it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # fewer methods to compile whenever `gonio` starts
 class RenderOptions:
-    """Options of a render; None takes the scene's value."""
+    """Options of a render; None means the scene's value."""
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None

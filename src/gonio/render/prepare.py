@@ -46,7 +46,7 @@ class Prepared:
 def prepare(request: Request, writes: bool = False) -> Prepared:
     """Read the scene, start Mitsuba and create the render. Raises InputError or MachineError.
 
-    writes  the picture will be written, under the scene's name for it if the request names no output
+    writes  whether the picture will be written, to the file that the scene names if the request names no output
     """
     request.check()
     if request.material is None and not os.path.exists(request.scene):
@@ -68,7 +68,7 @@ def _nearby(path: Path) -> str:
         return f"the folder '{parent}' does not exist"
     try:
         near = [x.name for x in parent.iterdir() if x.suffix in (".json", ".xml") or (x / "scene.json").is_file()]
-    except OSError:  # the folder must not be listed
+    except OSError:  # no permission to list the folder
         near = []
     return did_you_mean(path.name, near) if near and len(near) <= 20 else "give a folder, a .json or a .xml"
 
@@ -132,7 +132,7 @@ def _prepare_lab(request: Request, mi: ModuleType, names_output: bool) -> Prepar
 
 
 def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.Render | until.Until:
-    """A render by one of Gonio's own integrators."""
+    """A render with one of Gonio's own integrators."""
     from ..transport import integrators, until
 
     if request.until_error is None:
@@ -141,7 +141,7 @@ def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.
 
 
 def _most(request: Request, spp: int) -> int:
-    """Samples per pixel: those requested, those of the scene, or the limit if an error determines their number."""
+    """Samples per pixel: as requested, those of the scene, or the limit if an error determines their number."""
     return request.spp or (spp if request.until_error is None else MAX_SPP_UNTIL)
 
 
@@ -163,7 +163,7 @@ def _how(settings: Settings | None, request: Request, **more: images.Value) -> s
 
 
 def _code_of(program: type) -> str:
-    """A hash of the source file of a user's integrator; the name if it is Gonio's or has no file."""
+    """A hash of the source file of a user's integrator; its name if it is Gonio's or has no file."""
     if program.__module__.startswith("gonio."):
         return program.__name__
     try:
@@ -195,7 +195,7 @@ def _settings(scene: Settings, request: Request) -> Settings:
 
 
 def _own(settings: Settings) -> dict[str, images.Value]:
-    """Metadata of a picture by one of Gonio's own integrators."""
+    """Metadata of a picture rendered with one of Gonio's own integrators."""
     from ..transport import sampler
 
     metadata: dict[str, images.Value] = {
@@ -207,7 +207,7 @@ def _own(settings: Settings) -> dict[str, images.Value]:
 
 
 def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str, images.Value]:
-    """Metadata of a picture that say how it was rendered."""
+    """Metadata that record how a picture was rendered."""
     metadata: dict[str, images.Value] = {
         "scene": str(request.scene),
         **how,

@@ -1,4 +1,4 @@
-"""The request for a render, as the command line and `go.render` make it."""
+"""The request for a render, as the command line and `go.render` create it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ MAX_THREADS = 1024
 class Request(RenderOptions):
     """A scene or a material, and how to render it."""
 
-    scene: Path  # for a material without a scene, its name
+    scene: Path  # the name of the material if there is no scene
     output: Path | None = None
     timeout: float | None = None
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # shown on a ball, in place of a scene
     checkpoint: Path | None = None  # file of the sums so far; an existing one is continued
     until_error: float | None = None  # relMSE at which to stop; `spp` is then the maximum
-    gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
+    gradient: tuple[str, ...] = ()  # paths of values in the scene with respect to which the picture is differentiated
 
     @property
     def is_mitsuba(self) -> bool:
@@ -48,7 +48,7 @@ class Request(RenderOptions):
         if self.seed is not None and not 0 <= self.seed < 1 << 32:
             raise InputError(f"seed {self.seed} is out of range", "--seed", "give 0 to 4294967295")
         if self.threads is not None and not 1 <= self.threads <= MAX_THREADS:
-            raise InputError(f"{self.threads} threads asked for", "--threads", f"give 1 to {MAX_THREADS}")
+            raise InputError(f"{self.threads} threads requested", "--threads", f"give 1 to {MAX_THREADS}")
         if self.timeout is not None and not self.timeout > 0:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
         if self.until_error is not None:
@@ -59,7 +59,7 @@ class Request(RenderOptions):
             ("spectral", self.spectral),
         ):
             if self.gradient and given:
-                raise InputError(f"{option} and derivatives do not go together", "gradient", f"leave {option} out")
+                raise InputError(f"{option} and derivatives cannot be combined", "gradient", f"leave {option} out")
         exposures.check(self.exposure)
         if self.size is not None:
             check_film(self.size, "--size")
@@ -76,12 +76,12 @@ def check_error(error: float, spp: int | None) -> None:
     if not (math.isfinite(error) and error > 0.0):
         raise InputError(f"a relMSE of {error:g}", "--until-error", "give more than 0, such as 0.01")
     if spp == 1:
-        raise InputError("one sample per pixel tells no error", "--until-error", "give --spp 2 or more")
+        raise InputError("one sample per pixel gives no error estimate", "--until-error", "give --spp 2 or more")
 
 
 def parse_size(text: str) -> tuple[int, int]:
     """(width, height) of "640x480"."""
     match = re.fullmatch(r"\s*(\d{1,9})\s*[xX×]\s*(\d{1,9})\s*", text)  # noqa: RUF001 - people paste it
     if not match:
-        raise InputError(f"'{text}' is no size", "--size", "give width x height in pixels, such as 640x480")
+        raise InputError(f"'{text}' is not a size", "--size", "give width x height in pixels, such as 640x480")
     return int(match[1]), int(match[2])

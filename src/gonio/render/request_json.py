@@ -1,4 +1,4 @@
-"""Requests as JSON, for checkpoints and for the workers of a cluster. The JSON is untrusted, as a scene is: every key,
+"""Requests as JSON, for checkpoints and for the workers of a cluster. The JSON is untrusted, as scenes are: every key,
 type and range is checked."""
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _plain(value: Any) -> Any:
 
 
 def request_of(given: Facts, where: str, allow_code: bool) -> Request:
-    """The inverse of `described`. A file alone never makes Gonio run Python: `allow_code` is required again."""
+    """The inverse of `described`. A file alone cannot make Gonio run Python: `allow_code` is required again."""
     if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
         raise InputError(
             "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
@@ -58,7 +58,7 @@ def request_of(given: Facts, where: str, allow_code: bool) -> Request:
     try:
         material = _rebuilt(values["material"])
         if not (material is None or isinstance(material, BSDF)):
-            raise InputError("no material", f"{where}#/request/material", "render again without it")
+            raise InputError("the material is missing", f"{where}#/request/material", "render again without it")
         request = Request(**{**values, "material": material, "overrides": _rebuilt(values["overrides"])})
     except RecursionError:
         raise InputError("the materials are nested too deeply", where, "render again without it") from None
@@ -82,7 +82,7 @@ def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -
     """The facts of an untrusted file, validated by `model`.
 
     pointer  JSON pointer to the facts in the file
-    Raises InputError with the location and what is expected there.
+    Raises InputError with the location and the expected value.
     """
     try:
         return model.model_validate_json(

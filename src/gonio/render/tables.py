@@ -2,10 +2,10 @@
 
     tables.npz      every array and the manifest, float64
     manifest.json   the manifest alone, for people and scripts
-    E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. Of a table with
-                    three axes the slices stand one below the other, the first on top
-With layout "homework": E.png, E_avg.png and dfg.png exactly as the homework has them (`baked.homework_pictures`). Of an
-environment the levels are level_0.exr, level_1.exr ...
+    E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. The slices of a
+                    table with three axes are stacked vertically, the first on top
+With layout "homework": E.png, E_avg.png and dfg.png exactly as in the homework (`baked.homework_pictures`). The levels
+of an environment are level_0.exr, level_1.exr ...
 """
 
 from __future__ import annotations
@@ -63,30 +63,30 @@ def bake(
     ndf: str | None = None,
     levels: int | None = None,
 ) -> Baked:
-    """Bake tables of directional albedo, its average, the split sum and rough glass, or an environment prefiltered for
-    the split sum; the manifest gives their content and their error.
+    """Bake tables of directional albedo, its average, the split sum and rough glass, or prefilter an environment for
+    the split sum; the manifest gives the content of the tables and their error.
 
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
     target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"; or a picture of an
-              environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
+              environment (.hdr, .exr, .npz; latitude-longitude), for which "prefiltered" is the only table
     output    folder to write to, all files or none; None writes nothing
-    lut       of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass. Or "ltc" alone: linearly
-              transformed cosines of the target, with the shader code of light from quadrilaterals
-    resolution  texels along each axis, 1 to 4096; None is 128, and 64 of "ltc" (anisotropic: 16), which has at most 256
-    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `samples` per texel
-              by the `sampler` "hammersley", "stratified" or "independent" (of `seed`, 0 if None)
+    lut       any of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass. Or "ltc" alone:
+              linearly transformed cosines of the target, with shader code for light from quadrilaterals
+    resolution  texels along each axis, 1 to 4096; None is 128, or 64 for "ltc" (anisotropic: 16), which has at most 256
+    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then with `samples` per
+              texel by the `sampler` "hammersley", "stratified" or "independent" (with `seed`, 0 if None)
     masking   masking of a distribution; a material has its own
-    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures as `store` and `flip` say)
+    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures with `store` and `flip`)
     aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
-    floor     lower bound of the denominator of D, of method "cosine"
+    floor     lower bound of the denominator of D, for method "cosine"
     wrap      convert the homework's pictures to bytes as its program does: rounded down, and 256 becomes 0
     preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
-    ndf       of an environment: the distribution for its prefiltering (default ggx), into `levels` levels of roughness
+    ndf       for an environment: the distribution for prefiltering (default ggx) into `levels` levels of roughness
               0 to 1 (default 6); the error of the split sum is measured with `masking`
     Tables baked before come from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
-    Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
+    Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
     """
     if preset is not None:
         return _preset(target, output, preset, 128 if resolution is None else resolution, seed, store, flip)
@@ -127,7 +127,7 @@ def _written(baked: Baked, folder: Path | None) -> Baked:
 
 
 def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, Any]) -> Baked:
-    """The tables, by the options of `bake`."""
+    """The tables, with the options of `bake`."""
     names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy`
     given = {names.get(name, name): value for name, value in options.items()} | {"seed": options["seed"] or 0}
     sampling = Sampling(**{name: given.pop(name) for name in Sampling._fields})
@@ -141,12 +141,12 @@ def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
     """Raise InputError for tables and options that do not go with linearly transformed cosines."""
     if len(lut) > 1:
         what = f"ltc with '{next(name for name in lut if name != 'ltc')}'"
-        raise InputError(what, "--lut", "its axes are others: bake them into two folders")
+        raise InputError(what, "--lut", "its axes differ: bake them into two folders")
     _check_default(options, "ltc has axes and a method of its own")
 
 
 def _cosines(target: str | BSDF, folder: Path | None, resolution: int | None, masking: str | None) -> Baked:
-    """Linearly transformed cosines, and the code of light from quadrilaterals by them."""
+    """Linearly transformed cosines, with shader code for light from quadrilaterals."""
     material: Any = target
     if isinstance(target, str):
         made: Any = model("conductor")
@@ -172,7 +172,7 @@ def _homework(
     options: Mapping[str, Any],
     picture: Mapping[str, Any],
 ) -> Baked:
-    """Tables with linear axes, and the homework's pictures of them, written if a folder is given."""
+    """Tables with linear axes; they and the homework's pictures of them are written if a folder is given."""
     if not isinstance(target, str) or options["aspect"] not in (None, 1.0):
         problem = "a material, or two widths, in the homework's layout"
         raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
@@ -185,7 +185,7 @@ def _homework(
     return baked
 
 
-# The homework's two definitions of E: k of its text, without noise; and what its cosine-sampled picture shows.
+# The homework's two definitions of E: the k of its text, without noise; and that of its cosine-sampled picture.
 PRESETS: dict[str, dict[str, Any]] = {
     "homework-text": {"masking": "schlick-direct"},
     "homework-figure": {
@@ -198,12 +198,12 @@ def _preset(
     target: MaterialLike, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
     flip: bool,
 ) -> Baked:  # fmt: skip
-    """E and E_avg as the homework's text, or its figures, have them. E_avg of the figures is free of noise, and their
-    bytes wrap."""
+    """E and E_avg as in the homework's text or in its figures. E_avg of the figures is free of noise, and the bytes of
+    their pictures wrap."""
     if preset not in PRESETS:
         raise InputError(f"unknown preset '{preset}' of a table", "--preset", did_you_mean(preset, list(PRESETS)))
     if target != "ggx":
-        raise InputError(f"preset '{preset}' of '{target}'", "--preset", "the homework's tables are those of ggx")
+        raise InputError(f"preset '{preset}' for '{target}'", "--preset", "the homework's tables are those of ggx")
     folder = None if output is None else files.check_folder(output)
     options = PRESETS[preset]
     made = bake("ggx", lut=["E"], resolution=resolution, seed=seed, **options)
@@ -218,33 +218,33 @@ def _preset(
 
 
 def _homework_files(baked: Baked, store: str, flip: bool, wrap: bool) -> dict[str, bytes]:
-    """The homework's pictures by their names, noted in the manifest."""
+    """The homework's pictures by file name; their layout is recorded in the manifest."""
     baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
     pictures = homework_pictures(baked, store, flip, wrap)
     return {f"{name}.png": images.png_bytes(pixels) for name, pixels in pictures.items()}
 
 
 def _check_default(options: dict[str, object], hint: str) -> None:
-    """Raise InputError for given options that do not apply to the target."""
+    """Raise InputError for options that were given but do not apply to the target."""
     for name, value in options.items():
         if value != inspect.signature(bake).parameters[name].default:
-            raise InputError(f"--{name} {value} does not go with this target", f"--{name}", hint)
+            raise InputError(f"--{name} {value} does not apply to this target", f"--{name}", hint)
 
 
 def _is_picture(target: MaterialLike, lut: Sequence[str] | None) -> bool:
-    """Whether the target is an environment, by its suffix or by the requested tables."""
+    """Whether the target is the picture of an environment. Raises InputError if the requested tables do not fit it."""
     pictured = isinstance(target, str | Path) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
     others = [name for name in lut or () if name != "prefiltered"]
     if pictured and others:
-        raise InputError(f"table '{others[0]}' of a picture", "--lut", "of an environment: --lut prefiltered")
+        raise InputError(f"table '{others[0]}' of a picture", "--lut", "for an environment: --lut prefiltered")
     if not pictured and lut and "prefiltered" in lut:
-        what = f"'prefiltered' of '{target}', which is no picture ({', '.join(images.SUFFIXES)})"
+        what = f"'prefiltered' of '{target}', which is not a picture ({', '.join(images.SUFFIXES)})"
         raise InputError(what, "--lut", "give an environment: gonio bake sky.hdr --lut prefiltered")
     return pictured
 
 
 def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: int | None, masking: str | None) -> Baked:
-    """The levels of an environment, written as pictures too."""
+    """The levels of an environment, also written as pictures if a folder is given."""
     source = images.read(picture)
     if not source.hdr:
         what = "an 8-bit picture, whose values are clipped at white"
@@ -262,7 +262,7 @@ def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: in
 
 
 def _write(baked: Baked, folder: Path, contents: dict[str, bytes]) -> None:
-    """The pictures, tables.npz and manifest.json: all or none."""
+    """Write the pictures, tables.npz and manifest.json: all or none."""
     baked.manifest["files"] = ["tables.npz", "manifest.json", *contents]
     contents["tables.npz"] = baked.npz()
     contents["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
@@ -278,7 +278,7 @@ def _target(target: MaterialLike) -> str | BSDF:
     if kind is Kind.DISTRIBUTION:
         if settings:
             hint = "bake a material, such as conductor; alpha is an axis of the table"
-            raise InputError(f"'{name}' is a distribution, without parameters", "--param", hint)
+            raise InputError(f"'{name}' is a distribution, which has no parameters", "--param", hint)
         return target
     if kind is Kind.CODE:
         return _own(target, name)
@@ -291,25 +291,25 @@ def _target(target: MaterialLike) -> str | BSDF:
 
 
 def _named(text: str | None, family: Family[Any], option: str) -> str | None:
-    """The name of a distribution or a masking term that is given by name, or as FILE.py:CLASS."""
+    """The name of a distribution or masking term that is given by name or as FILE.py:CLASS."""
     return outside.member(text, None, option, family) if text is not None and outside.names_code(text) else text
 
 
 def _own(target: str, name: str) -> str | BSDF:
-    """A material from a Python file, or the name of a distribution from one."""
+    """A material from a Python file, or the name of a distribution from such a file."""
     thing = outside.thing(name, where="TARGET")
     material = getattr(thing, "family", BSDF.family) is BSDF.family
     return notation.named(target)[0] if material else outside.member(name, None, "TARGET", NDF.family)
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:
-    """Each table as a picture: mu to the right, roughness down, slices of a third axis below each other."""
+    """Each table as a picture: mu to the right, roughness down, slices along a third axis stacked vertically."""
     files = {}
     for name, dims in baked.manifest["dims"].items():
         value = baked.arrays[name]
         if not dims:
             continue  # one number
-        if dims == ["roughness"]:  # constant along mu, so that it is read with the coordinates of E
+        if dims == ["roughness"]:  # repeated along mu, so that the picture is read with the coordinates of E
             size = len(value)
             value = np.broadcast_to(value[:, None], (size, size, *value.shape[1:]))
         channels = value.shape[max(len(dims), 2) :] if dims != ["mu"] else value.shape[1:]
@@ -322,7 +322,7 @@ def _pictures(baked: Baked) -> dict[str, bytes]:
 
 
 def describe(path: str | Path) -> dict[str, Any]:
-    """What a baked folder or tables.npz holds: its manifest, and the range of each table."""
+    """The content of a baked folder or tables.npz: its manifest, and the range of each table."""
     baked = load(path)
     ranges = {n: [float(a.min()), float(a.max())] for n, a in baked.arrays.items()}
     return {**baked.manifest, "range": ranges}

@@ -1,8 +1,8 @@
 """Rendering one picture on several workers: each part is a range of its lanes, with all their samples.
 
 Lanes are independent, and every part begins at a multiple of the processor's vector width, so that the same rays are
-traced together: the sums are bit-identical to those of one process. A worker loads the scene from copies of its files,
-which are sent once and identified by a hash of their content.
+traced together: the sums are bit-identical to those of a single process. A worker loads the scene from copies of its
+files, which are sent once and identified by a hash of their content.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ MAX_SAMPLES = 1 << 25  # per part: some seconds on one machine
 MIN_SAMPLES = 1 << 21  # per part: with fewer, sending it costs too much
 SAMPLES_PER_SUBMISSION = 1 << 17  # samples that a worker traces while one part is submitted
 MAX_PASS = 2.0  # seconds: a worker need not react to Ctrl-C, and each pass costs 15 ms of Python
-PARTS = 20  # per worker at least, so that no worker idles long at the end
+PARTS = 20  # smallest number of parts per worker, so that no worker is idle for long at the end
 
 
 class Gathered:
-    """The results received from workers so far, with the interface of a render, for `checkpoints.Keeper`."""
+    """The sums received from workers so far, with the interface of a render, for `checkpoints.Keeper`."""
 
     def __init__(self, render: Render, wanted: int) -> None:
         self._render, self._wanted = render, wanted
@@ -106,8 +106,8 @@ def advance(
     finished: Callable[[int], None] = lambda index: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Advance every lane of some renders to their sample counts on the workers; return the reason for the end, as
-    `passes.run` does.
+    """Advance every lane of several renders to its sample count on the workers; return why this ended, as `passes.run`
+    does.
 
     report    called after each part, with the progress of all renders together
     finished  called with the index of a render when its last part has arrived
@@ -150,8 +150,8 @@ def advance(
 
 
 def part_size(total: int, workers: int) -> int:
-    """Samples per part for `total` samples in all: few enough to occupy all workers, many enough that submitting parts,
-    at about 10 ms each, keeps pace with the workers (`benchmarks/cluster.py`)."""
+    """Samples per part for `total` samples: few enough to occupy all workers, and many enough that submitting parts, at
+    about 10 ms each, keeps pace with the workers (`benchmarks/cluster.py`)."""
     return min(max(total // (PARTS * workers), MIN_SAMPLES, workers * SAMPLES_PER_SUBMISSION), MAX_SAMPLES)
 
 
@@ -165,18 +165,18 @@ def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
 
 
 def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
-    """A prepared render as text from which a worker can rebuild it, and the files that it needs, by content hash.
+    """A prepared render as text from which a worker can rebuild it, and the files that it needs, by hash of content.
 
     Raises InputError for a render that cannot be distributed.
     """
     request, where = prepared.request, "cluster"
     if not isinstance(prepared.render, Render):
-        what, instead = "Mitsuba's own integrator renders on one machine", "add --integrator path (or direct), or "
+        what, instead = "Mitsuba's own integrator renders on only one machine", "add --integrator path (or direct), or "
         if isinstance(prepared.render, PolarizedRender):
-            what, instead = "a scene with a polarizer is rendered by Mitsuba's own integrator, on one machine", ""
+            what, instead = "a scene with a polarizer is rendered by Mitsuba's own integrator, on only one machine", ""
         raise InputError(what, where, f"{instead}leave --workers, or the cluster, out")
     if prepared.render.settings.program.splats:
-        what = f"{prepared.render.settings.integrator} adds to the whole picture, and workers render parts of it"
+        what = f"{prepared.render.settings.integrator} adds to the whole picture, but workers render parts of it"
         raise InputError(what, where, "render on one machine, or use path")
     named = dict(prepared.sources.files)
     folder = ""
@@ -187,7 +187,7 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
         named[file.name] = file
         for name, path in named.items():
             if not path.resolve().is_relative_to(folder):
-                raise InputError(f"'{name}' lies outside the scene's folder", where, "copy it there: it has to travel")
+                raise InputError(f"'{name}' lies outside the scene's folder", where, "copy it there: workers need it")
     places = {str(path.resolve()): facts.file_hash(path) for path in named.values()}
     payload = {"request": described(replace(request, output=None, threads=None)), "folder": folder}
     text = json.dumps({**payload, "files": places}, sort_keys=True)
@@ -197,8 +197,8 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
 # ---------------------------------------------------------------------- on the worker
 
 _last: dict[str, tuple[Prepared, tempfile.TemporaryDirectory[str]]] = {}  # the loaded scene; consecutive parts share it
-_copies: dict[str, Path] = {}  # of its files, by their paths on the machine that submitted the job
-_rates: dict[str, float] = {}  # samples per second of its last part
+_copies: dict[str, Path] = {}  # copies of the scene's files, by their paths on the machine that submitted the job
+_rates: dict[str, float] = {}  # samples per second of the scene's last part
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
@@ -220,7 +220,7 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
 
 @contextlib.contextmanager
 def _places_as_given() -> Iterator[None]:
-    """Make errors name the files of the machine that submitted the job, not their copies here."""
+    """Inside the block, errors name the files of the machine that submitted the job instead of their copies here."""
     try:
         yield
     except Exception as error:
@@ -251,7 +251,7 @@ def _unpacked(known: Facts, folder: Path) -> Request:
     """The request, with its files in a folder of this machine."""
     text = json.dumps(known["request"])
     for path, content in known["files"].items():
-        # so that Python files find the modules that they import from their folder
+        # the same layout of folders, so that Python files can import modules from their own folder
         inside = os.path.relpath(path, known["folder"] or Path(path).anchor)
         target = folder / inside
         _copies[path] = target

@@ -1,10 +1,10 @@
 """`gonio report`: pictures, sheets, plots, tables and verdicts of a lab report as one document, with the student's own
-words.
+text.
 
     listing.py   the list of figures, report.toml
     entries.py   the kinds of figures, and how each is made
-    words.py     report.md, which is written once and then belongs to its author
-    document.py  the page, report.html; formulas.py sets its mathematics, printing.py prints it as a PDF
+    words.py     report.md, which is written once and then edited only by its author
+    document.py  the page, report.html; formulas.py typesets its formulas, printing.py prints it as a PDF
 """
 
 from __future__ import annotations

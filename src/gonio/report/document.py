@@ -1,4 +1,4 @@
-"""report.html: the words of a report with its pictures and tables in one file, which needs no network."""
+"""report.html: the text of a report with its pictures and tables in a single file, which needs no network."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from markdown_it import MarkdownIt
     from markdown_it.token import Token
 
-MAX_BYTES = 64 << 20  # of all pictures of a page
-MAX_ROWS = 2000  # of a table: beyond, a browser is slow and no reader follows
+MAX_BYTES = 64 << 20  # total size of the pictures of a page
+MAX_ROWS = 2000  # rows of a table; browsers are slow with more, and nobody reads them
 _HEAD = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -34,9 +34,9 @@ _HEAD = """<!doctype html>
 
 
 def page(text: str, folder: Path, allow_outside: bool = False) -> str:
-    """The page of a report's words; HTML in them is shown as text.
+    """The page for the text of a report, which is Markdown; HTML in it is shown as text.
 
-    folder  of the words, from which pictures and tables are named
+    folder  the folder of report.md, to which the paths of pictures and tables are relative
     Raises InputError, with file and line, for a picture or table that cannot be shown.
     """
     markdown = parser()
@@ -49,7 +49,7 @@ def page(text: str, folder: Path, allow_outside: bool = False) -> str:
 
 
 class _Reader:
-    """Writes tokens as HTML; a paragraph that is only a picture, or a link to a .csv file, becomes a figure."""
+    """Converts tokens to HTML; a paragraph that is only a picture, or a link to a .csv file, becomes a figure."""
 
     def __init__(self, markdown: MarkdownIt, folder: Path, allow_outside: bool) -> None:
         self.markdown, self.folder, self.allow_outside = markdown, folder, allow_outside
@@ -77,7 +77,7 @@ class _Reader:
         return f"{self.folder / WORDS_FILE}:{token.map[0] + 1}" if token.map else str(self.folder / WORDS_FILE)
 
     def _figure(self, inline: Token) -> str:
-        """A figure with its caption, or "" for a paragraph of words."""
+        """A figure with its caption, or "" for a paragraph of text."""
         location, children = self._location(inline), inline.children or []
         first = children[0] if children else None
         if first is None:
@@ -106,11 +106,11 @@ class _Reader:
         content = path.read_bytes()
         self.left -= len(content)
         if self.left < 0:
-            what = f"the pictures have more than {MAX_BYTES >> 20} MiB together"
+            what = f"the pictures exceed {MAX_BYTES >> 20} MiB together"
             raise InputError(what, location, "show fewer, or smaller ones: --size")
         kind = PICTURES.get(path.suffix.lower())
         if kind is None:
-            raise InputError(f"'{target}' is no picture", location, "a table is shown by a link: [caption](FILE.csv)")
+            raise InputError(f"'{target}' is not a picture", location, "show a table by a link: [caption](FILE.csv)")
         return f"data:image/{kind};base64,{b64encode(content).decode()}"
 
     def _table(self, target: str, location: str) -> str:
@@ -119,7 +119,7 @@ class _Reader:
             with path.open(encoding="utf-8-sig", newline="") as file:
                 rows = [row for row, _ in zip(csv.reader(file), range(MAX_ROWS + 1), strict=False)]
         except (UnicodeDecodeError, csv.Error) as error:
-            raise InputError(f"'{target}' is no table: {error}", location, "save it as .csv in UTF-8") from None
+            raise InputError(f"'{target}' is not a table: {error}", location, "save it as .csv in UTF-8") from None
         if len(rows) > MAX_ROWS:
             raise InputError(f"'{target}' has more than {MAX_ROWS} rows", location, "show a part of it, or a plot")
         head, *body = rows or [[]]

@@ -1,4 +1,4 @@
-"""The kinds of figures of a report. Each is made by the code of the verb of its name, into a file of the folder
+"""The kinds of figures of a report. Each is made by the code of the verb of the same name, as a file in the folder
 `figures`."""
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ Words = Annotated[str, Field(min_length=1)]
 class Making:
     """How and where figures are made.
 
-    options  of all pictures, as the command gives them; those that differ from their defaults override the list
-    folder   of the figures
-    tell     takes a notice about results of an earlier run
+    options  options of all pictures, as given by the command; those that differ from their defaults override the list
+    folder   the folder of the figures
+    tell     called with notices about results of an earlier run
     """
 
     options: RenderOptions
@@ -47,14 +47,14 @@ class Making:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a figure was made with, for the table at the end of the report; warnings are for the terminal."""
+    """The settings of a figure, for the table at the end of the report, and warnings for the terminal."""
 
     settings: str
     warnings: tuple[str, ...] = ()
 
 
 class PictureKeys(Part):
-    """Options of pictures, of one figure or of all: those of `gonio render` that change the picture."""
+    """Options of one picture or of all: the options of `gonio render` that change the picture."""
 
     spp: Whole | None = Field(default=None, ge=1)
     size: str | None = None
@@ -67,7 +67,7 @@ class PictureKeys(Part):
     exposure: Number | Literal["auto"] | None = None
 
     def request(self, given: RenderOptions) -> dict[str, Any]:
-        """The options as those of a Request; what the command gives comes first."""
+        """The options as those of a Request; options given by the command take precedence."""
         options = {one.name: getattr(given, one.name) for one in fields(RenderOptions)}
         for one in fields(RenderOptions):
             own = getattr(self, one.name, None)
@@ -78,9 +78,9 @@ class PictureKeys(Part):
 
 
 class Figure(Part):
-    """A figure. `heading`, `caption` and `text` are the words that report.md starts with; later they are edited there.
+    """A figure. `heading`, `caption` and `text` are its initial text in report.md, where it is edited later.
 
-    name  of its file, without suffix
+    name  the name of its file, without suffix
     """
 
     suffix: ClassVar[str] = ".png"
@@ -91,27 +91,27 @@ class Figure(Part):
     text: str = ""
 
     def with_defaults(self, common: PictureKeys, scene: str) -> Figure:
-        """The figure, with the options and the scene of the list where it has none."""
+        """The figure, with the list's options and scene where it has none of its own."""
         return self
 
     def title(self) -> str:
-        """A heading if none is given."""
+        """The heading if none is given."""
         raise NotImplementedError
 
     def description(self) -> str:
-        """A caption if none is given."""
+        """The caption if none is given."""
         raise NotImplementedError
 
     def command(self, given: RenderOptions) -> str:
-        """The command that makes the figure alone.
+        """The command that makes only this figure.
 
         given  options of all pictures
         """
         raise NotImplementedError
 
     def identity(self, making: Making) -> str:
-        """Check all that can be checked before anything is rendered. Returns a hash of all that the figure depends on,
-        or "" for a figure that is made each time, in seconds. Raises InputError."""
+        """Check everything that can be checked before rendering. Returns a hash of everything that the figure depends
+        on, or "" for a figure that is made each time, which takes seconds. Raises InputError."""
         raise NotImplementedError
 
     def make(self, making: Making, file: Path) -> Facts:
@@ -129,7 +129,7 @@ class SceneFigure(Figure, PictureKeys):
         return self.model_copy(update={**missing, "scene": self.scene or scene})
 
     def _shown(self, making: Making) -> tuple[Request, notation.Settings | None]:
-        """The request, without a material, and the material."""
+        """The request, without a material, and the settings of the material; None for a scene."""
         if not self.scene:
             raise InputError("no scene", "scene", "name a scene's folder, or a material")
         kind = operands.kind_of(self.scene, {Kind.SCENE, *operands.MATERIALS}, "scene")
@@ -182,7 +182,7 @@ class Render(SceneFigure):
 
 
 class Study(SceneFigure):
-    """A sheet of pictures for several values, as by `gonio study`."""
+    """A sheet of pictures for several values, as made by `gonio study`."""
 
     type: Literal["study"]
     vary: Annotated[list[Words], Field(min_length=1)]
@@ -215,7 +215,7 @@ class Study(SceneFigure):
 
 
 class Plot(Figure):
-    """A plot of materials, as by `gonio plot`."""
+    """A plot of materials, as made by `gonio plot`."""
 
     type: Literal["plot"]
     model: Annotated[list[Words], Field(min_length=1)]
@@ -251,7 +251,7 @@ class Plot(Figure):
 
 
 class Bake(Figure):
-    """Tables of albedo, as by `gonio bake`, and a figure of them. They are written beside the figure, in a folder."""
+    """Albedo tables, as made by `gonio bake`, and a figure of them. A folder next to the figure contains the tables."""
 
     type: Literal["bake"]
     target: Words = "ggx"
@@ -290,14 +290,14 @@ class Bake(Figure):
 
 
 class Check(Figure):
-    """A table of verdicts about the student's own work, as by gonio check."""
+    """A table of verdicts about the student's own work, as given by gonio check."""
 
     suffix: ClassVar[str] = ".csv"
     type: Literal["check"]
     work: Words
     against: str = ""
     picture_of: str = Field(default="", alias="picture-of")
-    """The scene that a picture shows, `--scene` of `gonio check`."""
+    """The scene that a picture shows: `--scene` of `gonio check`."""
     up: Literal["z", "y", "x"] = "z"
     sheet: str | None = None
 
@@ -352,7 +352,7 @@ def _identity(prepared: Prepared) -> str:
 
 
 def _of_formulas(*what: object) -> str:
-    """The identity of a figure that depends on Gonio's formulas alone, and on no file."""
+    """The identity of a figure that depends only on Gonio's formulas; "" if it may depend on a file."""
     named_files = any("file=" in str(one) or "/" in str(one) for one in what)
     return "" if named_files else parts.key_of(what, facts.versions(), facts.code())
 

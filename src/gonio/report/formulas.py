@@ -1,4 +1,4 @@
-"""Formulas in the words of a report, $f = k_d / \\pi$ or $$...$$ in a line of its own, set by Matplotlib as SVG."""
+"""Formulas in the text of a report, $f = k_d / \\pi$ or $$...$$ for display, typeset by Matplotlib as SVG."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ..viewer.figures import load_matplotlib
 if TYPE_CHECKING:
     from markdown_it import MarkdownIt
 
-_SIZE = 12.0  # points of the letters in the SVG; the page scales them to its own text
+_SIZE = 12.0  # font size in the SVG, points; the page scales it to the size of its text
 
 
 def plugin(markdown: MarkdownIt) -> None:
-    """Let a Markdown parser read formulas."""
+    """Let a Markdown parser recognize formulas."""
     markdown.inline.ruler.before("escape", "formula", _rule)
     markdown.add_render_rule("formula", lambda renderer, tokens, index, options, env: _html(tokens[index], env))
 
 
 def _rule(state: Any, silent: bool) -> bool:
-    """$...$ without spaces at its ends, as in prices, or $$...$$."""
+    """Parse $...$, without spaces just inside it so that prices are not formulas, or $$...$$."""
     text, start = state.src, state.pos
     if text[start] != "$":
         return False

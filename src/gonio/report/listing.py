@@ -18,28 +18,28 @@ from ..scene.reader import explain
 from .entries import Bake, Check, Figure, PictureKeys, Plot, Render, Study
 
 LIST_FILE = "report.toml"
-MAX_BYTES = 1 << 20  # a list that people write; pictures are files of their own
-WORDS = frozenset({"title", "author", "heading", "caption", "text"})  # prose, in which nothing names a file
+MAX_BYTES = 1 << 20  # size of a list, which people write by hand
+WORDS = frozenset({"title", "author", "heading", "caption", "text"})  # keys of prose, which names no files
 _OUTSIDE = re.compile(r"(?:^|[=,(\s])(?:/|~|[A-Za-z]:\\|\.\.(?:[/\\]|$))|[/\\]\.\.(?:[/\\]|$)")
 _KIND = re.compile(r"(lobe|slice|albedo|image)=(.*)", re.DOTALL)
 
 
 class ListFile(PictureKeys):
-    """A report.toml: what the document is called, options of all its pictures, and its figures in their order."""
+    """A report.toml: title and author of the document, options of all its pictures, and its figures in order."""
 
     title: str = ""
     author: str = ""
     scene: str = ""
-    """The scene of figures that name none; the list's own folder if it has a scene.json."""
+    """The scene of figures that name none; by default the list's own folder if it has a scene.json."""
     figure: list[Annotated[Render | Study | Plot | Bake | Check, Field(discriminator="type")]]
 
 
 @dataclass(frozen=True)
 class Listing:
-    """Figures in their order.
+    """The figures of a report in order.
 
     locations  where each is declared: a file with a JSON pointer, or an option
-    folder     that their paths start from
+    folder     the folder to which their paths are relative
     """
 
     title: str
@@ -51,9 +51,10 @@ class Listing:
 
 
 def listing(target: str, options: Mapping[str, Sequence[str] | None], allow_code: bool, allow_outside: bool) -> Listing:
-    """The list of a .toml, or of a scene's folder with a report.toml if no option lists figures; else of the options.
+    """The list in a .toml, or in the report.toml of a scene's folder if no option lists figures; else that of the
+    options.
 
-    options  "study", "plot", "bake" and "work", each with texts
+    options  the values of "study", "plot", "bake" and "work"
     Raises InputError with file and key.
     """
     path, given = Path(os.path.expanduser(target)), any(options.values())
@@ -90,12 +91,12 @@ def _read(file: Path, allow_code: bool, allow_outside: bool) -> Listing:
 def _toml(file: Path) -> dict[str, Any]:
     try:
         if file.stat().st_size > MAX_BYTES:
-            raise InputError("more than 1 MiB is no list of figures", str(file), "give a report.toml")
+            raise InputError("larger than 1 MiB, not a list of figures", str(file), "give a report.toml")
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot be opened: {error.strerror}", str(file), "check the path") from None
     except UnicodeDecodeError:
-        raise InputError("not a text in UTF-8", str(file), "save it as UTF-8") from None
+        raise InputError("not UTF-8 text", str(file), "save it as UTF-8") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         what = f"not valid TOML: {str(error)[:200]}"
         raise InputError(what, str(file), 'strings are in double quotes: type = "study"') from None
@@ -112,12 +113,12 @@ def _check_names(raw: Mapping[str, Any], file: Path, allow_code: bool, allow_out
 
 
 def _leads_out(folder: Path, text: str) -> bool:
-    """Whether a path, with its links followed, leaves the folder."""
+    """Whether a path, after following links, leads out of the folder."""
     try:
         path = (folder / text).resolve()
         return path.exists() and not path.is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):
-        return False  # no path
+        return False  # not a path
 
 
 def _strings(value: object, pointer: str) -> Iterator[tuple[str, str]]:
@@ -134,7 +135,7 @@ def _strings(value: object, pointer: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_options(target: str, options: Mapping[str, Sequence[str] | None]) -> Iterator[tuple[Figure, str]]:
-    """The scene itself, then what the options list, each with its option."""
+    """The scene itself, then the figures that the options list, each with its option."""
     yield Render(type="render", scene=target), "TARGET"
     for text in options.get("study") or ():
         yield Study(type="study", scene=target, vary=_parts(text)), "--study"

@@ -1,4 +1,4 @@
-"""A page as a PDF, printed by a Chromium of this machine."""
+"""Print a page to a PDF with a Chromium installed on this machine."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ _SECONDS = 120.0
 
 
 def browser() -> str:
-    """The program that prints. Raises MachineError if there is none."""
+    """The path of a browser that can print. Raises MachineError if there is none."""
     # On Windows, `which` also looks in the current folder, which is untrusted.
     known = [path for name in NAMES if (path := shutil.which(name)) and Path(path).parent != Path.cwd()]
     program = next(iter(known), None)
     program = program or next((place for place in PLACES if os.path.isfile(place)), None)
     if program is None:
         hint = "install Chromium or Chrome, or open report.html in any browser and print it to a file"
-        raise MachineError("no browser that prints a PDF", "--pdf", hint)
+        raise MachineError("no browser found that can print a PDF", "--pdf", hint)
     return program
 
 
 def write_pdf(page: Path, output: Path) -> Path:
-    """Print a page to a file. Raises MachineError."""
+    """Print a page to a PDF file. Raises MachineError if that fails."""
     program = browser()
     # Chromium's sandbox does not start as root; the page runs no script, and its policy lets it load nothing.
     own = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []

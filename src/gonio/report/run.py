@@ -1,4 +1,4 @@
-"""`gonio report` and `go.report`: make the figures of a list, then the document of the words that show them."""
+"""`gonio report` and `go.report`: make the figures of a list, then the document that shows them."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from . import document, printing, words
 from .entries import Facts, Figure, Making, as_csv
 from .listing import Listing, listing
 
-MADE_FILE = "made.json"  # in the folder of figures: what each was made of, so that it need not be made again
+MADE_FILE = "made.json"  # in the folder of figures: hashes of what each depends on, to skip those that are up to date
 
 
 @dataclass(frozen=True)
 class Report:
     """A document that was written.
 
-    output     the page, one file without network
+    output     the page, a single file that needs no network
     words      report.md, which its author edits
-    pdf        the printed page, if it was asked for
-    figures    files of the figures, in their order
-    unchanged  how many of them were there already
-    new_words  whether report.md was written by this call
+    pdf        the printed page, None if it was not requested
+    figures    files of the figures, in order
+    unchanged  number of figures that were up to date
+    new_words  whether this call wrote report.md
     unused     lines for report.md, one for each figure that it does not show
     """
 
@@ -67,21 +67,21 @@ def report(
     output: str | Path | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Report:
-    """Write the pictures, tables, plots and verdicts of a lab report as one document, with words that you edit.
+    """Write the pictures, tables, plots and verdicts of a lab report as one document, with text that you edit.
 
         go.report("examples/phong", study=["shapes.1.material.p=4,16,64"], plot=["slice=phong(p=16)"])
         go.report("lab2.toml", pdf=True)
 
     target  a list of figures (.toml), or a scene or material; a scene's folder may have a report.toml
-    study   sheets of the scene: a variation each, "NAME=V1,V2", or two for a grid, separated by a semicolon
-    plot    materials, separated by semicolons, as lobes; "slice=phong(p=4)" is another kind of plot
-    bake    distributions or materials whose tables of albedo are shown
-    work    own work to be judged: "f.csv; oren-nayar(sigma=0.3)"
+    study   sheets of the scene, each with one variation, "NAME=V1,V2", or two for a grid, separated by a semicolon
+    plot    materials, separated by semicolons, as lobes; "slice=phong(p=4)" gives another kind of plot
+    bake    distributions or materials whose albedo tables are shown
+    work    your own work to be judged: "f.csv; oren-nayar(sigma=0.3)"
     title   heading of a new report.md
-    pdf     also print the page, by a Chromium of this machine
+    pdf     also print the page, with a Chromium installed on this machine
     output  folder of the report; None is NAME-report in the current folder
-    The folder has report.md, report.html and the figures. report.md is written only if it is missing: edit its words,
-    and call again. Figures that have not changed are not made again.
+    The folder contains report.md, report.html and the figures. report.md is written only if it is missing: edit its
+    text, and call again. Unchanged figures are not made again.
     Other options as in `go.render`, for all pictures. Returns a Report. Raises InputError, MachineError.
     """
     lists = {"study": study, "plot": plot, "bake": bake, "work": work}
@@ -105,7 +105,7 @@ def write(
 ) -> Report:
     """Make the figures and the document.
 
-    step  called before each figure with the number of those made, of all, and the next one's name
+    step  called before each figure with the number of figures made, their total number, and the name of the next one
     tell  called with notices about results of an earlier run
     """
     content = listing(target, lists, options.allow_code, options.allow_outside)
@@ -143,7 +143,7 @@ def write(
 
 
 def _read(file: Path) -> str | None:
-    """The words, None if there are none yet. Raises InputError for a file that is no text."""
+    """The text of report.md, None if the file does not exist. Raises InputError if it is not a text file."""
     try:
         return file.read_text(encoding="utf-8") if os.path.lexists(file) else None
     except (OSError, UnicodeDecodeError) as error:
@@ -151,7 +151,7 @@ def _read(file: Path) -> str | None:
 
 
 def _file_names(content: Listing) -> list[str]:
-    """The file of each figure: its own name, or one made of its title. Raises InputError if two have one name."""
+    """The file name of each figure: its given name, or one derived from its title. Raises InputError for duplicates."""
     names: dict[str, str] = {}
     for figure, location in zip(content.figures, content.locations, strict=True):
         base = figure.name or re.sub(r"[^a-z0-9]+", "-", figure.title().lower()).strip("-")[:48] or figure.type
@@ -167,15 +167,15 @@ def _file_names(content: Listing) -> list[str]:
 def _make(
     content: Listing, names: Sequence[str], making: Making, step: Callable[[int, int, str], None]
 ) -> tuple[list[Facts], int]:
-    """Make each figure that has changed; what they were made with, and how many had not changed."""
+    """Make each figure that has changed; returns the facts of all, and the number of unchanged ones."""
     total = len(names)
     todo: list[tuple[str, Figure, str]] = list(zip(names, content.figures, content.locations, strict=True))
     identities = []
-    for name, figure, location in todo:  # all are checked before the first is made
+    for name, figure, location in todo:  # check all before making the first
         step(0, total, f"checking {name}")
         with _located(location):
             identities.append(figure.identity(making))
-    making.folder.mkdir(parents=True, exist_ok=True)  # a refused report leaves nothing behind
+    making.folder.mkdir(parents=True, exist_ok=True)  # only now, so that a rejected report leaves nothing behind
     before = _made_before(making.folder)
     facts: list[Facts] = []
     unchanged = 0
@@ -196,7 +196,7 @@ def _make(
 
 @contextlib.contextmanager
 def _located(location: str) -> Any:
-    """Give errors about a figure the place where it is declared."""
+    """Add the location where a figure is declared to errors about it."""
     try:
         yield
     except InputError as error:
@@ -222,5 +222,5 @@ def _write_settings(content: Listing, names: Sequence[str], facts: Sequence[Fact
 
 
 def given(options: RenderOptions) -> RenderOptions:
-    """The options of a render alone, of an object that has more."""
+    """Only the options of a render, from an object that has more."""
     return RenderOptions(**{one.name: getattr(options, one.name) for one in fields(RenderOptions)})

@@ -1,6 +1,6 @@
-"""report.md: the words of a report and the places of its figures.
+"""report.md: the text of a report and the places of its figures.
 
-It is written once; then it belongs to its author, and Gonio only reads it.
+Gonio writes it once and from then on only reads it; its author edits it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PICTURES = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".gif": "gif", ".web
 
 
 class Reference(NamedTuple):
-    """A picture, or a table, that the words show."""
+    """A picture or table that the text shows."""
 
     line: int
     target: str
@@ -32,7 +32,7 @@ class Reference(NamedTuple):
 def first_words(title: str, author: str, figures: Sequence[tuple[str, Figure]]) -> str:
     """The text of a new report.md.
 
-    figures  each with the name of its file
+    figures  file name and figure, in order
     """
     blocks = [f"# {title}", author or "*Your name, the date*"]
     if not any(figure.text for _, figure in figures):
@@ -54,7 +54,7 @@ def inclusion(file: str, figure: Figure) -> str:
 
 
 def parser() -> MarkdownIt:
-    """Markdown with tables and formulas; HTML in it is text."""
+    """A parser of Markdown with tables and formulas; it treats HTML as text."""
     from markdown_it import MarkdownIt
 
     markdown = MarkdownIt("commonmark", {"html": False}).enable(["table", "strikethrough"])
@@ -63,7 +63,7 @@ def parser() -> MarkdownIt:
 
 
 def references(text: str) -> Iterator[Reference]:
-    """The pictures and tables that the words show, with their lines."""
+    """The pictures and tables that the text shows, with their line numbers."""
     for token in parser().parse(text):
         for child in token.children or ():
             target = str(child.attrs.get("src" if child.type == "image" else "href", ""))
@@ -72,9 +72,9 @@ def references(text: str) -> Iterator[Reference]:
 
 
 def check_references(text: str, folder: Path, made: Collection[str], allow_outside: bool) -> None:
-    """Raise InputError for a picture or table that is neither there nor made.
+    """Raise InputError for a picture or table that does not exist and is not about to be made.
 
-    made  files of the folder `figures` that the list makes
+    made  files in the folder `figures` that the list makes
     """
     for line, target in references(text):
         if target not in {f"{FOLDER}/{name}" for name in made}:
@@ -82,14 +82,14 @@ def check_references(text: str, folder: Path, made: Collection[str], allow_outsi
 
 
 def local(folder: Path, target: str, location: str, allow_outside: bool) -> Path:
-    """The file of a picture or table that the words show. Raises InputError."""
+    """The path of a picture or table that the text shows. Raises InputError if it cannot be used."""
     if re.match(r"[a-zA-Z][a-zA-Z+.-]+:", target):
         raise InputError(f"'{target}' is not a file", location, "save it in the report's folder, and name it there")
     path = folder / target
     if path.suffix.lower() not in (*PICTURES, ".csv"):
-        raise InputError(f"'{target}' is no picture", location, f"give {', '.join(PICTURES)} or .csv")
+        raise InputError(f"'{target}' is not a picture", location, f"give {', '.join(PICTURES)} or .csv")
     if not path.is_file():
-        hint = f"the list makes no such figure: add it there, or remove it from {WORDS_FILE}"
+        hint = f"the list has no such figure: add it there, or remove it from {WORDS_FILE}"
         raise InputError(f"no file '{target}'", location, hint)
     if not allow_outside and not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(

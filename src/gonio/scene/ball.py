@@ -11,8 +11,8 @@ from . import overrides as override
 from .materials import MaterialPart, described
 from .schema import SceneDescription
 
-TILES = 12  # along a side of the floor
-TILE = 0.6
+TILES = 12  # tiles along a side of the floor
+TILE = 0.6  # side of a tile
 
 
 def of_material(material: BSDF, overrides: Mapping[str, object] | None = None) -> SceneDescription:
@@ -38,7 +38,7 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         for x in range(TILES)
         for z in range(TILES)
     ]
-    # outside the picture, also of a wide one: a large lamp at the left, a strip at the right, one above
+    # outside the picture, even of a wide one: a large lamp on the left, a strip on the right, one above
     key = {"type": "parallelogram", "base": [-4.6, 0.8, 1.6], "edge0": [1.6, 0, 1.6], "edge1": [0, 2.6, 0]}
     strip = {"type": "parallelogram", "base": [3.6, 0.4, -0.4], "edge0": [0, 2.8, 0], "edge1": [0.3, 0, 0.7]}
     top = {"type": "parallelogram", "base": [-1.3, 4.4, -1.2], "edge0": [2.6, 0, 0], "edge1": [0, 0, 1.6]}

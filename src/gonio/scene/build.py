@@ -29,18 +29,18 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-# Gonio's error of a material's plugin, whose text ends the traceback that Mitsuba hands on: kind, where, what and hint.
+# An error raised by Gonio in a material's plugin; it ends the traceback that Mitsuba reports: kind, where, what, hint.
 _RAISED = re.compile(r"\n(InputError|MachineError): ([^\n]*?): ([^\n]+)\n  hint: ([^\n]+)\Z")
 
-MERGE_FROM = 64  # number of materials of equal structure from which on they are merged into one BSDF
+MERGE_FROM = 64  # smallest number of materials of equal structure that are merged into one BSDF
 
-# Maps local +z, +x, +y of Mitsuba's sphere, where u runs about z from x toward y and v from +z, to the format's
-# +y, +z, +x, where u runs about y from z toward x and v from +y.
+# Maps local +z, +x, +y of Mitsuba's sphere, where u runs about z from x toward y and v from +z, to +y, +z, +x of the
+# format, where u runs about y from z toward x and v from +y.
 _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
-    """The `mi.Scene`: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
+    """The `mi.Scene` of a description: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an unusable image or mesh.
     """
@@ -56,9 +56,10 @@ class Built:
 
 
 def built(description: schema.SceneDescription, mi: ModuleType, merge_materials: bool = False) -> Built:
-    """As `build`, together with the BSDFs, for callers that change them.
+    """The scene, as from `build`, together with the BSDFs, for callers that change them.
 
-    merge_materials  represent many materials that differ only in numbers by one BSDF, which is not listed in `bsdfs`
+    merge_materials  whether many materials that differ only in numbers are represented by one BSDF, which is then not
+                     listed in `bsdfs`
     """
     builder = _Builder(description, mi, merge_materials)
     return Built(builder.scene(), builder.bsdfs)
@@ -75,7 +76,7 @@ class _Builder:
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
-        # spectral variants upsample colors one by one
+        # spectral variants upsample each color separately
         self.merge_materials = merge_materials and fast.enabled() and mi.variant().endswith("rgb")
         self.gathered: dict[MaterialPart, tuple[BSDFPlugin, Group, int]] = {}
 
@@ -106,11 +107,11 @@ class _Builder:
         return loaded
 
     def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
-        """A Mitsuba object. If Mitsuba rejects it, raise InputError at `where`."""
+        """The Mitsuba object of a dict. Raises InputError at `where` if Mitsuba rejects it."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", GonioWarning)  # the reader has already warned, with the location
-                # sequentially: in parallel, the order of the objects, and with it the kernels, would be random
+                # sequentially: in parallel, the order of the objects, and thus the kernels, would be random
                 return self.mi.load_dict(plugin, parallel=False, optimize=optimize)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
@@ -118,7 +119,7 @@ class _Builder:
             text = str(error).strip()
             if raised := _RAISED.search(text):
                 kind, at, what, hint = raised.groups()
-                if kind == "MachineError":  # whatever the scene says
+                if kind == "MachineError":  # not caused by the scene
                     raise MachineError(what, at, hint) from None
                 raise InputError(what, self.description.where(where), hint) from None
             raise InputError(
@@ -197,7 +198,7 @@ class _Builder:
         return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
     def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
-        """Mitsuba's own exact shape, None if it has none."""
+        """Mitsuba's own exact shape; None if it has none."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
             rotation = shape.transform.rotate
@@ -262,7 +263,7 @@ class _Builder:
             try:
                 bsdf = self.load(group.plugin(self.mi), places[members[0]])
             except InputError:
-                continue  # it accepts no textures, or one of them is invalid, which is reported when it is built alone
+                continue  # no textures are accepted, or a material is invalid, which is reported when it is built alone
             if bsdf.placed.model.transmits and bsdf.placed.model.interior is not None:
                 continue  # its index and absorption are also needed away from its shape
             self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
@@ -270,7 +271,7 @@ class _Builder:
     def plugin(self, material: MaterialPart, where: str) -> PluginDict:
         """The material as a Mitsuba dict."""
         plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
-        # As in the lab, back sides are not black; the flag has no effect on a material that transmits.
+        # As in the lab, back sides are not black; the flag has no effect on materials that transmit light.
         plugin["two_sided"] = material.two_sided is not False
         if material.preset is not None:
             plugin["preset"] = material.preset
@@ -336,7 +337,7 @@ class _Builder:
         return {**perturbed, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
 
     def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
-        """The values of an image, before the factor."""
+        """The values of an image, without its factor."""
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
         channel = texture.channel if isinstance(texture, ImageTexture) else None
         path, inside = self.description.locate(texture.file, f"{where}/file"), documents.inside(texture.file)[1]

@@ -1,4 +1,4 @@
-"""What a picture may be differentiated along: values of a scene's materials, by their path in the scene."""
+"""Values with respect to which a picture can be differentiated: those of a scene's materials, by path in the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHANNELS = ("r", "g", "b")
 
 
 def place_of(path: str, where: str) -> tuple[str, str]:
-    """("shapes.0.material", "base.alpha") of "shapes.0.material.base.alpha"."""
+    """A path in two parts: ("shapes.0.material", "base.alpha") for "shapes.0.material.base.alpha"."""
     steps = path.removeprefix("scene.").split(".")
     if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdecimal() or steps[2] != "material":
         raise InputError(f"'{path}' names no material of a shape", where, 'such as "shapes.0.material.alpha"')
@@ -21,7 +21,7 @@ def place_of(path: str, where: str) -> tuple[str, str]:
 
 
 def material_at(description: SceneDescription, built: Built, place: str, where: str) -> BSDFPlugin:
-    """The plugin that a material of the scene has become. Raises InputError where it is none of Gonio's."""
+    """The plugin of a material in the scene. Raises InputError if it is not one of Gonio's."""
     index = int(place.split(".")[1])
     if index >= len(description.shapes):
         raise InputError(f"no shape {index}", where, f"the scene has {len(description.shapes)}")
@@ -33,8 +33,8 @@ def material_at(description: SceneDescription, built: Built, place: str, where: 
 
 
 def along(description: SceneDescription, built: Built, path: str) -> Along:
-    """What "shapes.0.material.alpha" names, or "shapes.0.material.albedo.r". Raises InputError for what has no
-    derivative."""
+    """The variable named by a path such as "shapes.0.material.alpha" or "shapes.0.material.albedo.r". Raises InputError
+    for values without derivatives."""
     where = f"gradient: {path}"
     place, parameter = place_of(path, where)
     plugin = material_at(description, built, place, where)

@@ -25,7 +25,7 @@ def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool
         path = file.resolve()  # follows symbolic links, so that they cannot lead outside
         exists, regular = path.exists(), path.is_file()
         empty = regular and path.stat().st_size == 0
-    except (OSError, ValueError, RuntimeError) as error:  # too long, a NUL byte, a loop of links
+    except (OSError, ValueError, RuntimeError) as error:  # the name is too long, has a NUL byte, or links form a loop
         raise InputError(f"no usable file name: {error}", where, "give a file beside the scene") from None
     if not allow_outside and not path.is_relative_to(folder):
         raise InputError(

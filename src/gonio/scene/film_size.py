@@ -13,7 +13,7 @@ MAX_SIDE = 1 << 16  # pixels
 
 
 def check_film(size: tuple[int, int], where: str) -> None:
-    """Raise InputError for a film without pixels, or one too large for memory at one sample per pixel."""
+    """Raise InputError for a film without pixels, or for one that is too large for this machine's memory."""
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
@@ -28,7 +28,7 @@ def check_film(size: tuple[int, int], where: str) -> None:
 
 
 def memory() -> int:
-    """Bytes of memory in this machine; 8 GiB if the system does not report it."""
+    """Bytes of memory in this machine; 8 GiB if the system does not report them."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):

@@ -1,8 +1,8 @@
 """The materials of scene files, derived from the parameters that each model declares.
 
-Two families share the `type` key. The lab's six types have the lab's keys, meaning and defaults (`LAB`); every model of
+Two families share the `type` key. The lab's six types have the lab's keys, meaning and defaults (`LAB`). Every model of
 Gonio is available with its own parameters and defaults, as `gonio-conductor`, and without the prefix unless the lab
-uses that name. New models need no change here, nor do materials that are registered later, or classes in a Python file
+uses that name. New models need no change here, nor do materials that are registered later, nor classes in a Python file
 in the scene's folder ("ward.py:Ward"), which are executed only if code is allowed.
 """
 
@@ -61,7 +61,7 @@ Model = type[BSDF]
 Locate: TypeAlias = Callable[[str, str], Path]
 T = TypeVar("T")
 
-# What a parameter may be in a scene file
+# The possible values of a parameter in a scene file
 Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[float | ImageTexture, ...]"
 
 
@@ -69,7 +69,7 @@ Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[flo
 class LabType:
     """The mapping of a type of the lab's format to a model.
 
-    renamed   the lab's key -> the parameter it sets, value unchanged
+    renamed   the lab's key -> the parameter that it sets, with the value unchanged
     defaults  parameters whose default in the lab differs from the model's
     required  keys that the lab requires
     ignored   keys that are accepted but have no effect
@@ -109,7 +109,7 @@ LAB = {
 
 
 class Argument(NamedTuple):
-    """A parameter's value in a scene. `key` is its key in the file; `squared`: the parameter is the value's square."""
+    """A parameter's value in a scene, and its key in the file; if `squared`, the parameter is the square of `value`."""
 
     value: Value
     key: str
@@ -117,7 +117,7 @@ class Argument(NamedTuple):
 
 
 class MaterialPart(Part):
-    """The base of all materials; `_declare` creates the subclasses."""
+    """The base class of all materials; `_declare` creates the subclasses."""
 
     type: str
     normalmap: NormalMap | None = None
@@ -127,16 +127,16 @@ class MaterialPart(Part):
     two_sided: Annotated[bool, Strict()] | None = None
     """Whether both sides reflect alike. The default is true for all materials that transmit no light."""
 
-    _given: bool = PrivateAttr(False)  # made by a program: paths of files are used unchanged
+    _given: bool = PrivateAttr(False)  # whether a program made it; paths of files are then used unchanged
     _source: str = PrivateAttr("")  # the document that contains the material
     _notices: tuple[str, ...] = PrivateAttr(())  # what could not be converted from that document
     model: ClassVar[Model]
-    declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
-    dials: ClassVar[dict[str, str]]  # artist's key -> the parameter alpha whose square root it is
+    declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter that it sets
+    dials: ClassVar[dict[str, str]]  # key of a perceptual roughness -> the parameter alpha whose square root it is
     lab: ClassVar[LabType | None]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the type's name, since the classes are created at run time and belong to no module."""
+        """Pickle by the name of the type, since the classes are created at run time and belong to no module."""
         return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
 
     def get(self, key: str) -> Value | None:
@@ -161,8 +161,8 @@ class MaterialPart(Part):
         return preset
 
     def code(self) -> list[Path]:
-        """The user's Python files that it runs: its own, those of a distribution, a masking term, ..., and the modules
-        that these import from their folders."""
+        """The user's Python files that the material runs: its own, those of its distribution, masking term, ..., and
+        the modules that these import from their folders."""
         texts = [inspect.getsourcefile(self.model) or ""] if outside.is_outside(self.model) else []
         for name, (value, _, _) in self.arguments().items():
             parameter = self.model.parameters()[name]
@@ -172,7 +172,7 @@ class MaterialPart(Part):
         return [file for text in texts for file in outside.with_imports(Path(text))]
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
-        """The path of a file parameter. A scene's files must lie in its folder, unless files outside are allowed."""
+        """The path of a file parameter. A scene's files must lie in its folder unless files outside are allowed."""
         path, item = parted(file)
         if not self._given and locate is not None and path != SAMPLE:
             path = str(locate(path, pointer))
@@ -183,7 +183,7 @@ class MaterialPart(Part):
 
         locate  function that returns the path of a file, given its name in the scene and a JSON pointer
         where   JSON pointer of this material
-        Raises InputError for a combination that the model rejects (a two-sided glass).
+        Raises InputError for combinations that the model rejects, such as two-sided glass.
         """
         parameters = self.model.parameters()
         values: dict[str, Any] = {}
@@ -246,7 +246,7 @@ class MaterialPart(Part):
 
 
 def _attribute(key: str) -> str:
-    # The prefix prevents a parameter from hiding a method of pydantic (`copy`, `json`) or of this class.
+    # The prefix keeps a parameter from hiding a method of pydantic (`copy`, `json`) or of this class.
     return f"value_{key}"
 
 
@@ -394,13 +394,13 @@ def _summary(model: type[BSDF]) -> str:
 
 
 def _spellings(name: str) -> tuple[str, ...]:
-    """A model's names in a scene, with hyphens or underscores; the lab's own types come first."""
+    """A model's names in a scene, with hyphens or underscores; without the prefix unless the lab uses that name."""
     plain = () if name in LAB else (name,)
     return tuple(dict.fromkeys(s for n in (*plain, f"gonio-{name}") for s in (n, n.replace("-", "_"))))
 
 
 class _Declared(Mapping[str, type[MaterialPart]]):
-    """The class of each type by its names in a scene, created on first access: creating all of them takes a second."""
+    """The class of each type by its names in a scene, created on first access, since creating all takes a second."""
 
     def __init__(self) -> None:
         known = models()
@@ -427,7 +427,7 @@ class _Declared(Mapping[str, type[MaterialPart]]):
 
 
 BY_TYPE = _Declared()
-OWN = "FILE.py:CLASS"  # tag of Gonio's materials; those in other programs' files have the name of the format
+OWN = "FILE.py:CLASS"  # tag of Gonio's materials; materials in other programs' files have the name of the format
 
 
 @functools.cache
@@ -443,7 +443,7 @@ def part_of(name: str) -> type[MaterialPart] | None:
         return BY_TYPE[name]
     if library.knows(name):
         return BY_TYPE[library.named(name)[0].name]
-    model: Any = models().get(name.replace("_", "-").removeprefix("gonio-"))  # Any: mypy takes it for unhashable
+    model: Any = models().get(name.replace("_", "-").removeprefix("gonio-"))  # Any, since mypy thinks it unhashable
     return None if model is None else _own_part(name, model)
 
 
@@ -483,13 +483,13 @@ class DocumentPart(Part):
     """A material in another program's file, converted to Gonio's own materials with its numbers and textures."""
 
     type: Literal[tuple(Document.family.all())]  # type: ignore[valid-type]
-    """The file's format."""
+    """The format of the file."""
     file: str = Field(min_length=1)
     """The file, in the scene's folder; its textures must lie in its own folder."""
     material: Annotated[str, Strict()] | None = None
     """The material in the file, by name, or by number if it has no name; not needed if there is only one."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """As for any material."""
+    """Whether both sides reflect alike, as for any material."""
 
 
 def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> MaterialPart:
@@ -516,7 +516,7 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
 
 
 def _relative_to_scene(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
-    """The notation with paths of files relative to the scene's folder."""
+    """A material's notation, with the paths of its files relative to the scene's folder."""
     relative: dict[str, object] = {}
     for key, value in notation.items():
         if key == "file":
@@ -534,7 +534,7 @@ def _tag(value: object) -> str | None:
 
 
 def _own(value: object, info: ValidationInfo) -> MaterialPart:
-    """A material by its type: Gonio's, named, registered, or from a Python file, where code is allowed."""
+    """A material by its type: one of Gonio's, a named or registered one, or, if code is allowed, one from a file."""
     if isinstance(value, MaterialPart):
         return value
     if not isinstance(value, dict):
@@ -579,7 +579,7 @@ def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart
 
 
 def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
-    """A named material, as its model with a preset."""
+    """A material of the library by name, as its model with a preset."""
     try:
         model, preset = library.named(name)
     except InputError as error:
@@ -587,7 +587,7 @@ def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> 
     return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
 
 
-# Placeholder for any of Gonio's materials in a generated schema, since there are many, and they can be nested.
+# Placeholder for any of Gonio's materials in a generated schema, since there are many and they can be nested.
 PLACEHOLDER = {"$comment": "any material"}
 
 if TYPE_CHECKING:
@@ -601,7 +601,7 @@ else:
 
 
 def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
-    """The schema of any material, given references to those of Gonio's."""
+    """The schema of any material, given references to the schemas of Gonio's."""
     pattern = {"type": {"type": "string", "pattern": _CODE}}
     own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
     properties = {"type": {"const": SHADER}, "file": {"type": "string", "minLength": 1}}

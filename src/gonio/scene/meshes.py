@@ -1,9 +1,9 @@
 """Triangle meshes: shapes that Mitsuba lacks, and mesh files.
 
 Disk, cone and cylinder are tessellated with exact normals and texture coordinates at the vertices. A full turn has
-`SEGMENTS` = 1024 segments: points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface, and
-dp/du, constant over a segment, is off by up to pi/1024 = 0.18 degrees, as are normals near a cone's apex; u is off by
-up to half a segment, 1/2048, near the center of a disk and the apex of a cone.
+`SEGMENTS` = 1024 segments. Points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface. The
+direction of dp/du, constant within a segment, has an error of up to pi/1024 = 0.18 degrees, as have normals near a
+cone's apex; u has an error of up to half a segment, 1/2048, near the center of a disk and the apex of a cone.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..bridge.types import BSDFPlugin, Emitter, Shape
 from ..errors import InputError
 
 PlyProperties: TypeAlias = list[tuple[str, ...]]  # (type, name), or ("list", type of the count, type, name)
-PlyTable: TypeAlias = dict[str, np.ndarray | list[list[int]]]  # columns; those of lists are lists
+PlyTable: TypeAlias = dict[str, np.ndarray | list[list[int]]]  # columns by name; columns of lists are lists of lists
 
 SEGMENTS = 1024
 MAX_BYTES = 2**30  # of a mesh file
@@ -84,25 +84,25 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def disk(radius: float, inner_radius: float, phi_max: float) -> Triangles:
-    """In z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the center."""
+    """A disk in z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the center."""
     return _revolved(
         phi_max, rings=[(radius, 0.0, 0.0), (inner_radius, 0.0, 1.0 - inner_radius / radius)], slope=(0.0, 1.0)
     )
 
 
 def cylinder(radius: float, height: float, phi_max: float) -> Triangles:
-    """From z = 0 to z = height, open at both ends, normals outward; v = z / height."""
+    """A cylinder from z = 0 to z = height, open at both ends, with normals outward; v = z / height."""
     return _revolved(phi_max, rings=[(radius, 0.0, 0.0), (radius, height, 1.0)], slope=(1.0, 0.0))
 
 
 def cone(radius: float, height: float, phi_max: float) -> Triangles:
-    """Base circle in z = 0, apex at z = height, open below, normals outward; v = z / height."""
+    """A cone with its base in z = 0 and its apex at z = height, open below, with normals outward; v = z / height."""
     length = math.hypot(radius, height)
     return _revolved(phi_max, rings=[(radius, 0.0, 0.0), (0.0, height, 1.0)], slope=(height / length, radius / length))
 
 
 def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tuple[float, float]) -> Triangles:
-    """The band between two rings (radius, z, v) about z. `slope` is the normal's part along the radius and along z.
+    """The band between two rings (radius, z, v) about z. `slope` has the normal's components along the radius and z.
 
     A ring of radius 0, where u is undefined, gets one vertex per segment, at the middle angle of the segment, so that
     dp/du of each triangle has the direction of its chord.
@@ -132,7 +132,7 @@ def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tu
 
 
 def cube() -> Triangles:
-    """[-1, 1]^3, normals outward. On the face across axis i, u runs along axis i + 1 and v along axis i + 2."""
+    """The cube [-1, 1]^3 with normals outward. On faces normal to axis i, u runs along axis i + 1 and v along i + 2."""
     vertices: list[np.ndarray] = []
     normals: list[np.ndarray] = []
     faces: list[list[int]] = []
@@ -166,9 +166,9 @@ def is_ply(path: Path) -> bool:
 
 
 def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
-    """The triangles of an .obj or .ply file. Raises InputError, with the line of the file if it has lines.
+    """The triangles of an .obj or .ply file. Raises InputError, with the line if the format has lines.
 
-    kind  suffix to use instead of the name's
+    kind  suffix of the format, instead of that of the name
     """
     readers = {".obj": read_obj, ".ply": read_ply}
     kind = kind or path.suffix.lower()
@@ -188,7 +188,7 @@ def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
 
 
 def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
-    """The mesh without degenerate faces, its normals normalized. Raises InputError for unusable numbers or indices."""
+    """The mesh without degenerate faces and with unit normals. Raises InputError for unusable numbers or indices."""
     if len(mesh.faces) == 0:
         raise InputError(f"'{path.name}' has no faces", where, "export it with triangles or polygons")
     for name, values in (("vertex", mesh.vertices), ("normal", mesh.normals), ("texture coordinate", mesh.uv)):
@@ -432,7 +432,7 @@ def _ply_binary(body: memoryview, count: int, properties: PlyProperties, order: 
 def _ply_triangles(
     body: memoryview, count: int, properties: PlyProperties, order: str
 ) -> tuple[PlyTable, memoryview] | None:
-    """The usual case, a single list with only triangles, without a loop; None in other cases."""
+    """The usual case, a single list of triangles only, read without a loop; None in other cases."""
     if len(properties) != 1:
         return None
     _, counter, item, name = properties[0]

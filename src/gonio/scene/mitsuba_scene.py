@@ -36,9 +36,9 @@ def load(
     size: tuple[int, int] | None = None,
     own_integrator: bool = True,
 ) -> Scene:
-    """The scene of a Mitsuba XML file that was `read`.
+    """The scene of a Mitsuba XML file, given its text as returned by `read`.
 
-    size            size of the film in pixels; None keeps that of the scene
+    size            size of the film in pixels; None keeps the scene's
     own_integrator  whether the scene must name an integrator
     Raises InputError.
     """
@@ -67,8 +67,9 @@ def load(
 def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
     """Turn errors that a scene causes during rendering into InputErrors with Mitsuba's text.
 
-    own_integrator  the scene is rendered by its own integrator, so that all errors but those of Gonio's materials are
-                    Mitsuba's; otherwise only those of plugins are, "[Texture] eval_1_grad(): not implemented!"
+    own_integrator  whether the scene is rendered by its own integrator, so that all errors except those of Gonio's
+                    materials are Mitsuba's; otherwise only errors of plugins are, such as
+                    "[Texture] eval_1_grad(): not implemented!"
     """
     try:
         yield
@@ -86,9 +87,9 @@ def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
 
 
 def load_bsdf(path: Path) -> MitsubaBSDF:
-    """The BSDF of a Mitsuba XML file: its root, or the first one in a scene. It may read files in the same folder.
+    """The BSDF of a Mitsuba XML file: its root, or the first BSDF of a scene. It may read files in the same folder.
 
-    Raises InputError where there is none.
+    Raises InputError if there is none.
     """
     mi = foreign.mitsuba()
     with _without_options():
@@ -107,7 +108,8 @@ def load_bsdf(path: Path) -> MitsubaBSDF:
 
 
 def within(description: PluginDict, file: Path) -> PluginDict:
-    """The description in a file, with absolute paths of the files that it names; these must lie in its folder."""
+    """A description given in a file, with absolute paths of the files that it names; these must lie in that file's
+    folder."""
 
     def locate(name: str) -> str:
         return mitsuba_xml.readable(name, file.parent / name, file.parent, str(file))
@@ -125,7 +127,7 @@ def within(description: PluginDict, file: Path) -> PluginDict:
 
 @contextlib.contextmanager
 def _without_options() -> Iterator[None]:
-    """Remove the hint at an option of scenes from errors inside the `with` block."""
+    """Inside the block, remove the hint about `--allow-outside`, an option for scenes, from errors."""
     try:
         yield
     except InputError as error:
@@ -135,8 +137,8 @@ def _without_options() -> Iterator[None]:
 def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
     """The Mitsuba object that a scene's text describes. Raises Mitsuba's own errors."""
     allowed = [folder.resolve()] if text.runs_code else []
-    # Sequentially and without merging: otherwise the order of shapes, and with it the last bit, would be random.
-    # In parallel, an unreadable file would abort the process, since the error is raised in another thread.
+    # Sequentially and without merging, since otherwise the order of shapes, and thus the last bits, would be random.
+    # In parallel, an unreadable file would also abort the process, since the error is raised in another thread.
     with file_threads(), plugin_search.searching(mi, *allowed):
         return mi.load_string(text.text, parallel=False, optimize=False)
 
@@ -146,7 +148,7 @@ def _as_xml(value: object) -> str:
 
 
 def _mitsuba_text(error: Exception, scene: SceneText) -> str:
-    """Mitsuba's message without locations in its C++ source and without a traceback of Gonio."""
+    """Mitsuba's message without locations in its C++ source and without Gonio's traceback."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
     text = lines[0] if lines else type(error).__name__

@@ -1,10 +1,10 @@
-"""Rewriting the XML of a Mitsuba scene as one text without names that Mitsuba would have to look up.
+"""Rewriting the XML of a Mitsuba scene as a single text without names that Mitsuba would have to look up.
 
 Includes, search paths and parameters have the same meaning as in Mitsuba:
 
     <default name="spp" value="16"/>       default of a parameter, which "$spp" refers to
     <include filename="materials.xml"/>    inserts another file here
-    <path value="textures"/>               a folder in which files of plugins are searched first
+    <path value="textures"/>               a folder that is searched first for files of plugins
 
 They are resolved here, because Mitsuba would also search the current folder. In the rewritten text, each file is an
 absolute path to a file that may be read, and each plugin is one that may be loaded.
@@ -28,11 +28,11 @@ from ..measure import SAMPLE, parted
 from ..pictures import formats, scene_files
 from . import files, meshes
 
-MAX_BYTES = 64 << 20  # of all files together, and of the text that parameters add
+MAX_BYTES = 64 << 20  # size of all files together, and of the text that parameters add
 MAX_ELEMENTS = 1_000_000
 MAX_DEPTH = 64
 MAX_INCLUDES = 15  # nested, as in Mitsuba
-MAX_PARAMETER = 100  # characters of a parameter's name; as many are compared after each $
+MAX_PARAMETER = 100  # characters of a parameter's name; up to this many are compared after each $
 MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
 
 # elements that describe an object, which a plugin creates
@@ -48,9 +48,9 @@ class SceneText(NamedTuple):
 
     text       XML with one element per line
     origins    file and line that each line of `text` comes from
-    files      the files that are read, by their names in the scene, including included ones
-    sources    the texts of its XML files
-    runs_code  whether it loads native plugins from its folder
+    files      the files that are read, by their names in the scene, including those of <include>
+    sources    the texts of the scene's XML files
+    runs_code  whether the scene loads native plugins from its folder
     """
 
     text: str
@@ -73,8 +73,8 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
     """The text of a scene or of a single object.
 
     parameters     values of its `$parameters`
-    allow_outside  allow it to name files outside its folder
-    allow_code     allow it to load native plugins from the folder `plugins` beside it
+    allow_outside  allow the scene to name files outside its folder
+    allow_code     allow the scene to load native plugins from the folder `plugins` next to it
     Raises InputError, with file and line, for XML that is not well-formed, for a file that must not be read or is
     missing, for a plugin that must not be loaded, and for parameters that the scene does not have.
     """
@@ -112,10 +112,10 @@ def readable(name: str, path: Path, folder: Path, location: str, allow_outside: 
 def property_value(
     kind: str, name: str, value: str, location: str, locate: Callable[[str], str], allow_code: bool = False
 ) -> str:
-    """The value of a string property of a plugin; if it names a file, with the path of that file.
+    """The value of a string property of a plugin; if it names a file, the path of that file.
 
     kind    type of the plugin
-    locate  returns the path of a file that may be read, given its name
+    locate  function that returns the path of a file that may be read, given its name
     Raises InputError for code, and if Mitsuba would search other folders for a file of that name.
     """
     if outside.names_code(value) and not allow_code:
@@ -138,31 +138,30 @@ class _Reader:
     """The state that all files of a scene share.
 
     values   values of parameters, by name
-    folders  folders in which files of plugins are searched: those of <path> in the scene's own file, then the scene's
+    folders  folders that are searched for files of plugins: those of <path> in the scene's own file, then the scene's
              folder, then Mitsuba's
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
         self.file, self.folder = file, file.parent.resolve()
         self.values, self.used = dict(parameters), set[str]()
-        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # of the parameters' names
+        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # lengths of the parameters' names
         self.allow_outside, self.allow_code = allow_outside, allow_code
         self.lines: list[str] = []
         self.origins: list[tuple[Path, int]] = []
         self.files: dict[str, Path] = {}
         self.sources: list[str] = []
         self.folders: list[Path] = []
-        self.texts: list[tuple[int, str, dict[str, str], str]] = []  # those of plugins: line, plugin, element, place
-        self.references: dict[str, set[str]] = {}  # from the id of an object to those that it needs
+        self.texts: list[tuple[int, str, dict[str, str], str]] = []  # strings of plugins: line, plugin, element, place
+        self.references: dict[str, set[str]] = {}  # id of an object -> ids of those that it needs
         self.runs_code = False
-        self.version = ""  # of the scene's own file
-        self.bytes = self.elements = self.grown = 0  # what was read, and what parameters have added to it
+        self.version = ""  # version of the scene's own file
+        self.bytes = self.elements = self.grown = 0  # bytes and elements read, and bytes that parameters have added
 
     # ------------------------------------------------------------------ files
 
     def parse(self, file: Path, folders: list[Path], included: Mapping[str, str] | None = None, level: int = 0) -> None:
-        """Append the content of a file. `folders` are those in which it searches; `included` is the element that
-        includes it."""
+        """Append the content of a file. It searches `folders`; `included` is the element that includes it."""
         try:
             data = file.read_bytes()
         except OSError as error:
@@ -190,7 +189,7 @@ class _Reader:
             self.lines[line] = _tag("string", {**attributes, "value": value})
 
     def check_references(self) -> None:
-        """Raise InputError for circular or too long chains of references, since Mitsuba follows them by recursion."""
+        """Raise InputError for circular or overlong chains of references, since Mitsuba follows them recursively."""
         depths = dict.fromkeys({*self.references, *(n for names in self.references.values() for n in names)}, 0)
         waiting = Counter(name for names in self.references.values() for name in names)
         ready = [name for name in depths if not waiting[name]]
@@ -222,7 +221,7 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with parameters replaced by their values; after each $, the longest matching name counts."""
+        """A value with parameters replaced by their values; after each $, the longest matching name is used."""
         if "$" not in value:
             return value
         first, *others = re.split(r"(?<!\\)\$", value)
@@ -268,8 +267,8 @@ class _File:
     ) -> None:
         self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
         self.open: list[str] = []  # enclosing elements, "" for those that are resolved here and not written
-        self.kinds: list[str] = []  # of plugins, of the same elements
-        self.ids: list[str] = []  # of the same elements
+        self.kinds: list[str] = []  # plugin types of the same elements
+        self.ids: list[str] = []  # ids of the same elements
         self.parser = expat.ParserCreate()
         self.parser.StartDoctypeDeclHandler = self.parser.EntityDeclHandler = self._refused
         self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
@@ -331,7 +330,7 @@ class _File:
         self._line(_tag(tag, attributes))
 
     def _note_reference(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Record which objects a named one depends on: those that it refers to, and named ones inside it."""
+        """Record which objects a named object depends on: those that it refers to, and named objects inside it."""
         references, name = self.scene.references, attributes.get("id", "")
         if tag == "alias":
             references.setdefault(attributes.get("as", ""), set()).add(name)
@@ -368,7 +367,7 @@ class _File:
         self.scene.parse(path, folders, attributes, self.level + 1)
 
     def _root(self, tag: str, attributes: dict[str, str]) -> str:
-        """The root element as it is written: "" for an included scene, of which only the content is written; any other
+        """The root element as it is written: "" for an included scene, since only its content is written; any other
         included object gets the name of its <include>."""
         if tag not in OBJECTS:
             raise InputError(f"the file begins with <{tag}>", self.location, "a <scene> or another object is expected")

@@ -25,7 +25,7 @@ def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
 
 
 def _plain(value: object, path: str) -> Json:
-    """The value as a scene file would hold it: tuples and arrays are lists."""
+    """The value as a scene file would contain it, with lists in place of tuples and arrays."""
     if isinstance(value, Mapping):
         for key in value:
             _check_text(str(key), path)
@@ -122,7 +122,7 @@ def _index(holder: list[Json], step: str, path: str) -> int:
 
 
 def _that_take(holders: list[Json], key: str) -> list[Json]:
-    """The objects that have the key; if none has, the materials that accept it."""
+    """The objects that have the key; if none does, the materials that accept it."""
     with_key: list[Json] = []
     with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdecimal())]
     if with_key:

@@ -19,7 +19,7 @@ from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
 
-MAX_SHOWN = 4  # errors reported at once: enough to correct a file in one go, few enough to read
+MAX_SHOWN = 4  # errors reported at once: enough to correct a file in one pass, few enough to read
 
 
 def read(
@@ -98,7 +98,7 @@ def _check_output(description: SceneDescription) -> None:
 
 
 def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
-    """Warnings about a material, as (pointer relative to the material, text). Raises InputError for an invalid one."""
+    """Warnings about a material, as (pointer relative to the material, text). Raises InputError if it is invalid."""
     warnings = [("", f"{material._source}: {notice}") for notice in material._notices]
     for name, (value, key, _) in material.arguments().items():
         parameter = material.model.parameters()[name]
@@ -144,7 +144,7 @@ def _key(part: type[Part], field: str) -> str:
 
 
 def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
-    """A function that returns the scene as text, including overrides, and the files that the scene uses.
+    """(a function that returns the scene as text, including overrides; the files that the scene uses).
 
     The files are textures, meshes, documents and Python files, by their names in the scene.
     """
@@ -172,7 +172,7 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
 
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
-    """The first error with location, expectation and hint, and the next few with one line each, hint in parentheses."""
+    """The first error with location, problem and hint; the next few in one line each, with the hint in parentheses."""
     problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
         where, what, hint = _one(detail, raw)
@@ -187,7 +187,7 @@ def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 
-# what other programs' types are called here, where the name that is most alike says too little
+# hints for types of other programs for which the most similar name would be misleading
 ELSEWHERE = {
     "pointLight": "write 'spotLight', which shines equally in all directions",
     "point": "write 'spotLight', which shines equally in all directions",
@@ -196,7 +196,7 @@ ELSEWHERE = {
 
 def _type_of(file: str) -> str:
     """The type of a material or shape that a file holds, by its suffix."""
-    from ..catalog import documents  # readers of files, which a scene without one does not need
+    from ..catalog import documents  # readers of files, not needed by scenes without such files
     from ..measure import names_table
 
     for document in documents.Document.family.all().values():
@@ -267,7 +267,7 @@ def _as_file(value: Json) -> str:
 
 
 def _plain(known: list[str]) -> list[str]:
-    """One spelling of each name: without underscores, and without the prefix of names that Mitsuba has too."""
+    """One spelling of each name: without underscores, and without the prefix "gonio-"."""
     return [name for name in known if "_" not in name and not name.startswith("gonio-")]
 
 
@@ -279,7 +279,7 @@ def _unquote(value: Json) -> str:
 
 
 def _place(location: tuple[str | int, ...], raw: Json, keep_last: bool) -> tuple[list[str | int], Json]:
-    """The steps into the file and the value there, without the tags of unions that pydantic's location contains."""
+    """The steps to a value in the file, without the tags of unions that pydantic's location contains, and the value."""
     steps: list[str | int] = []
     value = raw
     for index, step in enumerate(location):

@@ -26,7 +26,7 @@ from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, V
 if TYPE_CHECKING:
     from ..transport import integrators as program
 
-MAX_SAMPLES = 2**30  # samples per pixel; those of one pixel can still be counted in 32 bits
+MAX_SAMPLES = 2**30  # samples per pixel, which can still be counted in 32 bits
 
 
 class Output(Part):
@@ -85,7 +85,7 @@ class Sampler(Part):
 
     @property
     def preference(self) -> str:
-        """The requested sampler; "default" if the file states no preference."""
+        """The requested sampler; "default" if the file expresses no preference."""
         return "default" if self.type == "independent" else self.type
 
 

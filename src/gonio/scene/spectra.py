@@ -1,4 +1,4 @@
-"""Emission spectra of lamps: for Mitsuba in spectral variants, as colors in the others."""
+"""Emission spectra of lamps: spectra in Mitsuba's spectral variants, colors in the others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SECOND_RADIATION = 1.438776877e7  # nm K, hc/k in Planck's law
 
 
 def emitted(light: Colour | LightSpectrum) -> PluginDict:
-    """A light's radiance as a Mitsuba plugin: a spectrum if both the variant and the light are spectral, else rgb."""
+    """A light's radiance as a Mitsuba plugin: a spectrum if the variant and the light are spectral, else rgb."""
     if engine.load().is_spectral and not np.any(light.scale if isinstance(light, LightSpectrum) else light):
         return {"type": "uniform", "value": 0.0}  # Mitsuba rejects a `regular` spectrum that is 0 everywhere
     if isinstance(light, LightSpectrum) and engine.load().is_spectral:
@@ -30,7 +30,7 @@ def emitted(light: Colour | LightSpectrum) -> PluginDict:
 
 
 def colour(light: Colour | LightSpectrum) -> list[float]:
-    """A light's radiance as linear sRGB. Colors outside the gamut are clipped at 0 and rescaled to preserve the
+    """A light's radiance as linear sRGB. Colors outside the gamut are clipped at 0 and rescaled to preserve
     luminance."""
     if not isinstance(light, LightSpectrum):
         return values.rgb(light)
@@ -65,7 +65,7 @@ def _relative(light: LightSpectrum) -> Floats:
 
 
 def _observer() -> Floats:
-    """Mitsuba's CIE 1931 curves, (3, N), scaled so that the constant radiance of Mitsuba's white has Y = 1."""
+    """Mitsuba's CIE 1931 curves, (3, N), scaled so that a constant radiance of 1, Mitsuba's white, has Y = 1."""
     from ..transport.scene_data import CIE_Y_INTEGRAL
 
     mi = engine.load()

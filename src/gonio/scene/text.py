@@ -1,7 +1,7 @@
 """Parsing the text of a scene file: strict JSON of bounded size and depth, as plain Python values.
 
-Python's own parser is too lenient for a file that people edit by hand (the last of two equal keys wins, NaN is a
-number) and fails on deep nesting. Here each of these is an `InputError` with the location in the file.
+Python's own parser is too lenient for files that people edit by hand (of two equal keys it takes the last, and it
+accepts NaN) and fails on deep nesting. Here, each of these is an `InputError` with the location in the file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..bridge.types import Json
 from ..errors import InputError
 
 MAX_BYTES = 64 * 2**20  # geometry and images are stored in separate files
-MAX_DEPTH = 64  # a lab scene has a depth of 8; 64 allows nested mixes and is far below any stack limit
+MAX_DEPTH = 64  # the lab's scenes have a depth of 8; 64 allows nested mixes and is far below any stack limit
 MAX_INTEGER = 2**53  # beyond this a double cannot represent every integer
 
 
@@ -131,7 +131,7 @@ def _plain(value: Json) -> bool:
 
 
 def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
-    """The value in plain types; raises InputError for the first one that JSON or a scene does not allow."""
+    """The value in plain types. Raises InputError for the first value that JSON or a scene does not allow."""
     if _plain(value):
         return value
     if len(steps) >= MAX_DEPTH and isinstance(value, (dict, list)):

@@ -1,4 +1,4 @@
-"""Images of a scene: their size is checked, they are decoded to linear float32 and passed to Mitsuba as textures."""
+"""Images of a scene: checked for size, decoded to linear float32, and passed to Mitsuba as textures."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ..pictures.images import RGB
 
 
 def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | None = None, inside: str = "") -> RGB:
-    """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded where `srgb`.
+    """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded if `srgb`.
 
-    channel  "r", "g", "b" or "a" alone; alpha is never decoded, and 1 where the image has none
-    inside   the number of the image, in a document that holds several
-    Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
+    channel  "r", "g", "b" or "a" alone; alpha is never decoded, and is 1 if the image has none
+    inside   the number of the image in a document that contains several
+    Raises InputError if the file is not an image, claims more pixels than it can hold, or contains NaN.
     """
     name = path.name
     if path.stat().st_size > scene_files.MAX_BYTES:
@@ -81,12 +81,12 @@ def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDi
 
 
 def environment(mi: ModuleType, values: RGB) -> PluginDict:
-    """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) is u = p/2pi, v = t/pi.
+    """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) has u = p/2pi, v = t/pi.
 
-    Mitsuba's `envmap` differs in two ways. Its azimuth runs the other way, (sin p, -cos p), so that the image is
+    Mitsuba's `envmap` differs in two ways. Its azimuth runs the other way, (sin p, -cos p); the image is therefore
     mirrored left to right and rotated by half a turn. Its rows lie at v = j/(h - 1), including the poles, instead of
     (j + 0.5)/h. The rows are therefore laid out at twice the density: row 2j + 1 is row j, and each row between two of
-    them is their mean, so that linear interpolation is unchanged.
+    these is their mean, so that linear interpolation is unchanged.
     """
     values = np.broadcast_to(values, (*values.shape[:2], 3))
     rows = np.empty((2 * values.shape[0] + 1, values.shape[1], 3), np.float32)

@@ -30,11 +30,11 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from .text import kind_of
 
 VISIBLE = (380.0, 780.0)  # nm
-MAX_NUMBER = 1e18  # its square fits a 32-bit float, so that lengths of vectors stay finite
+MAX_NUMBER = 1e18  # its square fits into a 32-bit float, so that lengths of vectors stay finite
 
 
 def invalid(what: str, hint: str, key: str = "") -> PydanticCustomError:
-    """An error for a validator to raise; `key` is the key of the object that the error is about."""
+    """An error for a validator to raise; `key` is the key that the error is about."""
     # Braces would be read as placeholders, so the text is passed as the value of one.
     return PydanticCustomError("scene", "{what}", {"what": what, "hint": hint, "key": key})
 
@@ -60,7 +60,7 @@ class Part(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """The JSON Schema with the docstrings of the fields. Pydantic itself would read them from the source whenever
-        the class is made, which takes half as long again as all else in a scene's classes."""
+        a class is created, which would make creating a scene's classes take 1.5 times as long."""
         schema = handler(core)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
         for name, text in _docstrings(cls).items():
@@ -81,7 +81,7 @@ class Part(BaseModel):
 
 
 def _docstrings(cls: type[Part]) -> dict[str, str]:
-    """The string below each field of a class and of its bases, as far as they were written in a module."""
+    """The docstrings of the fields of a class and its bases, as far as the classes are defined in a module."""
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         module = sys.modules[base.__module__]
@@ -92,7 +92,7 @@ def _docstrings(cls: type[Part]) -> dict[str, str]:
 
 @functools.cache
 def _documented(module: ModuleType) -> dict[str, dict[str, str]]:
-    """The docstrings of the fields in a module, by class and field."""
+    """The docstrings of all fields in a module, by class and field."""
     classes: dict[str, dict[str, str]] = {}
     for node in ast.parse(inspect.getsource(module)).body:
         if not isinstance(node, ast.ClassDef):
@@ -158,7 +158,7 @@ def _kind_of_value(value: object) -> str | None:
 
 
 def _either(expected: str) -> Discriminator:
-    """Distinguish numbers, lists and textures by the type of the value. The <> around tags let `reader` drop them."""
+    """Distinguish numbers, lists and textures by the type of the value. Thanks to the <>, no tag is equal to a key."""
     return Discriminator(_kind_of_value, "expected", expected)
 
 

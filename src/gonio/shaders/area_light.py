@@ -18,8 +18,10 @@ the horizon is cut off. The tables are read over the roughness and sqrt(1 - cos 
 
 
 def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> Bundle:
-    """The function `area_light` over the tables of `energy.tables.ltc`: with an argument `roughness` if they have this
-    axis, and `f0` if they serve any Schlick reflectance."""
+    """The function `area_light` with the tables of `energy.tables.ltc`.
+
+    It takes `roughness` if the tables have this axis, and `f0` if they serve any Schlick reflectance.
+    """
     inverse, norm = (Table(name, baked.arrays[name]) for name in ("ltc_inverse", "ltc_norm"))
     anisotropic, colored = inverse.channels == 8, norm.channels == 3
     swept = len(inverse.shape) == 2 + anisotropic
@@ -28,7 +30,7 @@ def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> B
     def area_light(
         f0: Spectrum | None, roughness: Scalar, wo: Direction, a: Direction, b: Direction, c: Direction, d: Direction
     ) -> Spectrum:
-        """Radiance reflected toward wo, from a light of radiance 1 with the corners a, b, c, d."""
+        """Radiance reflected toward wo from a light of radiance 1 with the corners a, b, c, d."""
         place = (formulas.turned_coordinates if anisotropic else formulas.coordinates)(inverse, roughness, wo)
         covered = (formulas.turned_quad if anisotropic else formulas.quad)(lookup(inverse, *place), wo, (a, b, c, d))
         albedo = lookup(norm, *place)

@@ -1,4 +1,4 @@
-"""A shader with everything that a program needs to use it: text, manifest, tables."""
+"""A shader with all that a program needs to use it: text, manifest, tables."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Bundle:
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write shader, manifest.json and a file per table in the form of `Placement.tables`; returns their paths."""
+        """Write the shader, manifest.json and one file per table, as `Placement.tables` says; returns their paths."""
         folder = files.check_folder(folder, parents=True)
         contents = {
             self.manifest["shader"]: self.text.encode(),
@@ -69,9 +69,9 @@ def bundle(
 ) -> Bundle:
     """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
 
-    arrays     whether numbered derived constants are arrays: the page passes them to its pixels one by one
+    arrays     whether numbered derived constants are arrays; not in the viewer, which passes them to pixels one by one
     on         paths of weights that stay fields of a lean shader although they are switched off
-    placement  prefix of the names, group and first number of the bindings, form of the files of tables
+    placement  prefix of the names, group and first number of the bindings, file format of the tables
     own        fields of `OwnValues`
     """
     values = OwnValues(**own)
@@ -97,7 +97,7 @@ def _file(
     place: Placement,
     own: OwnValues,
 ) -> Bundle:
-    """A file that runs by itself, which holds its tables."""
+    """A standalone file, which contains its tables."""
     if place.prefix or place.first_binding or place.tables or place.half:
         what = f"a prefix, a binding or a form of tables given, and {language.name} is a file of its own"
         raise InputError(what, "emit: lang", "import it under a name")

@@ -15,7 +15,7 @@ from .placement import Placement
 
 
 def fitted(model: BSDF, order: str, lang: str, placement: Placement | None = None) -> tuple[Bundle, list[str]]:
-    """The curves of a material as code, and a line per curve with its errors."""
+    """The curves of a material as code, and one line per curve with its errors."""
     fits.degrees(order)  # raises before anything is computed
     curves = fits.fit(fits.sample(model), order)
     return curves_bundle(curves, repr(model), order, lang, placement), errors(curves)
@@ -24,9 +24,9 @@ def fitted(model: BSDF, order: str, lang: str, placement: Placement | None = Non
 def curves_bundle(
     curves: Sequence[Curve], title: str, order: str, lang: str, placement: Placement | None = None
 ) -> Bundle:
-    """Functions `albedo(roughness, cos_theta)`, `average_albedo(roughness)` and, where it is known, `dfg`.
+    """Functions `albedo(roughness, cos_theta)`, `average_albedo(roughness)` and, if available, `dfg`.
 
-    The manifest has a key `errors` more: for each function the largest and the mean error.
+    The manifest has the additional key `errors`: the largest and the mean error of each function.
     """
     made = [(written(curve), _types(curve)) for curve in curves if curve.swept or curve.angle]
     low = f"roughness from {fits.LEAST_ROUGHNESS:g} and cosines from {fits.LEAST_COSINE:g}; below, the values there."
@@ -37,7 +37,7 @@ def curves_bundle(
 
 
 def errors(curves: Sequence[Curve]) -> list[str]:
-    """A line per curve: its largest and its mean error, or its value if it is a constant."""
+    """One line per curve: its largest and its mean error, or its value if it is constant."""
     lines = []
     for curve in curves:
         if curve.swept or curve.angle:
@@ -52,7 +52,7 @@ def _types(curve: Curve) -> dict[str, str | None]:
 
 
 def written(curve: Curve) -> Callable:
-    """A curve as a function of the vocabulary, of a roughness and a cosine, of which it may have only one."""
+    """A curve as a function in the vocabulary, of a roughness and a cosine or of only one of them."""
 
     def part(fitted: Rational, roughness: Scalar, cos_theta: Scalar) -> Scalar:
         return fitted(*fits.variables(fitted.forms, roughness, cos_theta))

@@ -20,7 +20,7 @@ from .placement import Placement, PlacementKeywords
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a material is written; the fields are arguments of `emit`."""
+    """The parts of a material to write; the fields are arguments of `emit`."""
 
     functions: str | Sequence[str]
     own: OwnValues = field(default_factory=OwnValues)
@@ -65,24 +65,24 @@ def emit(
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
 
-    model          anything that `go.material` takes, such as "conductor(preset=Au)"; a list of them for a module
-                   that holds them all, with common functions once
-    lang           name of a language, such as "glsl"; `gonio.shaders.languages()` has all of them
-    functions      of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
+    model          anything that `go.material` takes, such as "conductor(preset=Au)"; a list for one module with all of
+                   them, in which common functions are declared once
+    lang           name of a language, such as "glsl"; `gonio.shaders.languages()` lists all of them
+    functions      a choice of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
     lean           omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not
                    a field. An eighth of the text of a default `openpbr` remains
     constants      also write the material's own values, as a constant of its struct: Conductor_values
-    fold           put the material's own values into the code: what depends on them alone is a number there, and the
-                   functions keep the argument of the struct, but do not read it
-    prefix         begins all global names, so that shaders written apart fit into one module
-    group          of the bindings of tables: WGSL's @group, HLSL's register space
-    first_binding  number of the first table's binding
-    tables         form of the files of tables, which the text names: "raw", "exr" or "ktx2"; see `Placement`
-    half           tables of 16 bits per number; the text states the measured error, also of parameters in 16 bits
-    fit            instead the albedos as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
-    ibl            instead the split sum of image-based lighting
-    budget         the most exact terms, table or fit within so many operations; 0 is no limit
-    Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
+    fold           write the material's own values into the code: expressions of them alone become numbers, and the
+                   functions keep the struct as an argument but do not read it
+    prefix         start of all global names, so that separately written shaders fit into one module
+    group          binding group of the tables: WGSL's @group, HLSL's register space
+    first_binding  binding number of the first table
+    tables         format of the table files that the text names: "raw", "exr" or "ktx2"; see `Placement`
+    half           tables of 16 bits per number; the text states the measured error, also that of 16-bit parameters
+    fit            write the albedos instead, as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
+    ibl            write the split sum of image-based lighting instead
+    budget         use the most accurate terms, table or fit within this number of operations; 0 is no limit
+    Numeric parameters become the fields of a struct; choices shape the code. Spectra are RGB, and values are those of
     "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
     Raises InputError for a stochastic material (RandomWalk), which has no shader code, and where `fit`, `ibl` and
     `budget` exclude each other.
@@ -96,11 +96,11 @@ def emit(
 def shader(
     models: MaterialLike | Sequence[MaterialLike], lang: str, choice: Choice, placement: Placement
 ) -> tuple[Bundle, list[str]]:
-    """The shader, and lines on the measured errors of an approximation."""
+    """The shader, and lines that state the measured errors of an approximation."""
     lines: list[str] = []
     several = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
     if placement.half and (choice.fit or choice.ibl or Language.family.get(str(lang)).standalone):
-        raise InputError("half precision asked for", "emit: half", "it goes with whole materials in a shader language")
+        raise InputError("half precision requested", "emit: half", "it needs a whole material in a shader language")
     if choice.approximates:
         choice.check(len(several))
         model = material(several[0])

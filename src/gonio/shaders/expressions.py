@@ -12,7 +12,7 @@ from .source import returned_by
 from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
 from .values import SIZES, Member, Record, Routine, Value, stem_of
 
-INLINE = 88  # characters: a longer part of an expression gets a separate line
+INLINE = 88  # characters; a longer part of an expression gets a separate line
 # selections of existing values, which never get a separate line
 SELECTED = ("parameter", "constant", "component", "swizzle", "element")
 
@@ -57,7 +57,7 @@ class ExpressionWriter(ParameterWriter):
         }.get(value.op, {"add": "sum", "sub": "difference", "mul": "product"}.get(value.op, "value"))
 
     def wrapped(self, line: str) -> list[str]:
-        """A statement of the body in lines."""
+        """A statement of the body, broken into lines."""
         return wrap(line, INDENT)
 
     # ------------------------------------------------------------------ expressions
@@ -246,7 +246,7 @@ class ExpressionWriter(ParameterWriter):
         return texts
 
     def _array(self, member: Member, parts: list[str], initializer: bool = False) -> str:
-        """An array by the texts of its entries: one that exists, or a new one.
+        """An array from the texts of its entries: an existing one that holds them, or a new one.
 
         initializer  whether the text stands in the braces of a declaration
         """
@@ -262,7 +262,7 @@ class ExpressionWriter(ParameterWriter):
         return local
 
     def member_texts(self, record: Record, values: Sequence[Value | None]) -> list[str]:
-        """The texts of a struct's members by the values of its fields; None for a field that is not read."""
+        """The texts of a struct's members from the values of its fields; None for a field that is not read."""
         texts = []
         for member in self.names.members(record):
             parts = [
@@ -274,7 +274,7 @@ class ExpressionWriter(ParameterWriter):
         return texts
 
     def _member(self, value: Value, type_: str) -> str:
-        """The text of a struct's member among others."""
+        """The text of a struct's member in a list of members."""
         if self.language.whole_members or type_ not in ("vec2", "vec4") or value.op in ("constant", "vector"):
             return self.splat(value, type_)
         return f"{self.language.type(type_)}({', '.join(self._components(value))})"
@@ -283,7 +283,7 @@ class ExpressionWriter(ParameterWriter):
         return "0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM))
 
     def object(self, struct: Struct, fields: dict[str, tuple[Value, bool]]) -> str:
-        """A struct as an argument: this function's own if it holds exactly these fields, or a new one."""
+        """A struct as an argument: this function's own if it holds exactly these fields, else a new one."""
         name = struct.record.name
         if name in self.objects:
             own = self.objects[name][1]

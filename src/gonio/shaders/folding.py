@@ -1,4 +1,4 @@
-"""Constants through the functions of a recording: what depends on a material's own values alone becomes a number."""
+"""Constant propagation in a recording: values that depend only on a material's own values become numbers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..ops import graph
 from ..ops.evaluation import operate
 
 Numbers: TypeAlias = "tuple[float, ...] | tuple[bool, ...]"  # one per component
-SMALLEST, LARGEST = 1.2e-38, 3.4e38  # of normal numbers in 32 bits, but for 0
+SMALLEST, LARGEST = 1.2e-38, 3.4e38  # range of normal float32 numbers other than 0
 
 
 def folded(recorded: graph.Graph, values: Mapping[str, Any]) -> dict[graph.Node, Numbers]:
-    """The nodes of all functions that are the same numbers in every call, where the parameters have these values.
+    """The nodes of all functions that have the same value in every call if the parameters have these values.
 
-    values  by the name of the entry's parameter, "self.alpha": a number, or a list of components
+    values  name of the entry's parameter, "self.alpha" -> a number, or a list of components
     """
     known: dict[graph.Node, Any] = {}
     agreed: dict[graph.Function, list[Any]] = {}  # by callee, its arguments that are the same in all calls so far
@@ -46,7 +46,7 @@ def _parameters(function: graph.Function) -> list[graph.Node]:
 
 
 def _agree(agreed: dict[graph.Function, list[Any]], callee: graph.Function, arguments: list[Any]) -> None:
-    """Keep the arguments that are the same in this call as in those before."""
+    """Keep the arguments that are the same in this call as in all earlier ones."""
     pairs = zip(agreed.get(callee, arguments), arguments, strict=True)
     agreed[callee] = [a if a is not None and b is not None and np.array_equal(a, b) else None for a, b in pairs]
 
@@ -68,7 +68,7 @@ def _value(node: graph.Node, arguments: list[Any], known: Mapping[graph.Node, An
 
 
 def _numbers(node: graph.Node, value: Any) -> Numbers:
-    """The components of a value in 32 bits; empty where one of them has none there."""
+    """The components of a value in 32 bits; empty if one of them cannot be represented."""
     array = np.ravel(np.asarray(value))
     if array.dtype == bool:
         return tuple(map(bool, array))

@@ -1,4 +1,4 @@
-"""Functions of the vocabulary that are no methods of a material, as shader code: table lookups, fits, area lights."""
+"""Functions in the vocabulary that are not methods of a material, as shader code: table lookups, fits, area lights."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Functions = Sequence[tuple[Callable, Mapping[str, str | None]]]
 
 
 class _Plain(Routines):
-    """The routines of functions, each an entry of its name."""
+    """The routines of plain functions, each of which is an entry."""
 
     def __init__(self, functions: Functions, single: bool) -> None:
         kinds = {name: kind for _, types in functions for name, kind in types.items() if kind is not None}
@@ -89,6 +89,6 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
 
 
 def _arguments(functions: Functions, name: str) -> list[str]:
-    """The names of the arguments of an entry."""
+    """The names of an entry's arguments."""
     types = next(types for function, types in functions if function.__name__ == name)
     return [argument for argument, kind in types.items() if kind is not None]

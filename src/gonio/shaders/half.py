@@ -1,4 +1,4 @@
-"""What half precision of tables and parameters changes in a material's values, by measurement."""
+"""The measured effect of half-precision tables and parameters on a material's values."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .read_back import Array, parameters, recorded, values_of
 from .vectors import pairs
 
 PAIRS = 65_536
-BATCH = 4_096  # rows at a time: a recording of many operations holds an array for each
-UNCHANGED = 1e-9  # a smaller error is none, but for rounding in 64 bits
+BATCH = 4_096  # rows at a time: evaluating a recording may hold an array for each operation
+UNCHANGED = 1e-9  # smaller errors are rounding errors in 64 bits
 DIM = 1e-6  # errors of smaller values are relative to this
 SEED = 0
 
@@ -37,11 +37,11 @@ def bounded(made: Bundle, models: Sequence[BSDF]) -> Bundle:
 
 
 def errors(model: BSDF, manifest: Mapping[str, Json]) -> dict[str, Json]:
-    """The largest and the mean relative error of `eval` and `pdf` where tables or single parameters are rounded to half
+    """The largest and the mean relative error of `eval` and `pdf` if tables or single parameters are rounded to half
     precision; all arithmetic is in 64 bits.
 
-    Over 65,536 pairs of `vectors.pairs`, half of them with random parameters (`read_back.parameters`). The error is
-    that of the worst channel, as a part of the largest channel at the pair or of 1e-6 if that is larger.
+    Measured for 65,536 pairs from `vectors.pairs`, half of them with random parameters (`read_back.parameters`). The
+    error is that of the worst channel, relative to the largest channel of the pair, or to 1e-6 if that is larger.
     Returns {"pairs": 65536, "tables": {"eval": {"max", "mean"}, ...} or None without tables, "parameters": the same by
     path, with tables of 32 bits}.
     """
@@ -87,7 +87,7 @@ def _errors(reference: Mapping[str, Array], changed: Mapping[str, Array]) -> Err
 
 
 def described(manifest: Mapping[str, Json]) -> str:
-    """A sentence for the header."""
+    """A sentence on the errors, for the header."""
     half = manifest["half"]
 
     def listed(of: Errors) -> str:

@@ -14,12 +14,12 @@ IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 FORMATS = {(2, 1): 76, (2, 2): 83, (2, 4): 97, (4, 1): 100, (4, 2): 103, (4, 4): 109}
 CHANNELS = (0, 1, 2, 15)  # red, green, blue, alpha of the color model RGBSDA
 SIGNED_FLOAT = 0x80 | 0x40  # qualifiers of a sample
-RGBSDA, UNSPECIFIED, LINEAR = 1, 0, 1  # color model; primaries, since a table is no color; transfer function
+RGBSDA, UNSPECIFIED, LINEAR = 1, 0, 1  # color model; primaries, as a table has no colors; transfer function
 HEAD = 12 + 9 * 4 + 4 * 4 + 2 * 8 + 3 * 8  # identifier, header, index, and the index of one level
 
 
 def ktx2(texels: NDArray[np.floating]) -> bytes:
-    """An uncompressed KTX 2.0 file of (rows, columns, channels) or (layers, rows, columns, channels) float32 or
+    """An uncompressed KTX 2.0 file from (rows, columns, channels) or (layers, rows, columns, channels) float32 or
     float16, with 1, 2 or 4 channels: a 2D or 3D texture of one level.
 
     Source: "KTX File Format Specification 2.0", and for the descriptor "Khronos Data Format Specification 1.3",

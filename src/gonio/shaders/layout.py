@@ -1,4 +1,4 @@
-"""Layout of shader text: comments, and long statements broken into lines."""
+"""The layout of shader text: comments, and long statements broken into lines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
 
 
 def _break(text: str) -> int | None:
-    """Where to break: at the last one of the shallowest operators or commas before the last column."""
+    """The position of a line break: at the last of the shallowest operators or commas before the last column."""
     depth, best = 0, None
     for i, c in enumerate(text[: COLUMNS + 1]):
         if c in "([{":

@@ -59,7 +59,7 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
     ]
     terms = made.entries.get("terms")
     derived = made.derived
-    facts = made.bound  # of the code, whose parameters may change
+    facts = made.bound  # describes the code, whose parameters may change
     return {
         "version": 1,
         "lang": language.name,

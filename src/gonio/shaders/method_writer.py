@@ -76,7 +76,7 @@ const {name} = (sizes, places, texel) => {{
 
 
 def readers(names: Names, table: Table, readings: list[str]) -> list[str]:
-    """The functions that read a table, by `lookup` and `fetch`."""
+    """The functions that read a table for `lookup` and `fetch`."""
     axes = range(len(table.shape))
     letters = [*"xyz"[: len(axes)]]
     cells = [f"cell[{axis}]" for axis in axes]

@@ -1,4 +1,4 @@
-"""One module for the shaders of several materials: what they have in common is declared once."""
+"""One module for the shaders of several materials, in which common declarations appear once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .text import Block
 
 
 class Module:
-    """A text to which shaders are added one after the other.
+    """A text to which shaders are added one by one.
 
     head    the comment at its beginning
     blocks  the declarations
@@ -37,7 +37,7 @@ class Module:
     def add(self, made: Program, numbers: Mapping[str, Json]) -> dict[str, Json]:
         """Add a material's shader; returns its manifest.
 
-        A name that is declared differently already, or that depends on such a one, is replaced by NAME_2.
+        A name that is already declared differently, or that depends on such a name, is replaced by NAME_2.
         """
         names = Names(made, self.language, self.placement)
         bindings = self._numbered(made, names)
@@ -66,7 +66,7 @@ class Module:
         return [*blocks, texts.values(made, names, numbers)] if self.constants else blocks
 
     def _numbered(self, made: Program, names: Names) -> dict[int, int]:
-        """The binding of each table: that which it has already, or the next."""
+        """The binding of each table: its existing one, or the next."""
         bindings: dict[int, int] = {}
         following = self.placement.first_binding + len(self._bindings)
         for table in made.tables:
@@ -98,7 +98,7 @@ class Module:
                 renamed[block.name] = self._another(block, used | set(renamed.values()), renamed)
 
     def _another(self, block: Block, used: set[str], renamed: Mapping[str, str]) -> str:
-        """NAME_2, NAME_3, ...: the first that declares the same, or is free."""
+        """The first of NAME_2, NAME_3, ... that declares the same or is free."""
         for count in itertools.count(2):
             name = f"{block.name}_{count}"
             words = _words({**renamed, block.name: name}, self.placement.prefix)
@@ -109,7 +109,7 @@ class Module:
         raise AssertionError("endless")
 
     def _clash(self, block: Block, other: Block) -> bool:
-        """Whether two declarations of one name cannot stand in one module."""
+        """Whether two declarations of one name cannot be in one module."""
         if self._same(block, other):
             return False
         overloaded = block.kind == other.kind == "function" and self.language.overloads
@@ -120,7 +120,7 @@ class Module:
 
 
 def _words(renamed: Mapping[str, str], prefix: str) -> dict[str, str]:
-    """The replaced words of a text: of a table, its texture and the functions that read it."""
+    """Words of a text -> replacements; a table's include those of its texture and the functions that read it."""
     words = {}
     for name, other in renamed.items():
         words[prefix + name] = prefix + other
@@ -158,7 +158,7 @@ def _types(block: Block) -> list[str]:
 
 
 def of_several(manifests: list[dict[str, Json]], language: Language) -> dict[str, Json]:
-    """The manifest of a module: that of each material, and all textures."""
+    """The manifest of a module: those of all materials, and all textures."""
     textures = {texture["uniform"]: texture for each in manifests for texture in each["textures"]}
     shader = "materials" + language.suffix
     return {

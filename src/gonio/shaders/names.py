@@ -1,4 +1,4 @@
-"""Names that the routines of a shader share: their own, and those of the constants and structs that they use."""
+"""The global names of a shader: those of routines, and of the constants and structs that they use."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Names:
     routines   name of each routine
     constants  name -> (number, description)
     records    name -> struct
-    renamed    names that another shader of the module uses otherwise -> the names instead, both without prefix
+    renamed    names that another shader of the module uses differently -> their replacements, all without prefix
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Names:
                 self.routines[routine] = self.public(name)
 
     def public(self, name: str) -> str:
-        """A global name as it is written: replaced if another shader of the module has it, after the prefix."""
+        """A global name as written: with the prefix, and replaced if another shader of the module has it."""
         return self.placement.prefix + self.renamed.get(name, name)
 
     def constant(self, name: str) -> str:
@@ -58,7 +58,7 @@ class Names:
         return self.public(self.language.word(name))
 
     def table(self, table: Table, start: str = "") -> str:
-        """The public name of a table, or with "table_", "lookup_", "fetch_" that of its texture and its functions."""
+        """The public name of a table; with the start "table_", "lookup_" or "fetch_", of its texture or functions."""
         stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
         return f"{self.placement.prefix}{start}{stem}"
 
@@ -75,7 +75,7 @@ class Names:
         return members(record.fields, record.arrays and self.program.arrays)
 
     def declared(self, member: Member, name: str = "") -> tuple[str, str]:
-        """(type, name) of the declaration of a member, or of a parameter of the function under a name of its own."""
+        """(type, name) of the declaration of a member, or of a function's parameter under the given name."""
         type_, name = self.language.type(member.type), name or self.language.word(member.name)
         return self.language.array_declaration(type_, name, member.length) if member.length else (type_, name)
 
@@ -100,8 +100,7 @@ class Names:
         return first_free(name, used)
 
     def _types(self, routine: Routine) -> tuple[object, ...]:
-        """The types that distinguish overloads: those of the written arguments, where an object counts as its
-        struct."""
+        """The types that distinguish overloads: those of the written arguments, with the struct of an object."""
         arguments = self.program.recorded[routine].arguments
         struct_of = functools.cache(lambda root: self.program.struct_of(arguments.get(root)))
         types: dict[object, object] = {}

@@ -1,4 +1,4 @@
-"""Tables as OpenEXR pictures, for OSL and for engines; without Mitsuba, which shaders do not need."""
+"""Tables as OpenEXR images, for OSL and for engines; without Mitsuba, which shaders do not need."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TYPES = {2: 1, 4: 2}  # of a channel, by its bytes: half, float
 
 
 def openexr(pixels: NDArray[np.floating]) -> bytes:
-    """An uncompressed OpenEXR file of (rows, columns, channels) float32 or float16, with 1, 2 or 4 channels.
+    """An uncompressed OpenEXR file from (rows, columns, channels) float32 or float16, with 1, 2 or 4 channels.
 
     Source: "OpenEXR File Layout", openexr.com.
     """

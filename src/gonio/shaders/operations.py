@@ -1,4 +1,4 @@
-"""How many operations a function of a shader takes, by kind."""
+"""The number of operations of a shader's function, by kind."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ OF = {op: kind for kind, ops in KINDS.items() for op in ops}
 
 
 def operations(routine: Routine) -> dict[str, int]:
-    """Operations on numbers, those of called functions included.
+    """Operations on numbers, including those of called functions.
 
-    There is one per component of a vector; a dot product counts as its products and sums; signs and absolute values are
-    free. Both sides of a selection are counted, as a GPU computes both.
+    An operation on a vector counts once per component, and a dot product as its products and sums; signs and absolute
+    values are free. The two sides of a selection are counted, as a GPU computes both.
     """
     total = _count(routine, {})
     return {kind: total[kind] for kind in KINDS}

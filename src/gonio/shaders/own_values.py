@@ -1,4 +1,4 @@
-"""What a shader does with the values of the material that it is written from."""
+"""The use that a shader makes of the values of the material from which it is written."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class OwnValues:
 
     lean       omit what they switch off, such as a coat of weight 0
     constants  also write them, as a constant of the struct
-    fold       put them into the code: what depends on them alone is a number there
+    fold       write them into the code, where expressions of them alone become numbers
     """
 
     lean: bool = False

@@ -1,4 +1,4 @@
-"""The parameters of a routine: the arguments of the function in the text, and the names that values have there."""
+"""The parameters of a routine: the arguments of the written function, and the names of values in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .values import Member, Record, Routine, Value, members
 
 
 class ParameterWriter:
-    """Names the parameters of one routine; its local values get names that are free beside them."""
+    """Names the parameters of one routine, and gives its local values names that do not collide with them."""
 
     def __init__(self, names: Names, routine: Routine) -> None:
         self.names, self.routine, self.language = names, routine, names.language
@@ -22,7 +22,7 @@ class ParameterWriter:
         self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
         self.locals: dict[int, str] = {}
         self.lines: list[str] = []
-        self.arrays: dict[str, int] = {}  # text of an array that exists -> its length
+        self.arrays: dict[str, int] = {}  # text of an existing array -> its length
         self.built: dict[tuple, str] = {}
         self.holders: dict[str, Value] = {}  # name -> its current value
         self.first_lines: dict[str, int] = {}  # name -> index of the line that declares it
@@ -51,7 +51,7 @@ class ParameterWriter:
                 self._plain(member, given[member.first : member.first + max(member.length, 1)])
 
     def _members(self, parameters: Sequence[Value]) -> list[Member]:
-        """The arguments by which parameters are given."""
+        """The arguments that hold the parameters."""
         return members([(flat(p.static), p.type) for p in parameters], self.program.arrays)
 
     def _plain(self, member: Member, parameters: list[Value]) -> None:

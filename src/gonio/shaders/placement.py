@@ -1,4 +1,4 @@
-"""The place of a shader in a module with other code: a prefix of its names, the bindings and files of its tables."""
+"""The place of a shader in a module with other code: the prefix of its names, the bindings and files of its tables."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class PlacementKeywords(TypedDict, total=False):
 class Placement:
     """The place of a shader in a module.
 
-    prefix         begins all global names: functions, structs, constants, tables
-    group          of the tables' bindings: WGSL's `@group`, HLSL's register space, a descriptor set
-    first_binding  number of the first table's binding
-    tables         form of the files of tables: "raw", "exr" or "ktx2"; "" is the language's own, in most "raw"
+    prefix         start of all global names: functions, structs, constants, tables
+    group          binding group of the tables: WGSL's `@group`, HLSL's register space, a descriptor set
+    first_binding  binding number of the first table
+    tables         format of table files: "raw", "exr" or "ktx2"; "" is the language's default, mostly "raw"
     half           whether tables have 16 bits per number
     """
 
@@ -41,7 +41,7 @@ class Placement:
     half: bool = False
 
     def check(self, language: Language) -> None:
-        """Raise InputError for a prefix, a group or a form of tables that the language does not accept."""
+        """Raise InputError for a prefix, a group or a table format that the language does not accept."""
         start = self.prefix
         if start and (not re.fullmatch(r"[A-Za-z]\w*", start, re.ASCII) or "__" in start or start.startswith("gl_")):
             hint = "a letter, then letters, digits and single underscores, such as g_; not gl_, which GLSL reserves"
@@ -59,11 +59,11 @@ class Placement:
             raise InputError(what, f"{LOCATION}: tables", "leave it out")
 
     def form(self, language: Language) -> str:
-        """The name of the form of the files of tables."""
+        """The name of the format of table files."""
         return self.tables or language.tables
 
     def suffix(self, language: Language) -> str:
-        """The end of the name of a table's file."""
+        """The suffix of the name of a table's file."""
         form = self.form(language)
         return ".f16" if self.half and form == "raw" else FORMATS[form].suffix
 

@@ -2,7 +2,7 @@
 
 They are recorded like a model's functions, so one text serves every language. The languages guarantee little: GLSL ES
 3.00 and WGSL allow sin, cos, exp, log and atan an absolute error of 2^-11 or several units in the last place, which
-later lines cannot correct.
+later operations cannot correct.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .. import ops
 from ..ops import Mask, Scalar, Spectrum, abs, floor, graph, maximum, sqr, where
 from ..ops.types import Value
 
-# pi / 2 as the sum of a float32 and a rest, so that whole quarter turns can be subtracted without rounding
+# pi / 2 as the sum of a float32 and a remainder, so that whole quarter turns can be subtracted without rounding error
 QUARTER_TURN = 1.5707964
 QUARTER_REST = -4.371139e-8
 
@@ -67,7 +67,7 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 
 def sine_quarters(x: Scalar, quarters: float) -> Scalar:
-    """sin(x + quarters pi / 2) by Taylor series within an eighth of a turn: error 1e-7, a GPU's own has 5e-4."""
+    """sin(x + quarters pi / 2) by Taylor series within an eighth of a turn: error 1e-7, against 5e-4 for a GPU's."""
     count = floor(x * (2.0 / ops.pi) + 0.5)  # whole quarter turns
     r = (x - count * QUARTER_TURN) - count * QUARTER_REST
     r2 = sqr(r)
@@ -93,7 +93,7 @@ def scaled(x: Scalar, e: Scalar) -> Value:
 def log(x: Scalar) -> Scalar:
     """Natural logarithm of a normal float32 > 0: relative error 1e-7, also near 1, where a GPU's is at best 5e-7.
 
-    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Colors channel by channel.
+    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Colors are computed by channel.
     """
     if isinstance(x, graph.Node) and x.type != "float":
         value: Value = graph.emit("vector", x.type, *(ops.log(channel) for channel in _channels(x)))

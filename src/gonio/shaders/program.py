@@ -50,12 +50,12 @@ class Struct:
 
 
 class Routines:
-    """What the text of a shader is written from.
+    """The content from which the text of a shader is written.
 
     routines  in order of definition, callees first
     entries   name -> the routine that a program calls
     recorded  the recording of each routine
-    bound     the material of symbols, if there is one
+    bound     the material with symbols as parameters, if there is one
     tables    the tables that are read
     readings  for each table, by identity, how it is read: "lookup" or "fetch"
     arrays    whether numbered constants are written as arrays
@@ -222,7 +222,7 @@ class Program(Routines):
 
 
 def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
-    """A recording of functions of a material whose parameters are symbols; its results are theirs, in order.
+    """A recording of functions of a material whose parameters are symbols; it returns their results in order.
 
     single  whether the recording is for a language of float32 values, which lacks some functions of the vocabulary
     """
@@ -239,7 +239,7 @@ def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Gra
 
 @ops.function
 def derive(self: BSDF) -> dict[str, object]:
-    """Quantities that depend on the parameters alone: computed once, not for every pair of directions."""
+    """Quantities that depend only on the parameters: computed once, not for every pair of directions."""
     return _derive(self)
 
 
@@ -272,13 +272,13 @@ def flat(path: str) -> str:
 
 
 def field_list(value: object) -> list[tuple[str, str]]:
-    """(path, type) of a model's numeric parameters, including those of inner materials."""
+    """(path, type) of each numeric parameter of a model, including inner materials."""
     pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
     return [(rest, shape(type_)) for (_, rest, derived), type_ in pairs if not derived]
 
 
 def derived_list(value: object) -> list[tuple[str, str]]:
-    """(path, type) of derived values, of a model or of a dict."""
+    """(path, type) of each derived value of a model or a dict."""
     if not isinstance(value, BSDF | dict):
         return []
     pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
@@ -292,7 +292,7 @@ def _result_name(path: str, value: Value) -> str:
 
 
 def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
-    """(field, description with unit and range) of a model's numeric parameters."""
+    """(field, description with unit and range) of each numeric parameter of a model."""
     for path, parameter, _, _ in tree.surface(model):
         if parameter.numeric:
             doc = parameter.doc.partition(";")[0] if parameter.kind == "alpha" else parameter.doc
@@ -354,13 +354,13 @@ def stochastic(model: BSDF) -> BSDF | None:
 
 
 def written_from(model: object) -> str:
-    """What a text was made from, in words: the class's Python source, or the shader that it was read from."""
+    """A description of the source of a text: the class's Python source, or the shader that was read."""
     shader = getattr(type(model), "program", None)
     return f"the shader {shader.where}" if shader else "its Python source"
 
 
 def choices(model: BSDF) -> list[tuple[str, Value]]:
-    """(path, value) of the choices that shape the code: classes of materials, options and flags."""
+    """(path, value) of each choice that shapes the code: classes of materials, options and flags."""
     return [
         *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
         *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),

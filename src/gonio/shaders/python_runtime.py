@@ -1,4 +1,4 @@
-"""The parts of a Python file that are the same for every material and every library of arrays."""
+"""The parts of a Python file that are the same for every material and every array library."""
 
 from __future__ import annotations
 

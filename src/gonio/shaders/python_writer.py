@@ -29,7 +29,7 @@ class PythonWriter(RoutineWriter):
         return [f"{INDENT}{start} (", *wrap(text, 2 * INDENT), f"{INDENT})"]
 
     def infix(self, value: Value) -> tuple[str, int]:
-        """Comparisons bind more loosely than & and | in Python, and are parenthesized as their operands."""
+        """In Python comparisons bind more loosely than & and |, and are parenthesized as their operands."""
         a, b = value.args
         symbol = OPERATORS[value.op][0]
         if value.op in COMPARE:

@@ -1,11 +1,11 @@
-"""The round trip: a material written as shader text, the text read again, and the values of both compared in 64 bits.
+"""The round trip: a material is written as shader text, the text is read again, and the values are compared in 64 bits.
 
     made = bundle(material, "wgsl")
     Original(material, made, wo, wi, u).difference(made)
 
 The reference is the recording from which the text was written, in NumPy, with its constants and tables rounded to 32
-bits as the text's are. What is left is the order of additions, so that a difference beyond rounding in 64 bits is a
-fault of the writer or of the reader.
+bits as in the text. Only the order of additions may differ, so that a difference beyond rounding in 64 bits is an error
+of the writer or of the reader.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from .bundle import Bundle
 from .manifest import Json
 
 LANGUAGES = ("glsl", "hlsl", "wgsl")  # those that are read
-TINY = 1e-100  # in 64 bits, smaller values may be what underflow left
+TINY = 1e-100  # in 64 bits, smaller values may be remains of underflow
 Array = NDArray[np.float64]
 
 
 class Difference(NamedTuple):
-    """The largest difference of a function: relative to the larger value, its row, and both values there."""
+    """The largest difference of a function: relative to the larger value, with its row and the two values there."""
 
     function: str
     figure: float
@@ -47,7 +47,7 @@ class Difference(NamedTuple):
 
 
 class Original:
-    """The values of a material's recording, with which those of its texts are compared.
+    """The values of a material's recording, with which the values of its texts are compared.
 
     made    one of the texts, which may be in any language that is read
     wo, wi  directions, (N, 3)
@@ -77,8 +77,8 @@ def parameters(manifest: Mapping[str, Json], count: int, seed: int) -> dict[str,
     """A value of each field of the struct per row, by path: (N,) or (components, N), in 32 bits.
 
     Even rows have the material's values, odd rows random ones: a fifth at the ends of the range, half close to its
-    lower end, where code has other branches. A range without an end extends to twice or half the value. What tables
-    depend on stays.
+    lower end, where code has other branches. An open range extends to twice or half the value. Parameters on which
+    tables depend keep their values.
     """
     random = np.random.default_rng([seed, 3])
     kinds = {one["path"]: one for one in manifest["parameters"]}
@@ -158,14 +158,14 @@ def _read(
 
 
 def _components(symbol: graph.Node) -> Any:
-    """A vector as the machine holds it: a tuple of numbers."""
+    """A vector in the machine's form: a tuple of numbers."""
     if symbol.type == "float":
         return symbol
     return tuple(getattr(symbol, letter) for letter in "xyz"[: int(symbol.type[-1])])
 
 
 def _one(module: Module, made: Bundle, method: str) -> Function:
-    """The function of a method: of overloads, as of a mix of mixes, the one that takes the material's struct."""
+    """The function of a method; among overloads, as in a mix of mixes, the one that takes the material's struct."""
     name = made.manifest["functions"][method]
     candidates = module.function(name)
     if len(candidates) > 1:
@@ -178,7 +178,7 @@ def _one(module: Module, made: Bundle, method: str) -> Function:
 def _called(
     machine: Machine, module: Module, function: Function, structs: list[Any], more: list[Any]
 ) -> tuple[Any, ...]:
-    """A function's result as numbers; those that need no parameters or derived values take fewer structs."""
+    """A function's result as numbers; a function without parameters or derived values takes fewer structs."""
     names = [module.names.get(id, "") for id, _ in function.parameters]
     offered = dict(zip(("self", "derived"), structs, strict=False))
     offered["material"] = offered.get("self")
@@ -219,7 +219,7 @@ def values_of(
 
 
 def _fold(node: graph.Node) -> None:
-    """Turn an operation on numbers alone into its result, which the text has as one number of 32 bits."""
+    """Replace an operation on numbers alone by its result, which the text contains as one 32-bit number."""
     node.args = tuple(arg.static if isinstance(arg, graph.Node) and arg.op == "constant" else arg for arg in node.args)
     if node.op == "mul" and node.type == "float" and 0.0 in [arg for arg in node.args if isinstance(arg, float)]:
         node.op, node.args, node.static = "constant", (), 0.0  # of `zeros_like` and `ones_like`
@@ -239,7 +239,7 @@ def _rounded(table: Table, bits: int) -> Table:
 
 
 def _numbers(value: object) -> list[Array]:
-    """The numbers of a result, in order; of vectors component by component."""
+    """The numbers of a result, in order; vectors component by component."""
     return list(_each(value))
 
 

@@ -10,7 +10,7 @@ from .names import Names
 from .program import place
 from .values import ELEMENTWISE, Routine, Value, needed
 
-COMPUTED = ELEMENTWISE | {"call", "where", "texel"}  # gets a line if a component of it is selected
+COMPUTED = ELEMENTWISE | {"call", "where", "texel"}  # get a line if a component of them is selected
 
 
 class RoutineWriter(ExpressionWriter):
@@ -26,7 +26,7 @@ class RoutineWriter(ExpressionWriter):
         return [*comment(self.doc()), *wrap(self.head(), ""), *body, "}"]
 
     def head(self) -> str:
-        """The line with its name and its parameters."""
+        """The line with the routine's name and parameters."""
         result = self.names.note(self.routine.type)
         return self.language.signature(result, self.names.routines[self.routine], self.heads)
 
@@ -42,7 +42,7 @@ class RoutineWriter(ExpressionWriter):
         return [*self.lines, *result]
 
     def doc(self) -> str:
-        """The docstring without the entries of arguments that shaped the code and are not arguments of the function."""
+        """The docstring, without entries of arguments that shaped the code and are not arguments of the function."""
         entry = self.routine in self.program.entries.values()
         given = {place(p.static)[0] for i, p in enumerate(self.routine.parameters) if entry or i in self.routine.used}
         lines, dropping = [], False
@@ -140,7 +140,7 @@ class RoutineWriter(ExpressionWriter):
         type_ = self.names.note(value.type)
         wanted = self.language.word(self._name_for(value))
         name = self._reusable(wanted, value, index, last_use)
-        if name:  # as in Python, a name is assigned again after the last use of its old value
+        if name:  # as in Python, a name is assigned again once its old value is no longer used
             if name in self.first_lines:
                 line = self.first_lines[name]
                 self.lines[line] = self.language.changeable(self.lines[line])
@@ -153,7 +153,7 @@ class RoutineWriter(ExpressionWriter):
         self.locals[value.order] = name
 
     def _reusable(self, wanted: str, value: Value, index: int, last_use: dict[int, int]) -> str:
-        """A variable of the wanted name whose value is not needed any more, or ""."""
+        """A variable of the wanted name whose value is no longer needed, or ""."""
         number = 1
         while (name := wanted if number == 1 else f"{wanted}_{number}") in self.used_names:
             holder = self.holders.get(name)

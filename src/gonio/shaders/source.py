@@ -16,7 +16,7 @@ def module_constant(number: float, source: str) -> tuple[str, str]:
     text = linecache.getline(path, int(line or 0))
     words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}
     for name in words if number not in (0.0, 1.0) else ():
-        for module in sorted(sys.modules.values(), key=lambda m: getattr(m, "__file__", None) != path):  # own one first
+        for module in sorted(sys.modules.values(), key=lambda m: getattr(m, "__file__", None) != path):  # own first
             place = getattr(module, "__file__", None) or ""
             if place.startswith(_PACKAGE) and type(vars(module).get(name)) is float and vars(module)[name] == number:
                 about = _comment_on(place, name)
@@ -29,7 +29,7 @@ _PACKAGE = str(Path(__file__).parent.parent)
 
 
 def _comment_on(path: str, name: str) -> str | None:
-    """The comment on a constant at its definition, above it or after it; None if it is only imported there."""
+    """The comment on a constant at its definition, above or after it; None if the constant is only imported there."""
     lines = linecache.getlines(path)
     for index, line in enumerate(lines):
         if line.startswith(f"{name} ="):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# precedence of expressions, loosest first
+# precedence of expressions, from the loosest
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(9)
 
 OPERATORS = {
@@ -24,7 +24,7 @@ OPERATORS = {
 
 
 def literal(number: float) -> str:
-    """The shortest decimal of the same float32."""
+    """The shortest decimal that rounds to the same float32."""
     text = repr(number)
     short = np.format_float_positional(np.float32(number), unique=True, trim="0")
     if len(text) > 9 and np.float32(float(text)) == np.float32(number):

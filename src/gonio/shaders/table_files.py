@@ -15,7 +15,7 @@ Texels = NDArray[np.floating]  # x varies fastest, channels last
 
 
 class TableFormat(NamedTuple):
-    """The form of a table's file.
+    """The format of a table's file.
 
     suffix  of the file's name
     write   contents of the file of (rows, columns, channels) or (layers, rows, columns, channels) float32 or float16
@@ -31,7 +31,7 @@ def _raw(texels: Texels) -> bytes:
 
 
 def _rows(texels: Texels) -> Texels:
-    """The layers below each other, as a picture has no third axis."""
+    """The layers stacked vertically, as an image has no third axis."""
     return texels.reshape(-1, *texels.shape[-2:])
 
 
@@ -40,15 +40,15 @@ def _picture(texels: Texels) -> bytes:
 
 
 def _mirrored(texels: Texels) -> bytes:
-    """A picture whose rows follow once more in reverse order: renderers disagree about which row has t = 0."""
+    """An image whose rows are repeated in reverse order: renderers disagree about which row has t = 0."""
     rows = _rows(texels)
     return openexr(np.concatenate([rows, rows[::-1]]))
 
 
 FORMATS = {
-    "raw": TableFormat(".f32", _raw),  # .f16 of half precision
+    "raw": TableFormat(".f32", _raw),  # .f16 in half precision
     "exr": TableFormat(".exr", _picture),
     "ktx2": TableFormat(".ktx2", ktx2),
-    "exr-mirrored": TableFormat(".exr", _mirrored),  # of OSL
+    "exr-mirrored": TableFormat(".exr", _mirrored),  # for OSL
 }
-CHOICES = ("raw", "exr", "ktx2")  # of a user
+CHOICES = ("raw", "exr", "ktx2")  # open to users

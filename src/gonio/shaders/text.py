@@ -29,8 +29,8 @@ class Block(NamedTuple):
     """The declaration of one name, or of one overload of a function.
 
     kind   "constant", "struct", "table", "function" or "values"
-    name   without prefix; of a table "table_NAME", which stands for the functions that read it as well
-    table  the table, of that kind
+    name   without prefix; for a table "table_NAME", which also stands for the functions that read it
+    table  the table, if kind is "table"
     """
 
     kind: str
@@ -69,7 +69,7 @@ def blocks(made: Routines, names: Names, bindings: Mapping[int, int]) -> list[Bl
 
 
 def _helpers(names: Names, bodies: Sequence[Block]) -> list[Block]:
-    """The functions of the language's own that others call."""
+    """The language's own helper functions that the bodies call."""
     text = "\n".join(line for block in bodies for line in block.lines)
     called = {name: names.public(name) for name in names.language.helpers}
     return [
@@ -86,7 +86,7 @@ def _raw(names: Names, name: str) -> str:
 
 
 def joined(head: Sequence[str], declared: Sequence[Block], language: Language, prefix: str = "") -> str:
-    """The text of a shader: constants line after line, all else parted by an empty line."""
+    """The text of a shader: constants on consecutive lines, other declarations separated by empty lines."""
     constants = [line for block in declared if block.kind == "constant" for line in block.lines]
     parts = [constants, *(block.lines for block in declared if block.kind != "constant")]
     lines = "\n\n".join("\n".join(part) for part in parts if part).split("\n")

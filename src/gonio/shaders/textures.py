@@ -79,7 +79,7 @@ def reader(names: Names, table: Table) -> list[str]:
 
 
 def fetcher(names: Names, table: Table) -> list[str]:
-    """The function that reads one texel at integer positions, clamped outside (`gonio.ops.fetch`)."""
+    """The function that reads one texel at integer coordinates, clamped outside (`gonio.ops.fetch`)."""
     language = names.language
     _, sizes, lines = _head(names, table, "fetch")
     integer = language.type("int")
@@ -91,7 +91,7 @@ READERS = {"lookup": reader, "fetch": fetcher}
 
 
 def _head(names: Names, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
-    """Names of the axes in the order of a lookup, slowest first; their numbers of texels; the function's first line."""
+    """Names of the axes in the order of a lookup, slowest first; their sizes in texels; the function's first line."""
     language = names.language
     letters = list("xyz"[: len(table.shape)])
     channels = width(table)
@@ -103,7 +103,7 @@ def _head(names: Names, table: Table, how: str) -> tuple[list[str], dict[str, in
 
 
 def _texel(names: Names, table: Table, places: list[str]) -> str:
-    """A texel at positions along the axes, slowest first."""
+    """A texel at coordinates along the axes, slowest first."""
     at = places[::-1]
     if groups(table) > 1 and len(at) == 3:
         at[2] = f"group * {table.shape[0]} + {at[2]}"

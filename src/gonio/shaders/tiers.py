@@ -1,4 +1,4 @@
-"""Cheaper forms of a material within a number of operations, with their measured errors; split-sum code."""
+"""Cheaper forms of a material within a budget of operations, with their measured errors; split-sum code."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class Tier(NamedTuple):
 
 
 def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
-    """(the form of a material whose `eval` is most exact within a number of operations, all forms that were tried).
+    """(the form of a material whose `eval` is most accurate within a number of operations, all forms that were tried).
 
-    The forms differ in the choices of `TERMS`. Errors are those of `eval` over 4096 random pairs, as parts of the
-    largest channel at each pair, which counts as 1e-3 of the mean at least. The chosen form comes first.
+    The forms differ in the choices of `TERMS`. Errors are those of `eval` for 4096 random pairs, relative to the
+    largest channel of each pair, or to 1e-3 of the mean if that is larger. The chosen form comes first.
     Raises InputError if none is within the budget.
     """
     wo, wi = _pairs(bool(model.transmits))
@@ -85,7 +85,7 @@ def _variants(model: BSDF) -> Iterator[tuple[str, BSDF]]:
 
 
 def _pairs(below: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of directions: a half of them within the lobe of a mirror.
+    """Pairs of directions, half of them within the lobe of a mirror.
 
     below  whether half of the directions wi are mirrored to the other side, where light is transmitted
     """
@@ -106,11 +106,11 @@ def _pairs(below: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget: int = 0) -> tuple[Bundle, list[Tier]]:
-    """Code of the split sum for a material's distribution: `dfg` and `image_light`; and the forms of `dfg`, first the
-    chosen one.
+    """Code of the split sum for a material's distribution: `dfg` and `image_light`; and the forms of `dfg`, the chosen
+    one first.
 
-    budget  operations of `dfg`: the most exact form within them, of a table and of fits; 0 is the table. A lookup
-            counts its four texels and their interpolation
+    budget  operations of `dfg`: the most accurate of a table and several fits within this number is written; 0 for the
+            table. A lookup counts as its four texels and their interpolation
     Raises InputError for a material without a microsurface, or with two widths.
     """
     surface = model.microsurface
@@ -126,7 +126,7 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
 
     @function
     def image_light(f0: Spectrum, roughness: Scalar, cos_theta: Scalar, radiance: Spectrum) -> Spectrum:
-        """Light of an environment that the surface reflects; radiance is that of the prefiltered environment."""
+        """Light that the surface reflects from an environment; `radiance` is that of the prefiltered environment."""
         ab = dfg(roughness, cos_theta)
         return (f0 * ab.x + ab.y) * radiance
 
@@ -142,11 +142,11 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
     return bundle, [best, *(tier for tier, _ in tiers if tier is not best)]
 
 
-LOOKUP = 30  # operations of an interpolated lookup of two channels, beside its four texels
+LOOKUP = 30  # operations of an interpolated lookup of two channels, besides its four texels
 
 
 def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Tier, Callable]]:
-    """`dfg` by a table and, if a budget is given, by fits of several orders."""
+    """`dfg` from a table and, if a budget is given, from fits of several orders."""
     baked = baking.cached(surface.ndf, lut=("dfg",), masking=surface.masking, size=TABLE)
     table = Table("dfg", baked.arrays["dfg"])
 
@@ -165,7 +165,7 @@ def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Ti
 
 
 def _table_error(table: Table, samples: fits.Samples) -> tuple[float, float]:
-    """(largest, mean) error of lookups between the nodes, over the range of the fits."""
+    """(largest, mean) error of lookups between the nodes, in the range of the fits."""
     white, share = np.moveaxis(samples.values["dfg"], -1, 0)
     a, b = read_in_numpy(table, samples.roughness[:, None], samples.mu)
     error = np.maximum(np.abs(a - white * (1.0 - share)), np.abs(b - white * share))

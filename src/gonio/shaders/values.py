@@ -14,7 +14,7 @@ from ..ops import graph
 SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
 COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
 LOGIC = {"and", "or", "not"}
-MIN_ARRAY = 4  # numbers: fewer are read more easily by name
+MIN_ARRAY = 4  # numbers; fewer are easier to read by name
 ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
 
 Kind: TypeAlias = Any  # type of a value: a name, or a `Record`
@@ -103,7 +103,7 @@ class Routine:
     parameters  Values of op "parameter", with `static` the path ("self.base.alpha")
     results     a list of (path, Value); `single` if the result is one Value
     used        indices of the parameters that the results depend on
-    record      the type of several results
+    record      the struct type, if there are several results
     """
 
     def __init__(self, function: graph.Function) -> None:
@@ -144,7 +144,7 @@ def stem_of(routine: Routine) -> str:
 
 
 def shape(type_: str) -> str:
-    """The type of a recording in a shader, where a spectrum has three channels."""
+    """A recording's type in a shader, where a spectrum has three channels."""
     return "vec3" if type_ == "spectrum" else type_
 
 

@@ -1,4 +1,4 @@
-"""Pairs of directions with their values in 64 bits, against which an engine tests its own shader."""
+"""Pairs of directions with their values in 64 bits, against which an engine can test its shader."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ LIMIT = 1_000_000  # pairs: some 300 MB of text
 def vectors(
     model: MaterialLike, count: int = 10_000, functions: Sequence[str] = ("eval", "pdf", "sample"), seed: int = 1
 ) -> dict[str, Json]:
-    """Random pairs and what a shader should return for them, as plain data for JSON.
+    """Random pairs of directions and the values that a shader should return for them, as plain data for JSON.
 
     model      anything that `go.material` takes
     count      number of pairs, at most a million
-    functions  of "eval", "pdf", "sample"; other names are ignored, as is "terms"
+    functions  a choice of "eval", "pdf", "sample"; other names, such as "terms", are ignored
     Returns {"model", "seed", "fields": values of the struct by path, "wo", "wi", "u": (count, 3), "eval": (count, 3),
     "pdf": (count,), "sample": {"wi", "weight", "pdf", "delta"}}. Directions and random numbers are float32 numbers, so
-    that a shader receives exactly these; the results are computed in float64 from them. A tenth of the pairs are
-    mirrored within 6 degrees, a tenth graze. Raises InputError for a stochastic material.
+    that a shader receives exactly these; the results are computed from them in float64. A tenth of the pairs are within
+    6 degrees of mirror directions, another tenth at grazing angles. Raises InputError for a stochastic material.
     """
     model = material(model)
     asked = programs.check(model, functions, "emit")

@@ -1,6 +1,7 @@
 """SPIR-V's arithmetic on scalars, vectors and matrices, in the vocabulary of `gonio.ops`.
 
-FLOATS, INTEGERS and LOGIC hold functions of scalars, applied component by component; WHOLE functions of whole values.
+FLOATS, INTEGERS and LOGIC hold functions of scalars, which are applied component by component; WHOLE holds functions of
+whole values.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def elementwise(function: Callable[..., Value], *values: Value) -> Value:
 
 
 def passing(function: Callable[..., Value]) -> Callable[..., Value]:
-    """A function of scalars that passes on the first undefined one."""
+    """A function of scalars that returns the first undefined one, if there is one."""
 
     def passed(*scalars: Value) -> Value:
         undefined = lost(scalars)
@@ -38,7 +39,7 @@ def passing(function: Callable[..., Value]) -> Callable[..., Value]:
 
 
 def _float(plain: Callable[..., object], on_values: Callable[..., Value]) -> Callable[..., Value]:
-    """A function of floats: folded by NumPy if all are known."""
+    """A function of floats, folded by NumPy if all are constant."""
 
     def function(*values: Value) -> Value:
         if (undefined := lost(values)) is not None:
@@ -118,7 +119,7 @@ def _integer(plain: Callable[..., int], on_values: Callable[..., Value] | None) 
         if all(map(static, integers)):
             return plain(*integers)
         if on_values is None:
-            raise refuse("a bit operation on an integer that varies", "compute with floats")
+            raise refuse("bit operations on varying integers are not supported", "compute with floats")
         return on_values(*map(numeric, integers))
 
     return function
@@ -129,7 +130,7 @@ def _quotient(a: int, b: int) -> int:
 
 
 def to_integer(x: Value) -> Value:
-    """A float rounded toward 0, as an integer; out of range the nearest one."""
+    """A float rounded toward 0, as an integer; the nearest one if out of range."""
     if static(x):
         x = numeric(x)
         return int(min(max(x, -(2.0**31)), 2.0**32 - 1.0)) if x == x else 0
@@ -141,7 +142,7 @@ def _shift(a: int, b: int, left: bool) -> int:
 
 
 def _bitwise(plain: Callable[..., int], on_bits: Callable[..., Value]) -> Callable[..., Value]:
-    """An operation on integers that are known, or on the bits of floats."""
+    """An operation on constant integers, or on the bits of floats."""
     integers = _integer(plain, None)
     return lambda a, b: on_bits(a, b) if isinstance(a, Bits) or isinstance(b, Bits) else integers(a, b)
 
@@ -194,7 +195,7 @@ def _same(a: Value, b: Value) -> Value:
 
 
 def dot(a: tuple[Value, ...], b: tuple[Value, ...]) -> Value:
-    """Scalar product; terms with a constant 0, as of the frame's axes, are left out."""
+    """Scalar product; terms with a constant factor 0, such as a component of an axis of the frame, are omitted."""
     terms = [
         y if _is(x, 1.0) else x if _is(y, 1.0) else multiply(x, y)
         for x, y in zip(a, b, strict=True)
@@ -208,12 +209,12 @@ def _is(x: Value, number: float) -> bool:
 
 
 def transpose(matrix: tuple[Value, ...]) -> Value:
-    """Rows for columns."""
+    """The transpose, with rows in place of columns."""
     return tuple(zip(*matrix, strict=True))
 
 
 def matrix_vector(matrix: tuple[Value, ...], vector: tuple[Value, ...]) -> Value:
-    """M v, for a matrix by its columns."""
+    """M v, for a matrix given by its columns."""
     return tuple(dot(row, vector) for row in transpose(matrix))
 
 

@@ -1,4 +1,4 @@
-"""The bits of numbers that vary, as far as logarithms, powers of two and signs need them.
+"""The bits of floats that are not constant, as far as logarithms, powers of two and signs need them.
 
 (floatBitsToInt(x) >> 23) - 127                                             floor(log2 |x|)
 intBitsToFloat((e + 127) << 23)                                             2^e
@@ -19,7 +19,7 @@ SIGN, MAGNITUDE = 0x80000000, 0x7FFFFFFF
 
 
 def cast(value: Value, before: str, kind: str) -> Value:
-    """The bits of a scalar as another type: "float", "int" or "uint", both before and after."""
+    """The bits of a scalar of type `before` as type `kind`, each "float", "int" or "uint"."""
     if static(value):
         words = struct.pack("<f", value) if isinstance(value, float) else struct.pack("<I", wrapped(int(value), False))
         if kind == "float":
@@ -39,15 +39,15 @@ def cast(value: Value, before: str, kind: str) -> Value:
             else ops.where(value < 2.0**31, value, value - 2.0**32)
         )
     if kind == "float":
-        raise refuse("a float from the bits of an integer that varies", "compute with floats")
+        raise refuse("floats from the bits of varying integers are not supported", "compute with floats")
     return Bits(value, None)
 
 
 def _power_of_two(e: Value) -> Value:
-    """2^e of a whole e, exactly; in 32 bits within rounding from 2^100 on.
+    """2^e for an integer e: exact, except for a rounding error in 32 bits from 2^100 on.
 
-    `exp` is off by some roundings. They are in the lower half of the digits, which is 0 in a power of two and is cut
-    off by Veltkamp's splitting (Dekker1971).
+    The error of `exp`, a few ulps, is in the lower half of the digits, which is 0 for a power of two and is removed by
+    Veltkamp's splitting (Dekker1971).
     """
     about = ops.exp(e * math.log(2.0))
     multiple = about * ((2.0**12 if ops.is_short(e) else 2.0**27) + 1.0)
@@ -55,9 +55,9 @@ def _power_of_two(e: Value) -> Value:
 
 
 def shifted_right(value: Bits, count: Value) -> Value:
-    """Sign and exponent, of the bits of a float shifted by 23."""
+    """The bits of a float shifted right by 23: sign and exponent."""
     if value.number is None or value.part == "sign" or count != MANTISSA:
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     size = ops.abs(value.number)
     guess = ops.floor(ops.log(size) * (1.0 / math.log(2.0)))
     # the logarithm of a power of two may round to either side
@@ -69,16 +69,16 @@ def shifted_right(value: Bits, count: Value) -> Value:
 def shifted_left(value: Value, count: Value) -> Value:
     """The bits of a power of two, from its biased exponent."""
     if isinstance(value, Bits) or count != MANTISSA:
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     return Bits(None, numeric(value))
 
 
 def masked(a: Value, b: Value) -> Value:
-    """a & b, of which one is the bits of a float: its sign or its magnitude."""
+    """a & b, one of which is the bits of a float: its sign or its magnitude."""
     bits, mask = (a, b) if isinstance(a, Bits) else (b, a)
     word = 0 if isinstance(mask, Bits) or not static(mask) else wrapped(int(mask), False)
     if bits.number is None or bits.part == "sign" or word not in (SIGN, MAGNITUDE):
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     return Bits(bits.number, None, "sign") if word == SIGN else Bits(ops.abs(bits.number), None, "magnitude")
 
 
@@ -87,11 +87,11 @@ def joined(a: Value, b: Value) -> Value:
     size: Value
     size, sign = (b, a) if isinstance(a, Bits) and a.part == "sign" else (a, b)
     if not isinstance(sign, Bits) or sign.part != "sign":
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     if not isinstance(size, Bits) and static(size) and wrapped(int(size), False) < SIGN:
         size = Bits(float(cast(int(size), "uint", "float")), None, "magnitude")
     if not isinstance(size, Bits) or size.part != "magnitude":
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     number = ops.abs(sign.number) * 0.0 + size.number if static(size.number) else size.number
     return Bits(ops.copysign(number, sign.number), None)
 
@@ -107,4 +107,4 @@ def flipped(a: Value, b: Value) -> Value:
                 return Bits(bits.number * ops.copysign(0.0 * sign.number + 1.0, sign.number), None)
         elif static(sign) and wrapped(int(sign), False) == SIGN:
             return Bits(-bits.number, None)
-    raise refuse("a bit operation on an integer that varies", "compute with floats")
+    raise refuse("bit operations on varying integers are not supported", "compute with floats")

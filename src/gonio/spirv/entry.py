@@ -1,10 +1,10 @@
-"""A shader's `main`, run for the globals that it assigns before it calls the BRDF.
+"""A shader's `main`, which is run for the globals that it assigns before it calls the BRDF.
 
     float rough;
     void main() { rough = max(roughness, 0.04); color = brdf(l, v, n); }
 
-What cannot be run here, such as a read of a varying, makes the values that depend on it undefined, not the rest. Where
-`main` cannot go on, as at a branch on a varying, all globals that it might still assign are undefined.
+An instruction that cannot run here, such as a read of a varying, makes only the values that depend on it undefined.
+Where `main` cannot continue, as at a branch on a varying, all globals that it might still assign become undefined.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class _Reached(Exception):
 class Entry(Machine):
     """A machine that runs entry points as far as possible.
 
-    until  ids of the functions at whose first call an entry point ends
+    until  ids of functions; an entry point ends when it first calls one of them
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Entry(Machine):
         self._left: list[int] = []  # the blocks of the entry point that have not run to their ends
 
     def start(self, function: Function) -> None:
-        """Run an entry point; its arguments, as of HLSL's, have no values."""
+        """Run an entry point; its arguments, as in HLSL, are undefined or 0."""
         arguments = [self._missing(id, type) for id, type in function.parameters]
         try:
             self.call(function, arguments)
@@ -62,7 +62,7 @@ class Entry(Machine):
         return self.module.zero(inside) if self._zero else self.module.undefined(inside, why)
 
     def _lose(self, blocks: Iterable[Block], why: Undefined) -> None:
-        """Make the globals undefined to which blocks store."""
+        """Make the globals to which blocks store undefined."""
         for id in written(self.module, blocks):
             cell = self._globals[id].cell
             cell.value = self.module.undefined(self.module.type(self.module.variables[id].type).parts[0], why)
@@ -77,7 +77,7 @@ class Entry(Machine):
         if one.name == "Kill":  # the BRDF is not called in these lanes
             frame.returned = either(frame.returned, mask)
             return True
-        if len(self._stack) == 1 and one.name != "LoopMerge":  # every store of the block was made
+        if len(self._stack) == 1 and one.name != "LoopMerge":  # all stores of the block are done
             self._left = [*targets(one), *frame.waiting]
         return super()._leave(frame, block, one, mask)
 
@@ -95,11 +95,11 @@ class Entry(Machine):
             return self.module.undefined(one.type, why)
 
     def _recorded(self, function: Function, arguments: Sequence[Value], mask: Value) -> Value:
-        """Never as a function of its own: what a call could not run may end it anywhere."""
+        """Run directly, never recorded as a call: an instruction that cannot run may end it anywhere."""
         return self._run(function, arguments, mask)
 
     def _lose_arguments(self, frame: Frame, ids: Sequence[int], why: Undefined) -> None:
-        """Make the variables undefined that a call might have set."""
+        """Make the variables that a call might have set undefined."""
         for id in ids:
             pointer = self._get(frame, id)
             if isinstance(pointer, Pointer) and not isinstance(pointer.cell.value, Texture):
@@ -121,7 +121,7 @@ def prepared(
     starts: Sequence[Function],
     until: Iterable[int],
 ) -> Machine:
-    """A machine whose globals have the values that entry points assign; the arguments as of `Machine` and `Entry`."""
+    """A machine whose globals have the values that entry points assign; for the arguments see `Machine` and `Entry`."""
     entry, machine = Entry(module, globals, textures, zero, frozenset(until)), Machine(module, globals, textures, zero)
     for start in starts:
         entry.start(start)

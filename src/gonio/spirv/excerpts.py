@@ -1,7 +1,7 @@
-"""Single functions out of a shader file that does not compile by itself.
+"""Single functions from a shader file that does not compile by itself.
 
-`#include <scene_forward_lights_inc.glsl#light_compute>` takes the function of that name, with its overloads, and leaves
-the rest: engines keep their BRDFs in files that read buffers of the renderer as well.
+`#include <scene_forward_lights_inc.glsl#light_compute>` includes only the function of that name, with its overloads:
+engines have their BRDFs in files that also read the renderer's buffers.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ _HEAD = r"^[ \t]*(?:(?:highp|mediump|lowp|precise|static|inline)[ \t]+)*\w+[ \t]
 def functions_in(text: str, names: str, where: str) -> tuple[str, int]:
     """The definitions of functions, and the line of the first.
 
-    text   of a GLSL or HLSL file
-    names  of the functions, with commas
+    text   text of a GLSL or HLSL file
+    names  names of the functions, separated by commas
     where  the file, for messages
-    The lines between two definitions are blank, so that messages keep their lines. Raises InputError for a name that
-    the file does not define.
+    The lines between two definitions are blank, which preserves the line numbers in messages. Raises InputError for a
+    name that the file does not define.
     """
     spans = sorted({span for name in names.split(",") for span in _definitions(text, name.strip(), where)})
     parts, at = [], spans[0][0]
@@ -33,16 +33,16 @@ def functions_in(text: str, names: str, where: str) -> tuple[str, int]:
 
 def _definitions(text: str, name: str, where: str) -> list[tuple[int, int]]:
     if not re.fullmatch(r"\w{1,64}", name):
-        raise InputError(f"'{name[:64]}' is no name of a function", where, "#include <FILE.glsl#FUNCTION>")
+        raise InputError(f"'{name[:64]}' is not a function name", where, "write #include <FILE.glsl#FUNCTION>")
     heads = re.finditer(_HEAD.format(name=name), text, re.MULTILINE)
     spans = [(head.start(), end) for head in heads if (end := _end(text, head.end()))]
     if not spans:
-        raise InputError(f"no function '{name}' is defined here", where, "its name as the file spells it")
+        raise InputError(f"no function '{name}' is defined here", where, "use the name as spelled in the file")
     return spans
 
 
 def _end(text: str, start: int) -> int:
-    """The place after the body of a function whose arguments begin at `start`; 0 for a declaration or an open body."""
+    """The position after the body of a function whose arguments begin at `start`; 0 if the body is missing or open."""
     braces = 0
     for token in _TOKEN.finditer(text, start):
         one = token[0]

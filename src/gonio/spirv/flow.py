@@ -13,10 +13,10 @@ ENDS = frozenset({"Branch", "BranchConditional", "Switch", "Return", "ReturnValu
 class Flow:
     """Facts about a function's blocks.
 
-    order     label -> its place: a loop's blocks lie together, before the block that follows the loop
-    loops     label -> the loops that contain it, as sets of labels, the innermost first
-    reads     variable -> the labels of blocks that read it or pass it on
-    lasting   ids defined inside a loop and used outside
+    order     label -> its position; a loop's blocks are contiguous, before the block that follows the loop
+    loops     label -> the loops that contain it, as sets of labels, innermost first
+    reads     variable -> the labels of blocks that read it or pass it to a function
+    lasting   ids that are defined inside a loop and used outside
     """
 
     order: dict[int, int]
@@ -44,7 +44,7 @@ def flow_of(function: Function) -> Flow:
 
 
 def _structured(function: Function) -> dict[int, int]:
-    """Reverse postorder in which a construct's merge block comes after its blocks."""
+    """Reverse postorder, with the merge block of a construct after its blocks."""
     entry = next(iter(function.blocks))
     postorder: list[int] = []
     visited = {entry}

@@ -1,4 +1,4 @@
-"""Include guards and conditions of a C-like text, so that a header is expanded once, not for each #include of it."""
+"""Include guards and conditions of a C-like text, so that a header is expanded once, not per #include."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def is_guarded(text: str) -> bool:
 
 
 def guarded(text: str, content: str, name: str) -> str:
-    """The expansion of a text that is to be read once, by a macro: the compiler ignores #pragma once."""
+    """The expansion of a text, guarded by a macro if it has #pragma once, which the compiler ignores."""
     return f"#ifndef {name}\n#define {name}\n{content}\n#endif" if _ONCE.match(text) else content
 
 
 def context(text: str, at: int) -> Context:
-    """The conditions around a place of a text, without that of its guard."""
+    """The conditions around a position in a text, without that of its include guard."""
     guard = _GUARD.match(text)
     stack: list[str] = []
     for word, rest in _LINE.findall(text, guard.end() if guard else 0, at):

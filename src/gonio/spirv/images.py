@@ -1,4 +1,4 @@
-"""Textures as tables: filter and edge rule of a sampler, by `ops.lookup` and `ops.fetch`."""
+"""Textures as tables, read by `ops.lookup` and `ops.fetch` with the filter and edge rule of a sampler."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ FILTERS = ("linear", "nearest")
 
 @dataclass(frozen=True)
 class Texture:
-    """A texture: its table, (rows, columns, channels), row 0 at v = 0; None where no file was named.
+    """A texture: its table, (rows, columns, channels), with row 0 at v = 0; None if no file was named.
 
-    wrap    "clamp" to the edge, or "repeat"
-    filter  "linear" between the centers of texels, or "nearest"
-    dimensions, declared  of the shader's declaration: 0 and "" if it is unknown; else the number of coordinates, and
-                          what kind of texture that is not read it is
+    wrap        "clamp" to the edge, or "repeat"
+    filter      "linear" between texel centers, or "nearest"
+    dimensions  number of coordinates in the shader's declaration, 0 if unknown
+    declared    a description of the declared kind if it is not supported, else ""
     """
 
     name: str
@@ -34,7 +34,7 @@ class Texture:
     declared: str = ""
 
     def texels(self) -> ops.Table:
-        """The table. Raises InputError if there is none, or none of the declared kind."""
+        """The table. Raises InputError if there is none, or if its declared kind is unsupported or different."""
         if self.declared:
             raise refuse(f"'{self.name}' is {self.declared}", "tables are textures of one, two or three dimensions")
         if self.table is not None and self.dimensions not in (0, len(self.table.shape)):
@@ -46,7 +46,7 @@ class Texture:
 
 
 def sampled(name: str, values: list[Value]) -> Value:
-    """An instruction on textures."""
+    """The result of an instruction on textures."""
     texture = values[0]
     if isinstance(texture, Undefined):
         raise texture.error()
@@ -77,14 +77,14 @@ def sampled(name: str, values: list[Value]) -> Value:
 
 
 def _fetched(table: ops.Table, places: list[Value]) -> tuple[Value, ...]:
-    """The channels of a texel: plain numbers at a place that is known."""
+    """The channels of a texel; plain numbers if its coordinates are."""
     if all(map(static, places)):
         return tuple(float(channel) for channel in fetch_in_numpy(table, *places))
     return ops.fetch(table, *places)
 
 
 def _varying(places: list[Value]) -> list[Value]:
-    """All coordinates as values of the formula, if one is."""
+    """The coordinates, all as values of the formula if one is."""
     known = next((x for x in places if not static(x)), None)
     if known is None:
         return [where(True, x, x) if not static(x) else x for x in places]
@@ -96,7 +96,7 @@ def _wrapped(x: Value, wrap: str) -> Value:
 
 
 def _four(channels: tuple[Value, ...]) -> Value:
-    """Red, green, blue and alpha, as a sampler fills absent ones."""
+    """Red, green, blue and alpha, with missing channels filled as by a sampler."""
     parts = [float(c) if isinstance(c, np.ndarray) and c.ndim == 0 else c for c in channels]
     return (*parts[:4], *(0.0, 0.0, 0.0, 1.0)[len(parts) :])
 

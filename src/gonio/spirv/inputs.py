@@ -1,5 +1,5 @@
-"""The values of a module's global variables before its functions run: what is given, the text's own initial values, and
-for everything else a scalar that is refused where a result depends on it.
+"""The values of a module's global variables before its functions run: given values, the text's initial values, and
+otherwise undefined scalars, which are refused if a result depends on them.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from .module import UNIFORM, UNIFORMS, Instruction, Module
 from .values import Undefined, Value
 
 INPUT = 1  # the storage class of varyings and built-in inputs
-_ZERO = "what nothing sets is 0 with `unset_is_zero = true` in the adapter"
+_ZERO = "or add `unset_is_zero = true` to the adapter"
 
 
 def initial(
     module: Module, one: Instruction, given: Mapping[str, Value], textures: Mapping[str, Texture], zero: bool
 ) -> Value:
-    """The value of a global, by its declaration.
+    """The value of a global, from its declaration.
 
-    given     values of uniforms by name, and of members of a uniform block
-    textures  by the names of samplers
+    given     values of uniforms, and of members of a uniform block, by name
+    textures  textures by the names of samplers
     zero      whether everything else is 0
     """
     inside = module.type(one.type).parts[0]
@@ -44,7 +44,7 @@ def initial(
 
 
 def _texture(module: Module, type: int, texture: Texture) -> Texture:
-    """A texture with what the shader declares of it."""
+    """A texture with the kind that the shader declares."""
     kind = module.type(type)
     image = kind.parts[0] if kind.kind == "sampled image" else type
     dimensions = module.type(image).length if module.type(image).kind == "image" else 0
@@ -58,9 +58,9 @@ def _unset(module: Module, type: int, space: int, name: str, zero: bool) -> Valu
         what = f"the {'built-in' if name.startswith('gl_') else 'varying'} '{name}' has no value"
         return module.undefined(type, Undefined(what, f"make it an argument of the BRDF; {_ZERO}", True))
     if space in UNIFORMS:
-        what = f"the uniform '{name}' of {module.type(type).size} numbers ({module.shape(type)}) is no parameter"
-        return module.undefined(type, Undefined(what, f"uniforms of at most 64 numbers are; {_ZERO}", True))
+        what = f"the uniform '{name}' of {module.type(type).size} numbers ({module.shape(type)}) is not a parameter"
+        return module.undefined(type, Undefined(what, f"use at most 64 numbers; {_ZERO}", True))
     hint = f"give it an initial value{', or assign it in `main` from uniforms' if module.entered else ''}; {_ZERO}"
-    # where lanes are merged, any value serves in those that wrote none, unless an entry point may have written it
+    # where lanes are merged, lanes that wrote no value may take any, unless an entry point may have written one
     firm = not module.entered
     return module.undefined(type, Undefined(f"the global '{name}' is read and was never assigned", hint, firm))

@@ -17,13 +17,13 @@ _NAMED = re.compile(r"(?:\b([A-Za-z_$][\w$]*)\s*(?::\s*string\s*)?[=:]|\bexport\
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0", "\n": ""}
 _TOKEN = re.compile(r"""//[^\n]*|/\*.*?\*/|'(?:\\.|[^'\\\n])*'|"(?:\\.|[^"\\\n])*"|`""", re.DOTALL)
-_NAME_BEFORE = 400  # characters before a literal in which its name may stand
+_NAME_BEFORE = 400  # characters before a literal that may contain its name
 
 
 class Literal(NamedTuple):
-    """A template literal: the name that it is given ("default", or "" for none), its text, and its first line.
+    """A template literal: the name that it is assigned to ("default", or "" for none), its text, and its first line.
 
-    code  the line of its first `${`, 0 for none: such a text is made by running code
+    code  the line of its first `${`, 0 for none; a text with one depends on code that runs
     """
 
     name: str
@@ -33,7 +33,7 @@ class Literal(NamedTuple):
 
 
 def literals(text: str, where: str) -> list[Literal]:
-    """The template literals of a JavaScript text, outside comments and strings. Raises InputError for an open one."""
+    """The template literals of a JavaScript text, outside comments and strings. Raises InputError if one is open."""
     result, at = [], 0
     while (token := _TOKEN.search(text, at)) is not None:
         at = token.end()
@@ -49,22 +49,22 @@ def literals(text: str, where: str) -> list[Literal]:
 
 
 def shader_in(text: str, name: str, where: str) -> Literal:
-    """The literal of a name; of a file with one literal, that. Raises InputError if there is none without code."""
+    """The literal of that name, or the only one of a file. Raises InputError if it is missing or contains code."""
     every = literals(text, where)
     chosen = [one for one in every if one.name == name] if name else every
     if name and not chosen:  # bundlers write strings
         chosen = [one for one in _strings(text) if one.name == name]
     if len(chosen) != 1:
-        what = f"{len(chosen)} template literals{f' named {name}' if name else ''}"
+        what = f"{len(chosen)} template literals{f' named {name}' if name else ''}, one expected"
         known = ", ".join(one.name for one in every if one.name)
-        raise InputError(what, where, f"#include <FILE.js#NAME>; it has {known or 'none with a name'}")
+        raise InputError(what, where, f"write #include <FILE.js#NAME>; it has {known or 'none with a name'}")
     if chosen[0].code:
         raise InputError("'${': this text is made by running JavaScript", f"{where}:{chosen[0].code}", "write it out")
     return chosen[0]
 
 
 def _strings(text: str) -> Iterator[Literal]:
-    """The strings of a JavaScript text that are given a name."""
+    """The strings of a JavaScript text that are assigned to a name."""
     for token in _TOKEN.finditer(text):
         if token[0][0] in "'\"" and (
             named := _NAMED.search(text[max(token.start() - _NAME_BEFORE, 0) : token.start()])
@@ -74,8 +74,8 @@ def _strings(text: str) -> Iterator[Literal]:
 
 
 def _end(text: str, start: int, where: str) -> tuple[int, int]:
-    """The place after the closing backtick, and that of the first `${`, whose code may hold literals of its own."""
-    at, code, braces = start, 0, [0]  # braces: of the code around this place, innermost last; 0 in a literal
+    """The positions after the closing backtick and of the first `${`, whose code may contain literals."""
+    at, code, braces = start, 0, [0]  # braces: of the surrounding code, innermost last; 0 in a literal
     while at < len(text):
         one, inside = text[at], len(braces) % 2 == 1
         if inside and one == "\\":
@@ -95,7 +95,7 @@ def _end(text: str, start: int, where: str) -> tuple[int, int]:
             if braces[-1] == 0:
                 braces.pop()
         at += 1
-    raise InputError("a template literal that does not end", where, "the file may be cut off")
+    raise InputError("a template literal is not closed", where, "the file may be truncated")
 
 
 def _unescaped(text: str) -> str:
@@ -113,7 +113,7 @@ def array_in(text: str, name: str, where: str) -> tuple[str, list[float]]:
     try:
         return match[1], [_number(word) for word in match[2].replace(",", " ").split()]
     except ValueError as error:
-        raise InputError(f"{name}: {error}", where, "numbers alone") from None
+        raise InputError(f"{name}: {error}", where, "use only numbers") from None
 
 
 def _number(word: str) -> float:

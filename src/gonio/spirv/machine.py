@@ -1,8 +1,8 @@
 """A module's functions, run with the vocabulary of `gonio.ops`.
 
-All lanes run together: each block runs under the mask of the lanes that reach it, stores and results are selected by
-it. A loop runs until no lane is left in it; its counter is a plain number, so the loop unrolls. Loops that only values
-could end are refused, as are discard, atomics, barriers and everything else that has no meaning for a BSDF.
+All lanes run together: each block runs under the mask of the lanes that reach it, which selects stores and results. A
+loop runs until no lane is left in it; its counter is a plain number, so the loop unrolls. Loops whose end depends only
+on values that are not constant are refused, as are discard, atomics, barriers and all else without meaning for a BSDF.
 """
 
 from __future__ import annotations
@@ -39,30 +39,30 @@ from .values import (
 )
 from .work import Work
 
-MAX_ITERATIONS = 4096  # of a loop whose counter is known, each time it is entered
-MAX_VARYING = 256  # of a loop that only values can end
+MAX_ITERATIONS = 4096  # of a loop with a constant counter, each time it is entered
+MAX_VARYING = 256  # of a loop without a constant bound, which is then refused
 MAX_DEPTH = 64  # of calls
 
 
 class Frame:
-    """One call of a function: its values by id, and the blocks that wait, label -> (mask, values of its phis)."""
+    """One call of a function: its values by id, and the waiting blocks, label -> (mask, values of its phis)."""
 
     def __init__(self, function: Function, flow: Flow, outer: Value) -> None:
         self.function, self.flow, self.outer = function, flow, outer
         self.values: dict[int, Value] = {}
         self.own: set[int] = set()  # identities of this call's variables
         self.waiting: dict[int, tuple[Value, dict[int, Value]]] = {}
-        self.rounds: dict[int, int] = {}  # label -> how often it ran
+        self.rounds: dict[int, int] = {}  # label -> number of runs
         self.result: Value = UNDEFINED
-        self.returned: Value = False  # the lanes that have one
+        self.returned: Value = False  # the lanes that have returned
 
 
 class Machine:
     """A module ready to run.
 
-    globals  name of a global -> its value. Members of a block without a name are globals themselves.
+    globals  name of a global -> its value; members of an unnamed block are globals themselves
     textures name of a sampler -> its texture
-    zero     whether variables that nothing sets are 0; else they are refused where a result depends on them
+    zero     whether variables that are never set are 0; otherwise they are refused if a result depends on them
     """
 
     def __init__(
@@ -88,9 +88,9 @@ class Machine:
         self._work = Work(module)
 
     def call(self, function: Function, arguments: Sequence[Value]) -> Value:
-        """The result of a function. Arguments that are pointers get a variable of their own.
+        """The result of a function. Values given for pointer arguments are stored in new variables.
 
-        Raises InputError, with the line of the file, for constructs that are not read and for damaged modules.
+        Raises InputError, with the line of the file, for unsupported constructs and damaged modules.
         """
         self._work, self._stack = Work(self.module), []
         kinds = [self.module.type(kind).kind for _, kind in function.parameters]
@@ -113,7 +113,7 @@ class Machine:
             raise InputError(error.what, error.where or f"{one.file}:{one.line}", error.hint) from error
 
     def variable(self, name: str) -> Value:
-        """The value of a global now."""
+        """The current value of a global."""
         for id, one in self._globals.items():
             if self.module.names.get(id) == name:
                 return one.cell.value
@@ -123,7 +123,7 @@ class Machine:
 
     def _run(self, function: Function, arguments: Sequence[Value], outer: Value) -> Value:
         if function.id in self._stack or len(self._stack) >= MAX_DEPTH:
-            raise refuse(f"recursion of '{self.module.names.get(function.id, function.id)}'", "a loop of known length")
+            raise refuse(f"recursion of '{self.module.names.get(function.id, function.id)}'", "use a bounded loop")
         if function.id in self.module.refused:
             raise self.module.refused[function.id]
         if not function.blocks:
@@ -145,7 +145,7 @@ class Machine:
             label = min(frame.waiting, key=frame.flow.order.__getitem__)
             mask, phis = frame.waiting.pop(label)
             if not frame.waiting:
-                mask = negated(frame.returned)  # all lanes are here: a shorter expression of the same mask
+                mask = negated(frame.returned)  # all lanes reach this block: a shorter expression of the same mask
             for id, value in phis.items():
                 self._keep(frame, id, value, mask)
             self._block(frame, frame.function.blocks[label], mask)
@@ -186,14 +186,14 @@ class Machine:
             raise InputError(what, place, "compile it again") from error
 
     def _keep(self, frame: Frame, id: int, value: Value, mask: Value) -> None:
-        """A value of an id; lanes that left its loop keep theirs where it is used after the loop."""
+        """Set the value of an id; lanes that have left its loop keep the old one if it is used after the loop."""
         if id in frame.flow.lasting and id in frame.values and not isinstance(value, Pointer):
             value = select(mask, value, frame.values[id])
         self._work.copied(value)
         frame.values[id] = value
 
     def _leave(self, frame: Frame, block: Block, one: Instruction, mask: Value) -> bool:
-        """Whether an instruction ends the block; the blocks that follow then wait."""
+        """Whether an instruction ends the block; its successors are then waiting."""
         operands = one.operands
         if one.name == "LoopMerge":
             self._check_rounds(frame, block.label, mask)
@@ -213,16 +213,16 @@ class Machine:
                 rest = both(rest, negated(equal))
             self._edge(frame, block.label, operands[1], rest)
         elif one.name == "ReturnValue":
-            # once every lane is here, those that returned before keep their results
+            # lanes that returned before keep their results
             frame.result = select(frame.returned, frame.result, self._get(frame, operands[0]))
             frame.returned = either(frame.returned, mask)
         elif one.name in ("Return", "Unreachable"):
             frame.returned = either(frame.returned, mask)
         elif one.name == "Kill":
-            raise refuse("discard", "return a value: a BSDF has no fragments to discard")
+            raise refuse("discard is not supported", "return a value: a BSDF has no fragments to discard")
         elif one.name == "refused":
             what = REFUSED.get(operands[0], f"SPIR-V's instruction {operands[0]}")
-            raise refuse(what, ALONE)
+            raise refuse(f"{what} is not supported", ALONE)
         return True
 
     def _check_rounds(self, frame: Frame, label: int, mask: Value) -> None:
@@ -231,13 +231,13 @@ class Machine:
             what = f"a loop without a known end, more than {MAX_VARYING} iterations"
             raise refuse(what, "bound its counter by a constant")
         if count > MAX_ITERATIONS:
-            raise refuse(f"a loop of more than {MAX_ITERATIONS} iterations", "fewer, or a table of its results")
+            raise refuse(f"a loop of more than {MAX_ITERATIONS} iterations", "use fewer, or a table of its results")
 
     def _edge(self, frame: Frame, source: int, target: int, mask: Value) -> None:
         if mask is False:
             return
         if target in frame.rounds and source not in frame.flow.loops[target][0]:
-            frame.rounds[target] = 0  # the loop is entered anew
+            frame.rounds[target] = 0  # the loop is entered again
         before, phis = frame.waiting.get(target, (False, {}))
         fresh = dict(phis)
         for one in frame.function.blocks[target].instructions:
@@ -253,7 +253,7 @@ class Machine:
         return self._recorded(function, arguments, both(frame.outer, mask))
 
     def _recorded(self, function: Function, arguments: Sequence[Value], mask: Value) -> Value:
-        """A call that a recording keeps as one, if there is a recording."""
+        """The result of a call; a recording, if there is one, contains it as a call."""
         if not calls.is_recordable(arguments):
             return self._run(function, arguments, mask)
         named = calls.globals_of(self.module, function, self._named)
@@ -293,8 +293,11 @@ class Machine:
         return self.module.names.get(one.result) or member or self.module.names.get(inside, "")
 
     def _unread_elsewhere(self, frame: Frame, label: int, cell: Cell) -> bool:
-        """Whether lanes outside this block never read a variable's present value, so that its store needs no mask: all
-        lanes of a loop are here, and only the loop reads it. A counter so remains a plain number."""
+        """Whether lanes outside this block never read a variable's current value, so that a store needs no mask.
+
+        This holds if all lanes of a loop are in the block and only the loop reads the variable. It keeps loop counters
+        plain numbers.
+        """
         reads = frame.flow.reads.get(cell.id, set())
         for loop in (*frame.flow.loops[label], frozenset(frame.flow.order)):
             if any(waiting in loop for waiting in frame.waiting):
@@ -309,7 +312,7 @@ class Machine:
             known = self._get(frame, one.operands[1]) if len(one.operands) > 1 else self._unset(one)
             cell = Cell(known, one.result)
             frame.own.add(id(cell))
-            frame.values[-one.result] = cell  # keeps it alive, so that its identity is its own
+            frame.values[-one.result] = cell  # keeps it alive, so that its id is not reused
             return Pointer(cell)
         if name == "ExtInst":
             return self._standard(frame, one)
@@ -328,7 +331,7 @@ class Machine:
         if name in composites.COMPOSED:
             return composites.COMPOSED[name](self.module, one.type, *values)
         if name == "Bitcast":
-            source = frame.function.types.get(one.operands[0], one.type)  # constants are numbers
+            source = frame.function.types.get(one.operands[0], one.type)  # constants are not in `types`
             before, after = self._scalar(source), self._scalar(one.type)
             return elementwise(passing(lambda part: cast(part, before, after)), *values)
         return self._arithmetic(one, values)
@@ -339,7 +342,7 @@ class Machine:
         return (self.module.type(kind.parts[0]) if kind.parts else kind).kind
 
     def _unset(self, one: Instruction) -> Value:
-        """The value of a variable of a function before its first store."""
+        """The value of a function's variable before its first store."""
         inside = self.module.type(one.type).parts[0]
         if self._zero:
             return self.module.zero(inside)
@@ -364,14 +367,14 @@ class Machine:
             return elementwise(passing(on_integers), *values)
         if name in WHOLE:
             return WHOLE[name](*values)
-        raise refuse(f"the bits of a number ({name})", "compute with floats")
+        raise refuse(f"operations on the bits of a number ({name}) are not supported", "compute with floats")
 
     def _check_width(self, id: int) -> None:
         kind = self.module.type(id)
         kind = self.module.type(kind.parts[0]) if kind.kind in ("vector", "matrix") else kind
         if "-bit" in kind.kind:
             raise refuse(
-                f"{kind.kind}s are not read", "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
+                f"{kind.kind}s are not supported", "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
             )
 
     def _standard(self, frame: Frame, one: Instruction) -> Value:

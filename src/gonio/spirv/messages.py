@@ -1,4 +1,4 @@
-"""What a compiler of shaders says, in the words of a BSDF: limits that ended it, and things that a BSDF cannot have."""
+"""Messages of shader compilers in terms of BSDFs: exceeded limits, and features that a BSDF cannot have."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ ALONE = "a BSDF is a function of directions and parameters alone"
 
 
 def explained(message: str, printed: str) -> tuple[str, str]:
-    """An error and a hint in place of the compiler's message, where that says less than is known.
+    """An error and a hint in place of a compiler's message that says less than is known.
 
     printed  everything that the compiler wrote
     """
     if "Recursion detected" in message and (pair := _RECURSION.search(printed)):
         a, b = pair.groups()
         what = f"'{a}' calls itself" if a == b else f"'{a}' and '{b}' call each other"
-        return f"recursion: {what}", "a loop of known length"
+        return f"recursion: {what}", "use a bounded loop"
     if builtin := _BUILTIN.search(message):
         name = builtin[1] or builtin[2]
         for pattern, kind in _KINDS.items():
             if re.fullmatch(pattern, name):
-                return f"{kind} ({name})", ALONE
-    if "memory exhausted" in message:  # of its parser's stack, of 10,000 entries
+                return f"{kind} ({name}) is not supported", ALONE
+    if "memory exhausted" in message:  # of its parser's stack, which has 10,000 entries
         return "brackets or blocks that nest too deep for the compiler", "nest them less"
     return message, "correct the line"
 
@@ -39,8 +39,8 @@ def explained(message: str, printed: str) -> tuple[str, str]:
 def ended(code: int, printed: str, seconds: int, memory: int, size: int) -> tuple[str, str]:
     """An error and a hint for a compiler that ended without a message.
 
-    code     its exit code, minus the signal that ended it
-    seconds, memory, size  its limits: seconds of a processor, bytes of memory, bytes of a module
+    code     its exit code, or minus the number of the signal that ended it
+    seconds, memory, size  its limits: seconds of CPU time, bytes of memory, bytes of a module
     """
     shorter = "shorten the shader: its macros, loops, types and functions"
     if "bad_alloc" in printed or "MemoryError" in printed or "out of memory" in printed.lower():

@@ -1,6 +1,6 @@
-"""SPIR-V modules: words to types, constants, variables and functions, every index checked.
+"""SPIR-V modules: words parsed into types, constants, variables and functions, with every index checked.
 
-A module is untrusted. Sizes are bounded, and a type refers to earlier ones only, so that nothing is endless.
+A module is untrusted. Sizes are bounded, and a type refers only to earlier ones, so that none is infinite.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..errors import InputError
 from .opcodes import NAMES, REFUSED, TYPES
 from .values import UNDEFINED, Undefined, Value, refuse, wrapped
 
-SOURCE = "gonio-shader.frag"  # the file that the compiler reads: messages name the user's file in its place
+SOURCE = "gonio-shader.frag"  # the file that the compiler reads; messages name the user's file instead
 MAGIC = 0x07230203
 UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
 BUFFERS = (2, 9, 12)  # storage classes of blocks: uniform, push constants, storage
@@ -29,9 +29,9 @@ MAX_LEAVES = 1 << 16  # scalars in one value
 class Type(NamedTuple):
     """A type: kind is "float", "int", "uint", "bool", "vector", "matrix", "array", "struct", "pointer", "image", ...
 
-    parts   the types inside, for vectors, matrices and arrays one
-    length  of components, columns or items; the number of leaves of a struct
-    size    scalars of a value
+    parts   the types inside; one for vectors, matrices and arrays
+    length  number of components, columns or items; for a struct, number of leaves
+    size    number of scalars in a value
     """
 
     kind: str
@@ -41,7 +41,7 @@ class Type(NamedTuple):
 
 
 class Instruction(NamedTuple):
-    """One instruction: its name, result type and id (0 where it has none), operands, and line of the source."""
+    """One instruction: its name, result type and id (0 if it has none), operands, and source line."""
 
     name: str
     type: int
@@ -70,7 +70,7 @@ class Function:
 
     @cached_property
     def types(self) -> dict[int, int]:
-        """The types of its values, by id; of a function that has been read."""
+        """The types of its values, by id; only once the function has been read."""
         every = [one for block in self.blocks.values() for one in block.instructions]
         return {**dict(self.parameters), **{one.result: one.type for one in every}}
 
@@ -80,13 +80,13 @@ class Module:
     """A module, by ids.
 
     names      id -> name; members: (struct type, index) -> name
-    variables  id -> its instruction, outside functions
+    variables  id -> instruction, for variables outside functions
     constants  id -> value
-    sets       ids of instruction sets -> their names
-    refused    ids of functions that a front end could not translate -> why
-    defaults   names of uniforms -> their values where the text has some
-    costs      ids of functions -> instructions of a call, callees included; known when one has run
-    images     ids of image types whose textures are not read -> what they are
+    sets       id of an instruction set -> its name
+    refused    id of a function that a front end could not translate -> the error
+    defaults   name of a uniform -> its value in the text, if any
+    costs      id of a function -> instructions of a call, including callees; known after the first call
+    images     id of an image type that is not supported -> its description
     entered    whether entry points are among the functions
     """
 
@@ -105,17 +105,17 @@ class Module:
     entered: bool = True
 
     def type(self, id: int) -> Type:
-        """A type. Raises InputError for an id that names none."""
+        """The type of an id. Raises InputError if there is none."""
         if id not in self.types:
-            raise refuse(f"SPIR-V id {id} is no type")
+            raise refuse(f"SPIR-V id {id} is not a type")
         return self.types[id]
 
     def function(self, name: str) -> list[Function]:
-        """The functions of a name, overloads of one another."""
+        """The functions of a name: all its overloads."""
         return [one for id, one in self.functions.items() if self.names.get(id, "").partition("(")[0] == name]
 
     def zero(self, id: int) -> Value:
-        """The value of a type whose every scalar is 0."""
+        """The value of a type with all scalars 0."""
         kind = self.type(id)
         if kind.kind in ("float", "int", "uint", "bool"):
             return {"float": 0.0, "int": 0, "uint": 0, "bool": False}[kind.kind]
@@ -126,7 +126,7 @@ class Module:
         return UNDEFINED
 
     def undefined(self, id: int, why: Undefined = UNDEFINED) -> Value:
-        """The value of a type whose every scalar is undefined."""
+        """The value of a type with all scalars undefined."""
         kind = self.type(id)
         if kind.kind == "struct":
             return tuple(self.undefined(part, why) for part in kind.parts)
@@ -135,7 +135,7 @@ class Module:
         return why
 
     def shape(self, id: int) -> str:
-        """A type in GLSL's words: "float", "vec3"."""
+        """The GLSL name of a type: "float", "vec3"."""
         kind = self.type(id)
         if kind.kind == "pointer":
             return self.shape(kind.parts[0])
@@ -148,7 +148,7 @@ class Module:
 
 
 def parse(data: bytes, where: str = "SPIR-V") -> Module:
-    """The module in the bytes of a .spv. Raises InputError if it is none, or for types that are not read."""
+    """The module in the bytes of a .spv. Raises InputError for damaged modules and unsupported types."""
     try:
         return _Parser(data, where).module
     except InputError as error:
@@ -187,19 +187,19 @@ class _Parser:
         elif opcode == 11:  # OpExtInstImport
             module.sets[words[0]] = _text(words[1:])
         elif 19 <= opcode <= 39:
-            if words[0] in module.types:  # a type that changes could contain itself
+            if words[0] in module.types:  # a type that is redefined could contain itself
                 raise ValueError(f"two types of id {words[0]}")
             module.types[words[0]] = self._type(opcode, words)
         elif opcode in NAMES:
             self._instruction(NAMES[opcode], words)
         elif opcode in REFUSED and self.block is not None:
-            # refused where it runs: a function of the file that no formula calls may contain anything
+            # refused only where it runs: a function of the file that no formula calls may contain anything
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
         elif self.block is not None and opcode != 0:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
 
     def _debug(self, result: int, number: int, operands: tuple[int, ...]) -> None:
-        """Lines as Slang's compiler states them, in place of OpLine."""
+        """Source lines as stated by Slang's compiler, which does not use OpLine."""
         if number == 35:  # DebugSource
             file = self.module.strings.get(operands[0], "")
             self.module.strings[result] = self.where if file in ("", "0") else file  # "0" is the text itself
@@ -308,7 +308,7 @@ class _Parser:
 
 
 def _instructions(data: bytes, where: str) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """Opcode and operands of each instruction, after the header's check."""
+    """Opcode and operands of each instruction, after a check of the header."""
     if len(data) < 20 or len(data) % 4 or len(data) > MAX_BYTES:
         raise InputError(f"{len(data)} bytes, not a SPIR-V module", where, "give the .spv that a compiler wrote")
     order = "<" if struct.unpack("<I", data[:4])[0] == MAGIC else ">"

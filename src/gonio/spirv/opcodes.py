@@ -1,4 +1,4 @@
-"""Numbers of SPIR-V's instructions: those that are read, and the refused ones by what they do."""
+"""SPIR-V opcodes: the supported instructions, and descriptions of refused ones."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _RANGES = [
     (range(98, 99), "a read of a storage image"),
     (range(99, 100), "a write to an image"),
     (range(105, 108), "a query of a texture's levels"),
-    (range(113, 118), "a conversion between widths of numbers: doubles and 16-bit types are not read"),
+    (range(113, 118), "a conversion between number widths (doubles and 16-bit types)"),
     (range(207, 216), "a screen-space derivative (dFdx, dFdy, fwidth)"),
     (range(224, 226), "a barrier"),
     (range(227, 243), "an atomic operation"),

@@ -1,4 +1,4 @@
-"""What functions of a module may reach: the functions that they call, and the globals that they read and write."""
+"""What functions of a module may use: the functions that they call, and the globals that they read and write."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from collections.abc import Iterable, Iterator
 from .flow import successors
 from .module import Block, Function, Module
 
-Part = tuple[int, int | None]  # a global, and the member of it; None for all of it
+Part = tuple[int, int | None]  # a global, and a member of it; None for all of it
 
 
 def blocks_of(module: Module, starts: Iterable[int], without: Iterable[int] = ()) -> Iterator[Block]:
-    """The blocks of functions, by ids, and of all that they call, `without` some functions and what only those call."""
+    """The blocks of functions, by ids, and of all that they call.
+
+    without  functions to omit, with those that only they call
+    """
     visited, waiting = set(without), list(starts)
     while waiting:
         id = waiting.pop()
@@ -29,7 +32,7 @@ def called(blocks: Iterable[Block]) -> set[int]:
 
 
 def following(function: Function, labels: Iterable[int]) -> list[Block]:
-    """Some blocks, and those that may run after them."""
+    """The blocks of these labels, and those that may run after them."""
     visited, waiting = set[int](), list(labels)
     while waiting:
         one = waiting.pop()

@@ -1,7 +1,7 @@
-"""A shader's function recorded once, and its operations repeated on Dr.Jit values: the same operations in the same
-order as the machine's, without decoding instructions, masks and pointers at each call.
+"""Replay of a shader's function on Dr.Jit values: it is recorded once, and each call repeats the machine's operations
+in the same order, without decoding instructions, masks and pointers again.
 
-Only time is saved: without it, `Program.run` gives the same values.
+This only saves time: without it `Program.run` gives the same values.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ _OPERATIONS: dict[str, Callable[..., Value]] = {
     "abs": ops.abs, "minimum": ops.minimum, "maximum": ops.maximum, "exp": ops.exp, "log": ops.log, "sin": ops.sin,
     "cos": ops.cos, "atan2": ops.atan2, "floor": ops.floor, "copysign": ops.copysign, "isfinite": ops.isfinite,
 }  # fmt: skip
-MAX_RECORDED = 16  # of one function, by values that shape the code
+MAX_RECORDED = 16  # of one function, by the plain numbers among its arguments
 
 Inputs = Mapping[str, Mapping[str, Value]]
 
 
 class Replayed:
-    """A function of named scalars and tuples of scalars, recorded for each choice of those that are plain numbers, and
-    apart for 32 and 64 bits, in which a power of two is taken from its exponent otherwise.
+    """A function of named scalars and tuples of scalars, recorded for each combination of those that are plain numbers.
 
-    function  of mappings from names to values, as `Program.run`
+    It is recorded separately for 32 and 64 bits, which compute a power of two from its exponent differently.
+
+    function  a function of mappings from names to values, such as `Program.run`
     """
 
     def __init__(self, function: Callable[..., Value]) -> None:
@@ -39,7 +40,7 @@ class Replayed:
         self._recorded: dict[tuple[object, ...], graph.Function] = {}
 
     def __call__(self, **inputs: Mapping[str, Value]) -> Value:
-        """The function's value. Symbols of a recording are passed on: their recording keeps the shader's functions."""
+        """The function's value. Symbols of a recording are passed on, so that it contains the shader's functions."""
         scalars = list(_scalars(inputs))
         if any(isinstance(scalar, graph.Node) for _, scalar in scalars):
             return self.function(**inputs)
@@ -72,19 +73,19 @@ def _scalars(inputs: Inputs) -> Iterator[tuple[str, Value]]:
 
 
 def _filled(value: Value, path: str, symbols: Mapping[str, Value]) -> Value:
-    """A value with symbols in place of the scalars that are no plain numbers."""
+    """A value with symbols in place of the scalars that are not plain numbers."""
     filled = tuple(symbols.get(f"{path}.{place}", scalar) for place, scalar in enumerate(leaves(value)))
     return filled if isinstance(value, tuple) else filled[0]
 
 
 def _run(function: graph.Function, arguments: list[Value]) -> Value:
-    """The result of a recording, as it is structured."""
+    """The result of a recording, in its structure."""
     results = iter(_results(function, arguments))
     return rebuild(function.result, lambda _: next(results), graph.Node)
 
 
 def _results(function: graph.Function, arguments: list[Value]) -> list[Value]:
-    """The values of the nodes of its result."""
+    """The values of the nodes of a recording's result."""
     values: list[Any] = []
     remaining, read = iter(arguments), dict[tuple[object, ...], Any]()
 

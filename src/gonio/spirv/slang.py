@@ -1,4 +1,4 @@
-"""Slang's compiler, of the wheel `slangpy`: its program, the text it is given and its messages."""
+"""Slang's compiler, from the wheel `slangpy`: its command, the text that it compiles, and its messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import InputError, MachineError
 
 INSTALL = "pip install gonio[slang], or slangpy alone"
-# what makes the compiler read files; #include is resolved before
+# directives that make the compiler read files; #include is resolved earlier
 _READS = re.compile(r"#\s*include\b|\b(?:__)?(?:import|include|implementing)\b")
 _SKIPPED = re.compile(r'("(?:\\.|[^"\\\n])*")|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 _LINE = re.compile(r"^([ \t]*#line \d+) (\d+)$", re.MULTILINE)
@@ -25,7 +25,7 @@ def library() -> str:
         for name in ("libslang-compiler.so*", "libslang-compiler*.dylib", "slang-compiler*.dll"):
             if files := sorted(Path(folder).glob(name)):
                 return str(files[0])
-    raise MachineError("no compiler of Slang is installed: slangpy", "shader", INSTALL)
+    raise MachineError("the Slang compiler slangpy is not installed", "shader", INSTALL)
 
 
 def command(source: Path, output: Path) -> list[str]:
@@ -34,15 +34,15 @@ def command(source: Path, output: Path) -> list[str]:
 
 
 def program(text: str, calls: list[tuple[str, str, str]], name: str) -> str:
-    """A text with an entry point that uses every function, since the compiler drops those without an effect: their
-    results are stored in memory of the group.
+    """A text with an entry point that uses every function and stores the results in groupshared memory, since the
+    compiler drops functions without an effect.
 
     calls  (type of the result, declarations of arguments, call)
     Raises InputError for modules, which the compiler would read from any file.
     """
     code = _SKIPPED.sub(lambda match: '""' if match[1] else " ", re.sub(r"\\\r?\n", "", text))
     if (reads := _READS.search(code)) is not None:
-        what = f"'{reads[0]}' is not followed"
+        what = f"'{reads[0]}' is not supported"
         raise InputError(what, name, '#include "FILE" on a line of its own, from a folder of the adapter\'s `includes`')
     shared, body = [], []
     for place, (kind, arguments, call) in enumerate(calls):

@@ -15,7 +15,7 @@ SPIRV, SLANG, COMPUTE, STANDARD = 6, 1, 6, 2  # of slang.h: target, language of 
 
 
 def compile_file(library: str, source: str, output: str) -> int:
-    """0, or 1 after the messages have been printed. Without optimization, which would inline all functions."""
+    """0, or 1 after printing the messages. Optimization is off, as it would inline all functions."""
     slang, pointer, text = ctypes.CDLL(library), ctypes.c_void_p, ctypes.c_char_p
     for name in ("spCreateSession", "spCreateCompileRequest", "spGetEntryPointCode"):
         getattr(slang, name).restype = pointer

@@ -1,4 +1,4 @@
-"""The functions of GLSL.std.450, SPIR-V's standard library, by their numbers.
+"""The functions of GLSL.std.450, SPIR-V's standard library, by number.
 
 Powers, roots and inverse functions are built from the vocabulary; outside their domains they are NaN, as on a GPU.
 """
@@ -45,7 +45,7 @@ absolute = _function(np.abs, ops.abs)
 
 
 def _varying(x: Value, like: Value) -> Value:
-    """A value of the lanes of `like`."""
+    """A value with the lanes of `like`."""
     return x + 0.0 * like if static(x) else x
 
 
@@ -64,7 +64,7 @@ def _power(x: Value, y: Value) -> Value:
         return where(y > 0.0, 0.0 if x == 0.0 else math.nan, math.nan)
     positive = x > 0.0
     value = ops.exp(y * ops.log(ops.where(positive, x, 1.0)))
-    # 0, or NaN where x < 0: a root stays in an emitted text, where 0 / 0 would be simplified; its gradient is finite
+    # 0, or NaN where x < 0, by a root: unlike 0 / 0 it is not simplified in emitted text, and its gradient is finite
     domain = ops.sqrt(ops.where(x < 0.0, x, 0.0))
     if static(y) and y <= 0.0:
         return ops.where(positive, value, 1.0 / domain if y < 0.0 else value)
@@ -101,7 +101,7 @@ def sign(x: Value) -> Value:
 
 
 def round_even(x: Value) -> Value:
-    """The nearest whole number; halves to the even one."""
+    """The nearest integer; halves round to the even one."""
     if static(x):
         return folded(np.round, numeric(x))
     below = ops.floor(x)
@@ -131,7 +131,7 @@ def step(edge: Value, x: Value) -> Value:
 
 
 def smoothstep(low: Value, high: Value, x: Value) -> Value:
-    """3 t^2 - 2 t^3, t from 0 at `low` to 1 at `high`."""
+    """3 t^2 - 2 t^3, with t from 0 at `low` to 1 at `high`."""
     t = clamp(divide(subtract(x, low), subtract(high, low)), 0.0, 1.0)
     return multiply(multiply(t, t), subtract(3.0, multiply(2.0, t)))
 
@@ -175,7 +175,7 @@ def face_forward(n: Value, i: Value, reference: Value) -> Value:
 
 
 def determinant(m: tuple[Value, ...]) -> Value:
-    """By expansion along the first column."""
+    """The determinant, by expansion along the first column."""
     if len(m) == 1:
         return m[0][0]
     total: Value = 0.0
@@ -187,7 +187,7 @@ def determinant(m: tuple[Value, ...]) -> Value:
 
 
 def inverse(m: tuple[Value, ...]) -> Value:
-    """By cofactors."""
+    """The inverse, by cofactors."""
     volume = determinant(m)
 
     def cofactor(c: int, r: int) -> Value:
@@ -200,7 +200,7 @@ def inverse(m: tuple[Value, ...]) -> Value:
 
 
 LOG2 = math.log(2.0)
-# by number: of scalars, applied component by component
+# functions of scalars, applied component by component, by number
 ELEMENTWISE: dict[int, Callable[..., Value]] = {
     1: round_even, 2: round_even, 3: truncated, 4: absolute, 6: sign, 8: floor, 9: lambda x: negate(floor(negate(x))),
     10: fract, 11: lambda x: multiply(x, math.pi / 180.0), 12: lambda x: multiply(x, 180.0 / math.pi), 13: sin,
@@ -214,11 +214,11 @@ ELEMENTWISE: dict[int, Callable[..., Value]] = {
     32: lambda x: divide(1.0, sqrt(x)), 37: minimum, 40: maximum, 43: clamp, 46: mix, 48: step, 49: smoothstep,
     50: lambda a, b, c: add(multiply(a, b), c), 79: minimum, 80: maximum, 81: clamp,
 }  # fmt: skip
-# of integers
+# functions of integers
 WHOLE_NUMBERS: dict[int, Callable[..., Value]] = {
     5: absolute, 7: sign, 38: minimum, 39: minimum, 41: maximum, 42: maximum, 44: clamp, 45: clamp,
 }  # fmt: skip
-# of vectors and matrices
+# functions of vectors and matrices
 GEOMETRIC: dict[int, Callable[..., Value]] = {
     33: determinant, 34: inverse, 66: length, 67: lambda a, b: length(elementwise(subtract, a, b)), 68: cross,
     69: normalize, 70: face_forward, 71: reflect, 72: refract,

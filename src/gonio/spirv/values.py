@@ -1,7 +1,7 @@
-"""Values while a module runs: plain numbers where they are known, else Dr.Jit values or symbols; composites are tuples.
+"""Values while a module runs: plain numbers if they are constant, else Dr.Jit values or symbols; composites are tuples.
 
-A plain number is folded, so that loops over a counter unroll and a branch on a constant costs nothing. An integer that
-varies is held as a float with a whole value.
+Plain numbers are folded, so that loops with a counter unroll and a branch on a constant costs nothing. An integer that
+is not constant is represented by a float with an integer value.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Value = Any  # bool, int, float, a Dr.Jit value, a symbol, or a tuple of values
 
 
 class Undefined:
-    """A scalar that nothing determines. Arithmetic passes it on; it is refused where it decides a branch, an index or a
-    result, so that only what a formula depends on is refused.
+    """A scalar without a value. Arithmetic propagates it; it is refused if it determines a branch, an index or a
+    result, so that a formula is refused only if it depends on one.
 
-    firm  whether it stays where lanes are merged, as an input without a value does. The value of a local variable
-          before its first store does not: any value serves in lanes that do not read it.
+    firm  whether it remains undefined where lanes are merged, as an input without a value does. The value of a local
+          variable before its first store does not: lanes that do not read it may take any value.
     """
 
     __slots__ = ("firm", "hint", "what", "where")
@@ -42,16 +42,16 @@ class Undefined:
         return self.what, self.hint, self.firm, self.where
 
     def at(self, where: str) -> Undefined:
-        """The same, read at a file and line; the first place stays."""
+        """The same scalar with the file and line at which it is read, unless it has them already."""
         return self if self.where else Undefined(self.what, self.hint, self.firm, where)
 
     def error(self) -> InputError:
-        """The error for a use."""
+        """The error for its use."""
         return InputError(self.what, self.where, self.hint)
 
 
 class Bits:
-    """The bits of a float that varies as an integer: of `number`, or of the power of two with a biased exponent.
+    """The bits, as an integer, of a float that is not constant: `number`, or the power of two with a biased exponent.
 
     part  "magnitude" if the sign is known to be 0, "sign" if only the sign of `number` is left
     """
@@ -72,7 +72,7 @@ UNDEFINED: Final = Undefined("a value that nothing computes")
 
 
 def refuse(what: str, hint: str = "", where: str = "") -> InputError:
-    """The error for a construct that is not read; the machine adds file and line."""
+    """The error for an unsupported construct; the machine adds file and line."""
     return InputError(what, where, hint)
 
 
@@ -82,26 +82,25 @@ def static(value: Value) -> bool:
 
 
 def numeric(value: Value) -> Value:
-    """A scalar for arithmetic on floats: whole numbers that are known become floats. Raises InputError for undefined
-    ones."""
+    """A scalar for arithmetic on floats; constant integers become floats. Raises InputError if it is undefined."""
     if isinstance(value, Undefined):
         raise value.error()
     if isinstance(value, Bits):
-        raise refuse("a bit operation on an integer that varies", "compute with floats")
+        raise refuse("bit operations on varying integers are not supported", "compute with floats")
     if not _computes(value):
         raise refuse(f"a {type(value).__name__.lower()} in place of a number", "compile it again")
     return float(value) if isinstance(value, int) else value
 
 
 def truth(value: Value) -> Value:
-    """A scalar that decides. Raises InputError for undefined ones."""
+    """A scalar used as a condition. Raises InputError if it is undefined."""
     if isinstance(value, Undefined):
         raise value.error()
     return value
 
 
 def lost(values: Iterable[Value]) -> Undefined | None:
-    """The first undefined scalar, None if all are defined."""
+    """The first undefined scalar; None if all are defined."""
     return next((value for value in values if isinstance(value, Undefined)), None)
 
 
@@ -129,8 +128,8 @@ def negated(a: Value) -> Value:
 
 
 def select(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where the mask holds, else `b`, part by part of composites; undefined parts take the other value, unless they
-    are firm."""
+    """`a` where the mask holds, else `b`, part by part for composites; undefined parts take the other value, unless
+    they are firm."""
     if static(mask):
         return a if mask else b
     if isinstance(a, Undefined) or isinstance(b, Undefined):
@@ -151,7 +150,7 @@ def select(mask: Value, a: Value, b: Value) -> Value:
 
 
 def _merged(a: Value, b: Value) -> Value:
-    """Two values of which one is undefined."""
+    """The merged value of two, at least one of which is undefined."""
     if not isinstance(a, Undefined):
         a, b = b, a
     if isinstance(b, tuple):
@@ -184,6 +183,6 @@ def folded(function: Any, *values: float) -> float:
 
 
 def wrapped(value: int, signed: bool) -> int:
-    """A whole number in 32 bits."""
+    """An integer wrapped to 32 bits."""
     value &= 0xFFFFFFFF
     return value - (1 << 32) if signed and value >= 1 << 31 else value

@@ -1,8 +1,8 @@
-"""The limits of a call: instructions, and seconds.
+"""The limits of a call: instructions and time.
 
-A short text can ask for any amount of work: twenty functions that call the one before twice are a million calls. The
-largest shader of an engine that we know, the program of three-gpu-pathtracer, runs 4,054 instructions, and a loop
-of 4,096 rounds over a page of code 200,000.
+A short text can require any amount of work: twenty functions, each of which calls the previous one twice, make a
+million calls. The largest engine shader that we know, that of three-gpu-pathtracer, runs 4,054 instructions; 4,096
+iterations of a loop over a page of code run 200,000.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from .module import Function, Module
 from .values import Value, refuse
 
 MAX_INSTRUCTIONS = 250_000  # per call from outside
-SECONDS = 20.0  # of the thread, per call from outside: a single instruction may compute an array of 65,536 numbers
-COPIED = 256  # numbers of an array whose copy counts as one instruction more, in time and memory
+SECONDS = 20.0  # of thread time, per call from outside; a single instruction may compute an array of 65,536 numbers
+COPIED = 256  # numbers of an array whose copy counts as one additional instruction, in time and memory
 _HINT = "store what a function returned and use it again; shorten loops"
 
 
 class Work:
-    """What a call has done so far, by function. Raises InputError beyond the limits."""
+    """The work of a call so far, by function. Raises InputError beyond the limits."""
 
     def __init__(self, module: Module) -> None:
         self.module = module
@@ -41,7 +41,7 @@ class Work:
 
     @contextlib.contextmanager
     def shared(self, function: Function) -> Iterator[None]:
-        """A call that is recorded once for all calls alike: each counts, since each runs when values are computed."""
+        """A call that is recorded once for all equal calls; each counts, since each runs when values are computed."""
         before = self.total
         yield
         if self.total > before:
@@ -57,7 +57,7 @@ class Work:
             raise refuse(f"more than {MAX_INSTRUCTIONS:,} instructions: {self._most()}", _HINT)
 
     def copied(self, value: Value) -> None:
-        """A value was made; one of many numbers counts as several instructions."""
+        """A value was created; a large one counts as several instructions."""
         if isinstance(value, tuple):
             self.total += len(value) // COPIED
 

@@ -7,13 +7,13 @@ import numpy as np
 from .lights.solid_angles import is_sphere
 from .scene_data import SceneData
 
-# Paths behind mirrors and smooth glass rarely hit a lamp that subtends less than so many steradians there: in
-# examples/glass-caustic it is 0.008.
+# Solid angle in steradians: paths that leave mirrors and smooth glass rarely hit a lamp that subtends less than this.
+# The lamp of examples/glass-caustic subtends 0.008 sr.
 SMALL = 0.03
 
 
 def on_small_lights(data: SceneData) -> str:
-    """A hint if `path` will hardly find the light that mirrors or smooth glass cast on other surfaces; else ""."""
+    """A hint if `path` rarely samples the light that mirrors or smooth glass cast on other surfaces; otherwise ""."""
     if not data.smooth:
         return ""
     mi, flags = data.mi, data.mi.EmitterFlags

@@ -9,12 +9,12 @@ import drjit as dr
 from ..bridge.types import Float, Radiance, Ray, Sensor, UInt
 from .sampler import PairFunction
 
-# Dimensions of a sample that the camera uses: each decision of a sample has its own number, see `sampler`.
+# Sample dimensions used by the camera: each decision of a sample has a dimension of its own, see `sampler`.
 PIXEL, TIME, APERTURE, FIRST_FREE = 0, 1, 2, 3
 
 
 class Camera:
-    """The sensor of a scene, whose film has `width` pixels in a row."""
+    """The sensor of a scene; `width` is that of its film, in pixels."""
 
     def __init__(self, mi: ModuleType, sensor: Sensor, pair: PairFunction) -> None:
         self.mi, self.sensor, self.pair = mi, sensor, pair
@@ -23,9 +23,9 @@ class Camera:
         self.inverse_size = (dr.opaque(mi.Float, 1 / size[0]), dr.opaque(mi.Float, 1 / size[1]))
 
     def ray(self, pixel: UInt, key: UInt, index: UInt, wavelength: Float | None = None) -> tuple[Ray, Radiance]:
-        """A ray through a point of the pixel, and its weight.
+        """A ray through a point in the pixel, and its weight.
 
-        wavelength  a number in [0, 1) that chooses the wavelengths; None: a separate one for every sample
+        wavelength  a number in [0, 1) that selects the wavelengths; None: a separate one for every sample
         """
         mi = self.mi
         row = pixel // self.width

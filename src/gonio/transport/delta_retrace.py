@@ -5,7 +5,7 @@ hits a lamp behind two reflections within a glass ball. The path of such a sampl
 camera, with reflection and refraction equally likely, until it hits a lamp or ends. Both traces are weighted by their
 probability of taking that chain (power heuristic).
 
-All choices of a retrace are the digits of one number, so the chains of several retraces are stratified as well.
+All choices of a retrace are binary digits of one random number, so the chains of several retraces are stratified too.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..bridge.types import BSDFContext, BSDFSample, Float, Mask, Shape, UInt
 
 FIRST, DUE, RETRACING = 0, 1, 2  # `Retrace.phase`: the first trace, one after which a retrace follows, and the retrace
 
-COSINES = (-1.0, -0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 1.0)  # at which the lobe selection of materials is tested,
-STEPS = 65  # with so many numbers each
-MAX_ODDS = 1e12  # keeps their square finite
-END = 2.0**-20  # numbers that select the lobes at both ends of [0, 1]; no lobe is less likely
+COSINES = (-1.0, -0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 1.0)  # cosines at which the lobe selection of materials is tested
+STEPS = 65  # random numbers tested per cosine
+MAX_ODDS = 1e12  # keeps the square of the odds finite
+END = 2.0**-20  # END and 1 - END select the lobes at the two ends of [0, 1]; no lobe has a lower probability
 
 
 @dataclass
@@ -31,8 +31,8 @@ class Retrace:
     """State that a path carries for its retrace.
 
     phase   FIRST, DUE or RETRACING
-    odds    probability that a retrace takes the chain from the camera so far, over that of a first trace
-    number  in [0, 1), whose digits are the choices of a retrace
+    odds    probability that a retrace takes the chain from the camera so far, divided by that of a first trace
+    number  a number in [0, 1) whose binary digits are the remaining choices of a retrace
     """
 
     phase: UInt
@@ -41,7 +41,7 @@ class Retrace:
 
     @staticmethod
     def none(mi: ModuleType) -> Retrace:
-        """The state of a sample that begins."""
+        """The initial state of a sample."""
         return Retrace(mi.UInt32(FIRST), mi.Float(1), mi.Float(0))
 
     @property
@@ -49,12 +49,12 @@ class Retrace:
         return self.phase == RETRACING
 
     def weight(self) -> Float:
-        """Weight of the light at the end of the chain from the camera."""
+        """MIS weight of the light at the end of the chain from the camera."""
         by_retrace = dr.select(self.odds == 1, 0, dr.rcp(1 + dr.rcp(dr.square(self.odds))))  # 1: no vertex had a choice
         return dr.select(self.retracing, by_retrace, 1 - by_retrace)
 
     def lobe(self, u: Float) -> Float:
-        """The number that selects a lobe, instead of `u` in a retrace."""
+        """The random number that selects a lobe: `u`, except in a retrace."""
         return dr.select(self.retracing, dr.select(self.number < 0.5, END, 1 - END), u)
 
     def after(self, bs: BSDFSample, delta: Mask, two_ways: Mask, here: Mask) -> tuple[Retrace, Float, Mask]:
@@ -78,12 +78,12 @@ class Retrace:
         return after, weight, ~self.retracing | (odds > 0)
 
     def begin(self, retraced: Mask, number: Float) -> Retrace:
-        """The state of a path that begins; on lanes `retraced`, of the retrace that was due."""
+        """The initial state of a path; on the lanes `retraced`, that of the retrace that was due."""
         return replace(self, phase=dr.select(retraced, type(self.phase)(RETRACING), self.phase), number=number)
 
 
 def reflects_and_transmits(mi: ModuleType, flags: UInt) -> Mask:
-    """Whether a surface reflects as a mirror, transmits straight or refracted, and has no other lobe."""
+    """Whether a surface has a mirror reflection, a straight or refracted transmission, and no other lobe."""
     kinds = mi.BSDFFlags
     through = mi.has_flag(flags, kinds.DeltaTransmission) ^ mi.has_flag(flags, kinds.Null)
     return mi.has_flag(flags, kinds.DeltaReflection) & through & ~mi.has_flag(flags, kinds.Smooth)
@@ -92,8 +92,8 @@ def reflects_and_transmits(mi: ModuleType, flags: UInt) -> Mask:
 def is_possible(mi: ModuleType, context: BSDFContext, smooth: list[Shape]) -> bool:
     """Whether the scene has surfaces with two delta lobes, each selected by one end of the lobe's random number.
 
-    Materials may be user-defined, so they are sampled to find out; those whose lobe changes more than once along the
-    number are not retraced.
+    Materials may be user-defined, so this is tested by sampling them; False if the lobe of any of them changes more
+    than once as the number increases.
     """
     plugins = {id(plugin): plugin for plugin in (shape.bsdf() for shape in smooth)}.values()
     asked = [plugin for plugin in plugins if reflects_and_transmits(mi, mi.UInt32(+plugin.flags()))[0]]
@@ -109,7 +109,7 @@ def is_possible(mi: ModuleType, context: BSDFContext, smooth: list[Shape]) -> bo
     for plugin in asked:
         bs, _ = plugin.sample(context, si, u, mi.Point2f(0.5))
         first = np.array(mi.Float(bs.wo.z * cosine)).reshape(shape) < 0
-        first = first == first[:, :1]  # those with the lobe of the smallest number, whose probability is
+        first = first == first[:, :1]  # where the lobe is that of the smallest number; `likely` is its probability
         likely = np.array(mi.Float(bs.pdf) + 0 * cosine).reshape(shape)[:, 0]
         changes = np.sum(first[:, 1:] != first[:, :-1], axis=1)
         if np.any(changes > 1) or not np.all(abs(first.mean(1) - likely) < 2 / STEPS):

@@ -5,8 +5,8 @@
     >>> render.image()              # (height, width, 4): light of the surfaces alone, and coverage
 
 The lights may be in a separate scene. Then every point of a surface is lit by all of them without occlusion: no shadow
-ray is traced, and no surface illuminates another. This is what a fragment shader computes, and it is physically correct
-if every surface is isolated and convex.
+rays are traced, and no surface illuminates another. This is what a fragment shader computes, and it is physically
+correct if every surface is isolated and convex.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Foreground(Render):
 
 
 class _SurfacesOnly(SceneData):
-    """A scene whose paths begin at surfaces only; the feature is 1 where there is one."""
+    """A scene whose paths begin at surfaces only; the feature is coverage, 1 where a surface was hit."""
 
     def begins_path(self, hit: Hit) -> Mask:
         return hit.is_valid()
@@ -64,7 +64,7 @@ class _SurfacesOnly(SceneData):
 
 
 class _LightsApart(_SurfacesOnly):
-    """The same under the unoccluded lights of another scene, `apart`."""
+    """A scene whose paths begin at surfaces only, under the unoccluded lights of another scene, `apart`."""
 
     def __init__(self, apart: Scene, *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
@@ -79,9 +79,9 @@ class _LightsApart(_SurfacesOnly):
 
 
 class _Transparent(Lights):
-    """Lights that do not occlude each other: a ray collects every lamp on its way, and the environment behind them.
+    """Lights that do not occlude each other: a ray collects every lamp along it, and the environment behind them.
 
-    Light sampling traces no shadow ray here, so lights that a BSDF sample finds must not be occluded either.
+    Light sampling traces no shadow rays here, so lights hit by a BSDF sample must not be occluded either.
     """
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:

@@ -1,13 +1,13 @@
-"""Derivatives of a picture with respect to parameter values of its materials.
+"""Derivatives of a picture with respect to parameter values of the scene's materials.
 
     render = Gradients(scene, settings, [Along(plugin, "alpha")])
     render.advance(64)
-    render.image(), render.slopes()         # (H, W, 3), and one such array per value
+    render.image(), render.slopes()         # (H, W, 3), and a list of one such array per value
 
 The paths are those of the integrator itself: their directions and densities stay fixed while a value changes (detached
-sampling), and the light that its materials scatter along them is differentiated (attached evaluation). This is unbiased
+sampling), and the light that the materials scatter along them is differentiated (attached evaluation). This is unbiased
 for every value that does not move the paths; see Vicini2021 for the theory. Derivatives are propagated forward along
-the path with its throughput, so one traversal gives the picture and all of them.
+the path with its throughput, so one traversal gives the picture and all derivatives.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Along:
     """The variable of a derivative: a value of a material, or a channel of a color.
 
     plugin   the material in the scene, one of Gonio's
-    path     name of the value in it: "alpha", "base.alpha"
-    channel  0 to 2; None: all channels together, and both alphas of a pair
+    path     name of the value in the material: "alpha", "base.alpha"
+    channel  0 to 2; None: all channels together, or both alphas of a pair
     """
 
     plugin: BSDFPlugin
@@ -91,7 +91,7 @@ class Gradients(Render):
         return _ForwardDerivatives(walked, self.along)
 
     def slopes(self) -> list[NDArray[np.float32]]:
-        """The picture's derivative with respect to each value, (height, width, 3)."""
+        """The picture's derivative with respect to each value: arrays of shape (height, width, 3)."""
         return [self._mean(self._sums.features[3 * i : 3 * i + 3]) for i in range(len(self.along))]
 
 
@@ -213,7 +213,7 @@ class _AttachedScattering(Scattering):
     def _attach(
         self, vertex: Vertex, toward: Vector, value: Radiance, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[Radiance, Radiance]:
-        """The same value toward a light and weight of a sample, with the derivatives of the materials attached."""
+        """The given value toward a light and weight of a sample, with the derivatives of the materials attached."""
         mi, si = self.mi, vertex.si
         outer = 1.0 + si.duv_dx.x if self.media.known else None
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
@@ -229,7 +229,7 @@ class _AttachedScattering(Scattering):
 
     @contextmanager
     def _differentiated(self) -> Iterator[None]:
-        """Inside, the materials use the differentiated values and recompute the quantities derived from them."""
+        """Inside the block, materials use the differentiated values and recompute the quantities derived from them."""
         before = [(slot, slot.values) for slot in self.slots]
         derived = [(placed, placed.derived) for plugin in self.plugins for placed in _with_inner(plugin.placed)]
         try:

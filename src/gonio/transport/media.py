@@ -1,11 +1,12 @@
-"""Media between surfaces: absorption, and which of several overlapping media counts.
+"""Media between surfaces: absorption, and which of several overlapping media applies.
 
-Following Schmidt2002, every medium has a priority, and where several overlap the highest one counts: water that extends
-slightly into the glass around it has no surface there. Only a surface that separates different highest media is a real
-one; at any other, light passes straight through. At equal priority, the material that the scene names first is higher.
+Following Schmidt2002, every medium has a priority, and where several overlap, the highest one applies: water that
+extends slightly into the glass around it has no surface there. A surface is real only if the highest media on its two
+sides differ; light passes straight through any other. At equal priority, the material that the scene names first is
+higher.
 
-A path stores how many times it is inside each medium: four bits each in one number, in the order of priorities, so that
-the highest medium is that of the number's highest bit.
+A path stores how many times it is inside each medium: four bits per medium in one number, in the order of priorities,
+so that the highest medium is that of the number's highest bit.
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, Surf
 from ..errors import InputError
 from ..material.bsdf import Interior
 
-MAX_MEDIA = 8  # four bits each in 32
+MAX_MEDIA = 8  # with four bits each in a 32-bit number
 CROSSINGS = 256  # largest number of surfaces between the camera and the outside of the scene
 
 
 class Crossing(NamedTuple):
     """A surface that a path hits, in terms of media.
 
-    here     the path's media before the surface, and beyond it
-    beyond
+    here     the path's media before the surface
+    beyond   the path's media beyond the surface
     surface  whether it is a real surface; otherwise light passes straight through
-    outer    index of the medium adjacent to the surface's own
+    outer    index of refraction of the medium adjacent to the surface's own
     """
 
     here: UInt
@@ -63,7 +64,7 @@ class Media:
         dr.make_opaque(self.place)
 
     def containing(self, point: Point) -> UInt:
-        """The media that contain a point: a ray from there leaves them without having entered them."""
+        """The media that contain a point: those that a ray from there leaves without having entered them."""
         mi, depth, inside = self.mi, [0] * MAX_MEDIA, [0] * MAX_MEDIA
         offsets = Offsets(mi, self.scene)
         ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
@@ -80,20 +81,20 @@ class Media:
         return dr.opaque(mi.UInt32, packed)
 
     def crossing(self, si: SurfaceInteraction, bsdf: BSDFPlugin, inside: UInt, active: Mask) -> Crossing:
-        """The media on both sides of a surface that is hit from inside of these media."""
+        """The media on the two sides of a surface that is hit from within the media `inside`."""
         mi = self.mi
         number = self._number(bsdf, active)
         medium = active & (number < MAX_MEDIA)
         one = mi.UInt32(1) << (4 * dr.minimum(number, MAX_MEDIA - 1))
         entering = si.wi.z > 0.0
-        counted = (inside & (15 * one)) != 0  # else the path began inside, or the surface is not closed
+        counted = (inside & (15 * one)) != 0  # False if the path began inside, or if the surface is not closed
         others = dr.select(entering | ~counted, inside, inside - one)
         beyond = dr.select(medium, dr.select(entering, inside + one, others), inside)
-        surface = ~medium | (others < one)  # all others are lower
+        surface = ~medium | (others < one)  # all others have lower priority
         return Crossing(inside, beyond, surface, self.eta(others, si))
 
     def eta(self, inside: UInt, si: SurfaceInteraction) -> Float:
-        """The index of the highest of these media; 1 outside of all media."""
+        """Index of refraction of the highest of these media; 1 outside all media."""
         value = self.mi.Float(1.0)
         for here, interior in self._each(inside, si):
             value = dr.select(here, interior.eta, value)
@@ -107,7 +108,7 @@ class Media:
         return value
 
     def transmitted(self, inside: UInt, si: SurfaceInteraction, length: Float) -> Radiance:
-        """Transmittance over a length of the highest of these media: exp(-absorption length) (Beer and Lambert)."""
+        """Transmittance of the highest of these media over a length: exp(-absorption length) (Beer and Lambert)."""
         loss = self.absorption(inside, si)
         return self.mi.Spectrum(dr.select(loss > 0.0, dr.exp(-loss * length), 1.0))
 
@@ -126,7 +127,7 @@ class Media:
 
 
 def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
-    """Gonio's plugins with an interior, each once, in the order of the scene."""
+    """Gonio's plugins that have an interior, each once, in the order of the scene."""
     visited: set[int] = set()
     for shape in scene.shapes():
         bsdf = shape.bsdf()

@@ -15,16 +15,16 @@ from ..bridge.types import Plugin, Scene
 from ..errors import InputError
 from .passes import power_of_two
 
-# Samples in flight of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.
+# Samples per pass of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.
 WAVEFRONT = 1 << 21
 
 
 class MitsubaRender:
-    """A Mitsuba scene rendered by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
+    """A Mitsuba scene rendered by one of Mitsuba's integrators, in passes of `pass_size` samples, one seed each.
 
-    The picture depends on the seed and the film, not on timing, except for the last bits: Mitsuba's film adds up with
-    atomics, in arbitrary order. A sampler that needs a square number of samples (stratified, multijitter) rounds each
-    pass up; `done` counts the samples actually taken.
+    The picture depends on the seed and the film, not on timing, except for the last bits: Mitsuba's film is accumulated
+    with atomics, in arbitrary order. A sampler that needs a square number of samples (stratified, multijitter) rounds
+    each pass up; `done` counts the samples actually taken.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class MitsubaRender:
         if self._sum is not None and self._sum.shape != weighted.shape:
             what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
             raise InputError(what, "checkpoint", "render again without it")
-        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
+        self._sum = weighted if self._sum is None else self._sum + weighted  # a new array: `state` returns the old one
         self._passes += 1
         self.done += samples
 
@@ -65,8 +65,8 @@ class MitsubaRender:
         return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError or KeyError for another
-        film."""
+        """Resume with the next pass; only the last bits of the picture may differ. Raises ValueError or KeyError for
+        sums of another film."""
         width, height = self._sensor.film().crop_size()
         total, passes = state["sum"], state["passes"]
         fits = total.ndim == 3 and total.shape[:2] == (int(height), int(width)) and total.shape[2] > 0

@@ -1,9 +1,9 @@
-"""The flight of particles from the lamps: the steps that `light` and `caustics` share.
+"""Tracing of particles from the lamps: the steps that `light` and `caustics` share.
 
     leave -> [ intersect -> sample_bsdf, eval_bsdf -> follow ]
 
-A particle arrives at a surface with a flux and is scattered by the adjoint BSDF: radiance's factor (eta_o / eta_i)^2 is
-omitted, and where shading and geometric normals differ the flux is corrected (Veach1997, sec. 5.3).
+A particle arrives at a surface with a flux and is scattered by the adjoint BSDF: the factor (eta_o / eta_i)^2 for
+radiance is omitted, and where shading and geometric normals differ, the flux is corrected (Veach1997, sec. 5.3).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .lights.sources import Particle, Sources, Targets
 from .scattering import Vertex, keep_hero
 from .scene_data import SceneData
 
-# Dimensions of a particle at the lamp and at each vertex.
+# Sample dimensions of a particle at the lamp and at each vertex.
 PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
 DIRECTION, LOBE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
 
@@ -46,23 +46,23 @@ class Flight:
     ray: Ray
     hit: Hit
     flux: Radiance  # at the lamp
-    throughput: Radiance  # fraction of it that remains
-    eta: Float  # product of the relative indices: the current index over that at the start
+    throughput: Radiance  # fraction of the flux that remains
+    eta: Float  # product of the relative indices: the current index divided by that at the start
     hero_only: UInt
     inside: UInt
     active: Mask
 
     @property
     def dimension(self) -> UInt:
-        """Dimension of the first random number of its next vertex."""
+        """Dimension of the first random number at the next vertex."""
         return self.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
 
 
 class Particles:
-    """The particles of a picture. Number n = (low, high) is the same wherever it is traced: all form one sequence.
+    """The particles of a picture. They form one sequence: particle n = (low, high) is the same wherever it is traced.
 
-    max_depth  the longest path in segments, as kernel data
-    targets    where they are aimed; None: everywhere
+    max_depth  maximum path length in segments, as kernel data
+    targets    what particles are aimed at; None: they leave in all directions
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, targets: Targets | None = None) -> None:
@@ -88,8 +88,8 @@ class Particles:
     def leave(self, key: UInt, low: UInt, wavelength: Float | None = None) -> tuple[Particle, Flight]:
         """Particle `low` as it leaves its lamp, and its flight to the first surface that it hits.
 
-        wavelength  a number in [0, 1) that chooses its wavelengths, which its flux refers to; None: it samples its own,
-                    and its flux is weighted by their density
+        wavelength  a number in [0, 1) that selects the wavelengths at which the flux is given; None: the particle
+                    samples its own, and its flux is weighted by their density
         """
         mi, data = self.mi, self.data
         pick, color = data.pair(key, low, PICK)
@@ -119,7 +119,7 @@ class Particles:
         return particle, flight
 
     def intersect(self, flight: Flight) -> Vertex:
-        """The surface that a particle hits; media on the way attenuate its throughput. It traces no ray."""
+        """The surface that a particle hits; media along the ray attenuate its throughput. Traces no ray."""
         data, active = self.data, flight.active
         vertex, throughput = data.vertex(flight.hit, flight.ray, flight.inside, flight.throughput, active)
         flight.throughput = throughput
@@ -148,7 +148,7 @@ class Particles:
         si, bsdf = vertex.si, vertex.bsdf
         if not self.bent:
             return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
-        # Evaluated in reverse as radiance: radiance is scaled by glass, importance is not.
+        # Evaluated in reverse, as radiance: glass scales radiance but not importance.
         reverse = self.mi.SurfaceInteraction3f(si)
         reverse.wi = toward
         into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
@@ -182,9 +182,9 @@ class Particles:
 
 
 def adjoint(si: SurfaceInteraction, wo: Vector, normal: Vector | None = None) -> Float:
-    """Factor of a particle's flux where the shading normal s differs from the geometric g: |wi.s wo.g / (wi.g wo.s)|.
+    """Factor of a particle's flux where shading normal s and geometric normal g differ: |wi.s wo.g / (wi.g wo.s)|.
 
-    normal  s, if it is not that of the surface
+    normal  s, if it is not the surface's shading normal
     """
     into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))
     shading = si.sh_frame.n if normal is None else normal

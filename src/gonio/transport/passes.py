@@ -2,7 +2,7 @@
 
 The size of the passes depends on timing, but the picture does not: `integrators.Render` numbers its samples and sums
 them in order. A Mitsuba scene with its own integrator has no such numbering, so its passes have a fixed size that
-depends on the film only; there the passes also bound memory as samples grow.
+depends on the film only; it also bounds the memory, which there grows with the samples of a pass.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-PASS_SECONDS = 0.5  # long compared with a pass's start-up (some 10 ms), short enough for Ctrl-C
+PASS_SECONDS = 0.5  # long compared with a pass's overhead (about 10 ms), short enough to react to Ctrl-C
 
 FIRST_PASS = 1 << 18  # samples: about 50 ms, for a first picture soon after compilation
 
-# Signals that end a render: Ctrl-C, those of batch systems, and that of a closing terminal; Windows lacks some.
+# Signals that end a render: that of Ctrl-C, those of batch systems, that of a closing terminal; Windows lacks some.
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -67,13 +67,13 @@ def run(
     interrupted: Callable[[], object] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Advance `render` to `spp` samples per pixel; returns why it ended: "" (done), "interrupt" or "timeout".
+    """Advance `render` to `spp` samples per pixel; return why it ended: "" (done), "interrupt" or "timeout".
 
     At least one pass is made if samples are missing, so that there is always a picture. Interrupts and the time limit
     are checked between passes; near the time limit the passes shrink to fit.
 
-    spp    if a function, called after each pass: no pass goes beyond its latest value
-    first  samples per pixel of the first pass, if the rate is known; 0 begins with a short one
+    spp    a number, or a function that is called after each pass; no pass goes beyond its latest value
+    first  samples per pixel of the first pass, if the rate is known; with 0, the first pass is short
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # passes of a Mitsuba scene have a fixed size
@@ -110,7 +110,7 @@ def run(
 
 
 def _next_count(count: int, elapsed: float, compiled: bool) -> int:
-    """Samples per pixel of a pass of about PASS_SECONDS, at most 8 times as many as in the last one."""
+    """Samples per pixel for a pass of about PASS_SECONDS, at most 8 times as many as in the last one."""
     if not compiled and elapsed > PASS_SECONDS:  # probably the compilation
         return count
     return max(1, round(count * min(PASS_SECONDS / elapsed, 8)))
@@ -147,7 +147,7 @@ class Interrupts:
         return self
 
     def check(self) -> None:
-        """End by the signal that arrived, if any: for work that has nothing to save yet."""
+        """End the process by the signal that has arrived, if any; for work that has nothing to save yet."""
         if self.asked:
             self.__exit__()
             signal.raise_signal(self.asked)

@@ -2,7 +2,7 @@
 
 A particle leaves a lamp toward smooth surfaces, passes mirrors and glass, and is stored at the first surface that is
 neither; from there it continues once, through mirrors and glass to a second such surface. SAMPLES_PER_MAP samples of
-every pixel share a map; the radius within which a particle counts shrinks from map to map.
+every pixel share a map; the radius within which a particle contributes shrinks from map to map.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from .photons import Photon, PhotonDensity, PhotonMap
 from .scene_data import SceneData
 
 SAMPLES_PER_MAP = 4
-PER_PIXEL = 2.0  # particles of a map per pixel,
+PER_PIXEL = 2.0  # particles of a map per pixel, within the limits below
 MIN_PARTICLES, MAX_PARTICLES = 1 << 14, 1 << 19
-FOOTPRINT = 1.0  # first radius of a search, over the median width of a pixel on the visible surfaces
-SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
+FOOTPRINT = 1.0  # radius of a search in the first map, in median widths of a pixel on the visible surfaces
+SHRINKING = -1 / 6  # exponent of the number of maps in the radius (Knaus2011, with alpha = 2/3)
 DENSITY_CELL = 4.0  # width, in radii, of the cubes in which particles are counted
 WAVELENGTHS = 4  # per sample in spectral variants
 WAVELENGTH_KEY = 0x48554553  # key of the sequence of the maps' wavelengths
-PROBED = 48  # rays per axis, to measure the width of a pixel
+PROBED = 48  # rays per axis for measuring the width of a pixel
 
 
 @dataclass
 class _Trail:
-    """Particles from a lamp by mirrors to a surface, and from there by mirrors to a second one."""
+    """Particles from a lamp through mirrors to a surface, and from there through mirrors to a second one."""
 
     flight: Flight
-    density: Float  # over étendue, at the start of the current chain of mirrors
+    density: Float  # with respect to étendue, at the start of the current chain of mirrors
     mirrored: Mask  # whether such a chain has begun
     landed: Mask
     first: Photon
@@ -44,12 +44,12 @@ class _Trail:
 
 
 class PhotonMaps:
-    """The maps of a render, of which one exists at a time.
+    """The maps of a render; only one exists at a time.
 
     current  the map of the current samples
     density  approximate number of arriving particles per area; computed from the first map and used for all
 
-    radius_factor  factor of the first radius, relative to the default
+    radius_factor  factor applied to the default first radius
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, radius_factor: float) -> None:
@@ -80,27 +80,27 @@ class PhotonMaps:
         return self._current[1]
 
     def path_weight(self, lobe: Float, density: Float) -> Float:
-        """Weight of a path that finds the lamp behind mirrors, against the particles (power heuristic).
+        """MIS weight of a path that hits the lamp behind mirrors, against the particles (power heuristic).
 
-        lobe     density of its last direction before the mirrors, over the cosine
-        density  of the particles over étendue at the lamp, in the medium where the path began
+        lobe     density of its last direction before the mirrors, divided by the cosine
+        density  density of the particles with respect to étendue, at the lamp, in the medium where the path began
         """
         particles = density * (self.total * dr.pi * dr.square(self.current.radius))
         ratio = particles / lobe
         return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
 
     def etendue_density(self, place: Point) -> Float:
-        """Approximate density over étendue of particles that arrive at a rough surface."""
+        """Approximate density of the particles that arrive at a rough surface, with respect to étendue."""
         return self.density.at(place) * dr.inv_pi
 
     # ------------------------------------------------------------------ wavelengths
 
     def wavelength(self, number: UInt, turn: UInt) -> Float:
-        """The number in [0, 1) that chooses the wavelengths of a map's particles, and of the paths that read the map;
-        `turn` selects the first of them.
+        """The number in [0, 1) that selects the wavelengths of a map's particles and of the paths that read the map;
+        `turn` determines which of them is first.
 
         The wavelengths are one number and its shifts by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio
-        distribute the number evenly over a quarter, and multiples of the square root of 2 select the first one.
+        distribute the number evenly over a quarter, and multiples of the square root of 2 select the first wavelength.
         """
         key = sampler.pixel_key(self.mi.UInt32(WAVELENGTH_KEY), self.particles.seed)
         place, first = (
@@ -110,7 +110,7 @@ class PhotonMaps:
         return (place + self.mi.Float((self.mi.UInt32(WAVELENGTHS * first) + turn) % WAVELENGTHS)) / WAVELENGTHS
 
     def rotated(self, flux: Radiance, by: UInt) -> Radiance:
-        """The flux per wavelength, reordered to begin with number `by`."""
+        """The flux per wavelength, rotated so that wavelength number `by` is first."""
         values = list(flux)
         for step in range(1, WAVELENGTHS if self.mi.is_spectral else 1):
             values = [
@@ -141,8 +141,8 @@ class PhotonMaps:
         lane = dr.arange(mi.UInt32, self.count)
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
-        # Where wavelengths separate, each of a map's continues alone for a part of the particles: contiguous in the
-        # sequence, so that each part is evenly distributed.
+        # Where wavelengths separate, each of the map's wavelengths continues alone for one part of the particles. A
+        # part is contiguous in the sequence, so that it is evenly distributed.
         turn = lane * WAVELENGTHS // dr.opaque(mi.UInt32, self.count)
         wavelength = self.wavelength(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
         particle, flight = particles.leave(key, low, wavelength)
@@ -159,7 +159,7 @@ class PhotonMaps:
         return trail
 
     def _vertex(self, trail: _Trail, key: UInt, low: UInt, turn: UInt) -> _Trail:
-        """One vertex of a particle: it is stored there, or continues."""
+        """One vertex of a particle, where it is stored or continues."""
         mi, particles, flight = self.mi, self.particles, trail.flight
         vertex = particles.intersect(flight)
         flags = vertex.bsdf.flags()

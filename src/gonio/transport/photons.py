@@ -1,4 +1,4 @@
-"""A photon map: particles stored where they have arrived, for the incident light at a point.
+"""A photon map: particles stored where they arrive, for estimating the incident light at a point.
 
 The map is a grid of cells as wide as a search (two radii), hashed so that a row of cells along x is contiguous in
 memory: all particles within the radius of a point are in four such rows. Particles are sorted by cell and by number, so
@@ -20,8 +20,8 @@ from ..bridge.types import Float, Mask, OfVariant, Point, Radiance, UInt, Vector
 from . import sampler
 
 ROW = 4096  # distinct cells along x; particles further out are assigned to the outermost
-LEVEL = 0.25  # largest distance of a particle from the plane of the place, over the radius
-FACING = 0.9  # smallest cosine between the normals: particles around an edge do not count
+LEVEL = 0.25  # largest distance of a particle from the tangent plane of the place, as a fraction of the radius
+FACING = 0.9  # smallest cosine between the normals: excludes particles around an edge
 VISITED = 16  # approximate number of particles visited per row
 CUBES = 1 << 16  # entries of a PhotonDensity
 FIELDS = 16  # numbers per particle, see `Photon.packed`
@@ -31,12 +31,12 @@ FIELDS = 16  # numbers per particle, see `Photon.packed`
 class Photon:
     """A stored particle.
 
-    position, normal  its position, and the geometric normal of the surface there, on whichever side it has arrived
-    direction         direction of origin, a unit vector away from the surface
+    position, normal  its position, and the geometric normal of the surface there, whichever side it arrived on
+    direction         unit vector toward where it came from, away from the surface
     flux              its flux
-    density           density over étendue at its lamp, `sources.Particle.density`, over the square of the index there
+    density           `sources.Particle.density` at its lamp, divided by the square of the index there
     depth             segments of its path
-    second            whether it has arrived from another surface, not directly from a lamp's chain of mirrors
+    second            whether this is its second surface, reached from a first one
     """
 
     position: Point
@@ -79,9 +79,9 @@ class Photon:
 class Search:
     """A point whose surroundings on its surface are searched for particles.
 
-    Particles on surfaces that face the same way count on whichever side they have arrived, since a rough surface may
-    transmit light; on surfaces that face the other way, as parts of one mesh may, if they have arrived on the side of
-    `back`.
+    On surfaces that face the same way, particles are accepted whichever side they arrived on, since a rough surface may
+    transmit light; on surfaces that face the other way, as parts of one mesh may, only those that arrived on the side
+    of `back`.
 
     back  direction toward the viewer
     u     a random number in [0, 1), see `PhotonMap.gather`
@@ -103,7 +103,7 @@ class Search:
 
 
 class PhotonMap:
-    """Particles, indexed by place. `radius` is kernel data like the particles: a new value compiles nothing."""
+    """Particles, indexed by position. `radius` is kernel data like the particles, so a new value recompiles nothing."""
 
     def __init__(self, mi: ModuleType, photons: Sequence[Photon], landed: Sequence[Mask], radius: float):
         self.mi = mi
@@ -121,7 +121,7 @@ class PhotonMap:
         column = np.concatenate([np.array(one) for one in columns])
         stored = np.flatnonzero(column < ROW)
         self.count = len(stored)
-        # At least twice as many rows as particles: more take longer to make and to read, fewer collide more often.
+        # At least twice as many rows as particles: more take longer to build and to read, fewer collide more often.
         bits = max(self.count.bit_length() + 1, 10)
         row = np.concatenate([np.array(one) for one in rows])[stored] & np.uint32((1 << bits) - 1)
         key = row + column[stored]
@@ -159,12 +159,12 @@ class PhotonMap:
         active: Mask,
         within: float = 0.0,
     ) -> tuple[Radiance, Radiance]:
-        """Sum over the particles of a search: `visit(particle, weight by distance in 1/m^2, mask)`; and its excess over
-        the sum over those `within` that fraction of the radius, if this is not 0.
+        """(sum of `visit(particle, weight by distance in 1/m^2, mask)` over the particles of a search, excess of this
+        sum over that of a search with the fraction `within` of the radius; 0 if `within` is 0).
 
-        The weight is a paraboloid over the disk of the radius, with integral 1. Where particles are dense, only every
-        second, third, ... one of a row is visited, from one on that the search's random number chooses, and weighted
-        for the others.
+        The weight is a paraboloid on the disk of the radius, with integral 1. Where particles are dense, only every
+        second, third, ... particle of a row is visited, beginning with one that the search's random number selects, and
+        its weight is multiplied accordingly.
         """
         mi, radius2 = self.mi, dr.square(self.radius)
         rows = self._rows(search)
@@ -175,7 +175,7 @@ class PhotonMap:
             photon = Photon.unpacked(mi, dr.gather(mi.Matrix4f, self.values, at, here), zero)
             position = photon.position
             here &= search.accepts(photon, self.radius)
-            # rows of other cells may share their memory
+            # rows of other cells may have the same hash
             here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
             here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
             distance2 = dr.squared_norm(position - search.place)
@@ -200,8 +200,8 @@ class PhotonMap:
         return result[-2], result[-1]
 
     def _rows(self, search: Search) -> Callable[[UInt, Mask], tuple[UInt, UInt, UInt, UInt, UInt]]:
-        """A function of a row's number, 0 to 3, that returns (cell in y, in z, first and last particle, stride); rows
-        are empty if the search covers fewer than four."""
+        """A function of a row's number, 0 to 3, that returns (cell in y, cell in z, first particle, end of the row,
+        stride). If the search covers fewer than four rows, the others are empty."""
         mi = self.mi
         low = [mi.Int32(dr.floor((x - self.radius) * self.per_cell)) for x in search.place]
         high = [mi.Int32(dr.floor((x + self.radius) * self.per_cell)) for x in search.place]
@@ -221,18 +221,18 @@ class PhotonMap:
 
 
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
-    """The stable order of keys.
+    """The indices that sort keys stably.
 
-    Sorted by 16 bits at a time, which NumPy does by counting: 32 bits take twice as long.
+    Sorts by 16 bits at a time, which NumPy does by counting: sorting by 32 bits takes twice as long.
     """
     order = np.argsort(key.astype(np.uint16), kind="stable")
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]
 
 
 class PhotonDensity:
-    """The approximate number of arriving particles per area: a number per cube of space, computed once from one map.
+    """The approximate number of arriving particles per area: one number per cube of space, computed once from one map.
 
-    It only determines weights, for which any number is correct if all estimators use the same one.
+    It only determines weights, which are correct for any number as long as all estimators use the same one.
     """
 
     def __init__(self, mi: ModuleType, photon: Photon, landed: Mask, width: float, traced: int):

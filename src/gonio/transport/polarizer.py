@@ -24,8 +24,8 @@ TRACED = ("path", "direct")  # the integrators that Mitsuba's path tracer can re
 class PolarizedRender(MitsubaRender):
     """A picture of the light that passes a linear polarizer.
 
-    It accumulates the Stokes vector of each pixel, with Q > 0 along the picture's horizontal and U > 0 halfway to its
-    vertical. A filter at angle theta transmits (I + Q cos 2 theta + U sin 2 theta) / 2 (Born1999).
+    It accumulates the Stokes vector of each pixel, with Q > 0 along the picture's horizontal and U > 0 at 45 degrees
+    toward its vertical. A filter at angle theta transmits (I + Q cos 2 theta + U sin 2 theta) / 2 (Born1999).
 
     degrees  the direction of transmitted polarization, counterclockwise from the picture's horizontal
     """

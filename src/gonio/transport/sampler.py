@@ -37,7 +37,7 @@ SAMPLERS: dict[str, str] = {
 
 
 def mix(a: UInt, b: UInt) -> UInt:
-    """Hash two 32-bit words into one (the `lowbias32` finalizer of C. Wellons: bias 0.17 bits of 32 after mixing).
+    """Hash two 32-bit words into one (the `lowbias32` finalizer of C. Wellons, whose bias is 0.17 by his measure).
 
     Multiplying `b` by the golden ratio first spreads small integers over all bits.
     """
@@ -56,10 +56,10 @@ def owen_hash(x: UInt, seed: UInt) -> UInt:
     """Owen scrambling of a *bit-reversed* word: bit i is flipped by a hash of the bits below it and the seed.
 
     The Laine-Karras construction: additions and multiplications by odd numbers carry only upwards, so that on
-    reversed words each digit depends on more significant digits alone, which is what nested uniform scrambling
-    asks for. Constants of N. Vegdahl, as in pbrt-v4's FastOwenScrambler.
+    reversed words each digit depends on more significant digits alone, as nested uniform scrambling requires. The
+    constants are N. Vegdahl's, as in pbrt-v4's FastOwenScrambler.
     """
-    x = x ^ (x * 0x3D20ADEA)  # never `^=`: which would modify the caller's Dr.Jit array
+    x = x ^ (x * 0x3D20ADEA)  # never `^=`, which would modify the caller's Dr.Jit array
     x = (x + seed) * ((seed >> 16) | 1)
     x = x ^ (x * 0x05526C56)
     return x ^ (x * 0x53A22864)
@@ -84,7 +84,7 @@ def unit(x: UInt) -> Float:
 
 
 def sobol_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """The Owen-scrambled Sobol point of `index`, its order shuffled for this key and dimension (Burley2020, sec. 3)."""
+    """Point `index` of an Owen-scrambled Sobol sequence, shuffled for this key and dimension (Burley2020, sec. 3)."""
     seed = mix(key, type(key)(dimension))
     shuffled = dr.brev(owen_hash(dr.brev(type(key)(index)), seed))
     x = owen_hash(shuffled, mix(seed, type(key)(0x51633E2D)))
@@ -93,13 +93,14 @@ def sobol_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
 
 
 def independent_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Two independent numbers: a counter hashed twice, as good as a stateful generator."""
+    """Two independent numbers: two hashes of a counter, of the same quality as a stateful generator."""
     word = mix(mix(key, type(key)(dimension)), type(key)(index))
     return unit(mix(word, type(key)(0x51633E2D))), unit(mix(word, type(key)(0x68BC21EB)))
 
 
-# y over x of a lattice: the first 32-bit word whose lattices of 2, 4, ... 2^20 points all have a shortest dual vector
-# of at least 0.66 of the hexagonal one's (searched bit by bit, with the best 400). 16 points have 0.74, 64 have 0.89.
+# Slope y / x of the lattice: the first 32-bit word for which the shortest dual vector of the lattices of 2, 4, ... 2^20
+# points is at least 0.66 times that of a hexagonal lattice (found bit by bit, keeping the 400 best candidates). The
+# ratio is 0.74 for 16 points and 0.89 for 64.
 SLOPE = 1030637
 
 

@@ -16,7 +16,7 @@ from .media import Crossing, Media
 class Vertex:
     """A point where a path has hit a surface.
 
-    crossing  the media on both sides of it, None in scenes without media
+    crossing  the media on the two sides of the surface; None in scenes without media
     """
 
     si: SurfaceInteraction
@@ -42,7 +42,7 @@ class Scattering:
         return vertex.bsdf.eval(self.context, vertex.si, toward, active)
 
     def sample(self, vertex: Vertex, lobe: Float, u: Point, active: Mask) -> tuple[BSDFSample, Radiance]:
-        """A direction, and its weight: the BSDF times the cosine over the density."""
+        """A sampled direction, and its weight: the BSDF times the cosine, divided by the density."""
         return vertex.bsdf.sample(self.context, vertex.si, lobe, u, active)
 
     def eval_pdf_sample(
@@ -54,7 +54,7 @@ class Scattering:
     def pass_through(
         self, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[BSDFSample, Radiance]:
-        """The sample; where the media say that there is no real surface, one that passes straight through."""
+        """The sample, replaced by one that passes straight through where the media do not form a real surface."""
         if vertex.crossing is None:
             return bs, weight
         mi, through = self.mi, active & ~vertex.crossing.surface
@@ -67,8 +67,8 @@ class Scattering:
 def keep_hero(mi: ModuleType, throughput: Radiance, hero_only: UInt, here: Mask) -> tuple[Radiance, UInt]:
     """Continue with the first wavelength only where the index depends on it, weighted for all of them.
 
-    The wavelengths of a sample are shifted copies of one number, so the first has the same distribution as each of them
-    and can represent all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero wavelength).
+    The wavelengths of a sample are shifted copies of one number, so the first has the same distribution as the others
+    and can represent all of them (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero wavelength).
     """
     count = dr.size_v(throughput)
     hero = mi.Spectrum(0)

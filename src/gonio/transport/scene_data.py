@@ -32,14 +32,15 @@ from .media import Media
 from .scattering import Scattering, Vertex
 from .surfaces import Surfaces
 
-# The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm): white of radiance 1 has Y = 1.
+# The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm); dividing by it gives white of radiance 1
+# a luminance of Y = 1.
 CIE_Y_INTEGRAL = 106.7502593994140625
 
 
 class SceneData:
     """The parts of a scene that integrators use; lights and media are prepared on first use.
 
-    pair, direction_pair  the sampler's points: two numbers in [0, 1) of (key, index, dimension), for positions on
+    pair, direction_pair  the sampler's points: two numbers in [0, 1) for (key, index, dimension), for positions on
                           pixels and lamps, and for directions
     camera      rays through pixels
     surfaces    the surfaces that rays hit
@@ -50,7 +51,7 @@ class SceneData:
 
     sampler_name      a name of `sampler.SAMPLERS`, or "default"
     ambient_color     scene-wide ambient radiance; None or 0 for none
-    mis_compensation  whether BSDFs are sampled too, which then sample the uniform part of an environment map
+    mis_compensation  whether BSDFs are sampled too, and then cover the uniform part of an environment map
     """
 
     def __init__(
@@ -84,13 +85,13 @@ class SceneData:
 
     @cached_property
     def ambient(self) -> Texture | None:
-        """The ambient light as a texture of radiance, None if no BSDF has an attribute "ambient" to reflect it."""
+        """The ambient light as a texture of radiance; None if no BSDF has an attribute "ambient" to reflect it."""
         color = self._ambient_color
         if color is None or not any(color):
             return None
         if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
             return None
-        # An rgb texture is a reflectance and clamped to 1; d65 times one is a light, also in spectral variants.
+        # An rgb texture is a reflectance, clamped to 1; d65 times such a texture is a light, also in spectral variants.
         scale = max(color)
         tint = {"type": "rgb", "value": [c / scale for c in color]}
         return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
@@ -125,7 +126,7 @@ class SceneData:
         return ray, weight, self.surfaces.nearest(ray, active)
 
     def begins_path(self, hit: Hit) -> Mask:
-        """Whether a camera ray that ends at `hit` begins a path: every one does, but in `foreground.py`."""
+        """Whether a camera ray that ends at `hit` begins a path; all do, except in `foreground.py`."""
         return self.mi.Bool(True)
 
     def vertex(self, hit: Hit, ray: Ray, inside: UInt, throughput: Radiance, active: Mask) -> tuple[Vertex, Radiance]:
@@ -136,19 +137,20 @@ class SceneData:
             here = active & si.is_valid()
             throughput = dr.select(here, throughput * self.media.transmitted(inside, si, si.t), throughput)
             vertex.crossing = self.media.crossing(si, vertex.bsdf, inside, here)
-            # carries the index outside to `bridge.adapter.plugin`, which sees nothing else of the media
+            # passes the index outside to `bridge.adapter.plugin`, which has no other access to the media
             si.duv_dx = self.mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
         return vertex, throughput
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
-        """Lanes from whose surface a point that is on no surface is visible."""
+        """Whether `point`, which must not lie on a surface, is visible from `si`; False on inactive lanes."""
         return active & ~self.surfaces.blocked(shadow_ray_to(self.surfaces.offsets, si, point), active)
 
     def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
-        """Features of a sample's first vertex, averaged besides its color: albedo and normal if needed.
+        """Features of a sample's first vertex, averaged in addition to its color: albedo and normal if needed.
 
-        throughput   of the ray that the BSDF has sampled there
-        alive        lanes with a path; `active`: those whose path has hit a surface there
+        throughput  throughput of the ray that the BSDF has sampled there
+        alive       lanes with a path
+        active      lanes whose path has hit a surface there
         """
         if not self.aovs:
             return []

@@ -1,4 +1,4 @@
-"""The camera of particles: connections from points of the scene to pixels, and the light that they add there."""
+"""The camera for particles: connections from points of the scene to pixels, and the light that they add there."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # Mitsuba's cameras that poin
 # A splat is counted in units of 2^-32 of the largest radiance of a lamp. No picture is brighter on average, so 2^30
 # samples fit into a 64-bit integer; random rounding makes the sum unbiased.
 BITS = 32
-PROBED = 4096  # points on the lamps, to estimate that radiance
-MAX_BITS = 58  # of one splat; a larger one is skipped and counted as invalid
+PROBED = 4096  # points on the lamps at which that radiance is estimated
+MAX_BITS = 58  # bits of one splat; a larger one is skipped and counted as invalid
 DITHER = 0xD1B54A32
-NEAREST = 1e-2  # fraction of the scene's size: distance to a point light at which its brightness is bounded
+NEAREST = 1e-2  # distance from a point light at which its brightness is bounded, as a fraction of the scene's size
 AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection from the lamp itself
 
 
@@ -34,7 +34,7 @@ class Splat(NamedTuple):
     uv     position on the film, pixels
     value  radiance
     si     the point that it comes from
-    eye    the point that must be visible from there; None for infinity, in the direction `away`
+    eye    the point that must be visible from `si`; None for a point at infinity, in the direction `away`
     """
 
     uv: Point
@@ -93,7 +93,7 @@ class SplatCamera:
         return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0
 
     def see_lamp(self, key: UInt, low: UInt, particle: Particle, sums: Sums) -> UInt:
-        """Splat the lamp itself, from the point where a particle leaves it; returns the same as `splat`."""
+        """Splat the lamp itself, from the point where a particle leaves it; returns what `splat` returns."""
         mi = self.mi
         invalid = mi.UInt32(0)
         if SURFACE in self.particles.sources.known:
@@ -122,7 +122,7 @@ class SplatCamera:
         return camera_sample(self.sensor, si, lens, active)
 
     def splat(self, key: UInt, low: UInt, sums: Sums, light: Splat, active: Mask) -> UInt:
-        """Add light to its pixel; returns 1 where its value is not finite."""
+        """Add light to its pixel; returns 1 where its value is not finite or too large, else 0."""
         mi, si, eye = self.mi, light.si, light.eye
         x, y = mi.Int32(dr.floor(light.uv.x)), mi.Int32(dr.floor(light.uv.y))
         active = active & (x >= 0) & (y >= 0) & (x < mi.Int32(self.width)) & (y < mi.Int32(self.height))

@@ -20,7 +20,7 @@ class Sums:
     """Sums in 64 bits, one entry per lane: radiance (r, g, b, and other values of a complete sample), and features of
     the first hits.
 
-    splats  red, green and blue of particles, one entry per pixel, integers; empty for integrators without splats
+    splats  red, green and blue of particles as integers, one entry per pixel; empty for integrators without splats
 
     A value that is not finite (overflow in a BSDF) is skipped and counted, so that the rest of the pixel remains valid.
     """
@@ -32,7 +32,7 @@ class Sums:
 
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, radiance: int, features: int, pixels: int = 0) -> Sums:
-        """Zeros of so many numbers each; `pixels` of a picture with splats, else 0."""
+        """Zero sums of these sizes; `pixels` is 0 for pictures without splats."""
         totals, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
         sums = Sums(totals, more, dr.zeros(mi.UInt32, lanes), splats)
@@ -45,7 +45,7 @@ class Sums:
         return Sums(totals, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Each sum by its name; views on the CPU, but copies of splats, which are modified in place."""
+        """Each sum by its name: views on the CPU, except for splats, which are copied since they change in place."""
         totals = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
         totals |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
         totals |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
@@ -53,7 +53,7 @@ class Sums:
 
     @staticmethod
     def of_arrays(mi: ModuleType, arrays: Mapping[str, NDArray[Any]], lanes: int, like: Sums) -> Sums:
-        """Sums from `arrays`. Raises ValueError if their number or size does not match."""
+        """Sums from the result of `arrays`. Raises ValueError if their number or size does not match."""
         known = like.arrays()
         for name, values in known.items():
             entries = len(values) if name.startswith("splat") else lanes
@@ -77,7 +77,7 @@ class Sums:
         return Sums(totals, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
 
     def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], Mask]:
-        """(sums, lanes of values that are not finite); None for the latter if there are no sums."""
+        """(sums, lanes with values that are not finite); the latter is None if there are no sums."""
         if not sums:
             return sums, None
         finite = dr.isfinite(sum(values))

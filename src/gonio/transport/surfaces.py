@@ -31,9 +31,9 @@ class Surfaces:
     def nearest(self, ray: Ray, active: Mask = True) -> Hit:
         """The first surface that a ray hits.
 
-        Where a ray hits two surfaces at the same distance, `coherent=True` lets the other rays of a packet decide:
-        they are traced together, in an order that suits them all. Which paths begin together depends on where a pass
-        ends, so the picture would depend on timing. Rays that are traced one by one cost about as much.
+        Where a ray hits two surfaces at the same distance, the result with `coherent=True` depends on the other rays of
+        a packet, which are traced together in a common order. Which paths begin together depends on where a pass ends,
+        so the picture would depend on timing. Tracing rays one by one costs about as much.
         """
         if self.inline is not None:
             return self.inline.nearest(ray, active)

@@ -4,13 +4,13 @@ The samples form two halves, each a picture from a separate random sequence. The
 even the points within each half are: a quarter of their squared difference estimates the variance of their mean without
 bias. The estimate for one pixel is uncertain, but the mean over thousands gives the error of the picture.
 
-If noise is uneven, the first samples determine how many of the later ones each tile of 4 x 4 pixels gets. These shares
-then stay fixed, and the first samples are averaged with the rest by a weight that is the same for all pixels: a pixel
-whose number of samples depended on its own values would be biased.
+If noise is uneven, the first samples determine how many of the later ones each tile of 4 x 4 pixels gets. This
+distribution then stays fixed, and the first samples are averaged with the rest by a weight that is the same for all
+pixels: a pixel whose number of samples depended on its own values would be biased.
 
 The blur of an integrator (`caustics`) is an additional error, equal in both halves. Each half also measures the
-difference to a less blurred picture; the product of two such measurements estimates the square without bias, and the
-blur's error follows from it. If blur is too large a part of the error, rendering starts over with a smaller radius.
+difference from a less blurred picture; the product of two such measurements estimates its square without bias, and the
+blur's error follows from this. If blur is too large a part of the error, rendering starts over with a smaller radius.
 """
 
 from __future__ import annotations
@@ -30,23 +30,26 @@ from .integrators.progressive import SHARE, TILE, tiles
 Picture = NDArray[np.float32]
 Share = NDArray[np.uint32]
 
-FIRST = 16  # samples per pixel of both halves, before the first estimate of the error
+FIRST = 16  # samples per pixel of both halves together, before the first estimate of the error
 FLOOR = 0.01  # relMSE = mean((x - r)^2 / (r^2 + FLOOR mean(r)^2)): noise counts relative to the scene's brightness
-MARGIN = 0.5  # standard errors added to the estimate, since rendering stops at the luckiest of several estimates
-# The error falls with the number of samples to a power of 1 to 1.5: with the larger one, no estimate comes much too
+MARGIN = 0.5  # standard errors added to the estimate, since rendering stops at the first of several that is low enough
+# The error falls as the number of samples to the power -1 to -1.5; with the larger exponent, no estimate comes much too
 # late.
 POWER = 1.5
-MIN_STEP, MAX_STEP = 1.04, 2.5  # factors of samples from one estimate to the next
-LOW, HIGH = SHARE // 4, SHARE * 8  # limits of a tile's share, since the first samples miss rare light
-MAX_GAIN, MIN_SAVED = 0.8, 1 << 24  # shares must need at most that fraction of the samples, and save so many (seconds)
-# The square of a blur over that of its difference to a blur four times narrower: 1.14 for smooth light (blur grows with
-# the square of the radius), 1.31 for an edge within a pixel (power 3/2), 1.90 for an edge across pixels (power 1/2);
-# measured 0.8 to 1.3. The estimate of the true value below is too dark more often than not, so a lower one is used.
+MIN_STEP, MAX_STEP = 1.04, 2.5  # factors between the numbers of samples at consecutive estimates
+LOW, HIGH = SHARE // 4, SHARE * 8  # limits of a tile's number of samples, since the first samples miss rare light
+# Samples are distributed unevenly if this needs at most the first fraction of them, and saves at least the second
+# number (some seconds).
+MAX_GAIN, MIN_SAVED = 0.8, 1 << 24
+# Ratio of a squared blur to its squared difference from a blur a quarter as wide: 1.14 for smooth light (blur grows
+# with the square of the radius), 1.31 for an edge within a pixel (power 3/2), 1.90 for an edge across pixels (power
+# 1/2); measured 0.8 to 1.3. The true value estimated below is more often too dark than too bright, so a lower ratio is
+# used.
 BLUR = 1.1
-DARKEST = 0.4  # smallest true value of a blurred pixel, as a fraction of it
-BLUR_POWER = 1.5  # power of the radius by which the squared blur falls: the middle one
-MAX_BLUR, BLUR_AIM = 0.5, 0.25  # fractions of the requested error: above the first, start over, aiming at the second
-SURE = 3.0  # standard errors above that, before rendering starts over
+DARKEST = 0.4  # smallest true value assumed for a blurred pixel, as a fraction of the blurred value
+BLUR_POWER = 1.5  # assumed exponent of the radius in the squared blur
+MAX_BLUR, BLUR_AIM = 0.5, 0.25  # fractions of the requested error: above the first, start over and aim at the second
+SURE = 3.0  # standard errors by which blur must exceed MAX_BLUR before rendering starts over
 MIN_RADIUS = 1 / 64
 WINDOW = 3 * TILE  # pixels: a tile's noise is averaged half and half with that of this window
 
@@ -59,11 +62,11 @@ def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
 
 
 def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
-    """The relMSE of the mean of two pictures caused by blur. `blurs` are four estimates (two from `a`, two from `b`,
-    all with independent noise) of the difference to a less blurred picture.
+    """The part of the relMSE of the mean of two pictures that blur causes. `blurs` are four estimates (two from `a`,
+    two from `b`, all with independent noise) of the difference from a less blurred picture.
 
     Where light was blurred over a dark place, the true value is far below that of the pictures: it is estimated as the
-    picture minus the difference, using the two estimates that are not in the product, to keep noise out of the result.
+    picture minus the difference, using the two estimates that are not in the product, so that noise causes no bias.
     """
     mean, floor = _agreed(a, b)
     d = [blur.astype(np.float64) for blur in blurs]
@@ -82,8 +85,8 @@ def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
 def _agreed(a: Picture, b: Picture) -> tuple[NDArray[np.float64], float]:
     """An estimate of the true value of each pixel, and the floor of its square.
 
-    With the mean of both pictures, a single bright sample would reduce its own relative error. Therefore the mean is
-    limited to the value that the surrounding pixels or both pictures agree on.
+    With the mean of both pictures, a single bright sample would reduce its own relative error. The mean is therefore
+    limited to the value that the surrounding pixels, or both pictures, agree on.
     """
     from scipy import ndimage  # imported here, since not every render needs SciPy
 
@@ -105,7 +108,7 @@ class Estimate:
         return Estimate(float(np.mean(values)), float(np.std(values)) / math.sqrt(values.size))
 
     def with_another(self, other: Estimate) -> Estimate:
-        """The combination of both: their mean, weighted by inverse variance."""
+        """The mean with another estimate, weighted by inverse variance."""
         a, b = (1.0 / max(one.deviation**2, 1e-300) for one in (self, other))
         return Estimate((a * self.value + b * other.value) / (a + b), (a + b) ** -0.5)
 
@@ -114,8 +117,9 @@ class Estimate:
 class _Wide:
     """Two halves that were too blurred, shown as long as their successors are worse.
 
-    error  of their picture; `blur` is its part due to blur
-    width  their `Until._width`
+    error   error of their picture
+    blur    the part of `error` due to blur
+    width   their `Until._width`
     radius  their `Settings.radius`
     """
 
@@ -127,27 +131,27 @@ class _Wide:
 
 
 class Until:
-    """A render until its relMSE is estimated to be at most `error`: `passes.run` advances it to its `goal`.
+    """A render that ends once its relMSE is estimated to be at most `error`; `passes.run` advances it to its `goal`.
 
-    most  largest number of samples per pixel
+    most  maximum number of samples per pixel
     """
 
     def __init__(self, scene: Scene, settings: Settings, error: float, most: int, aovs: bool = False) -> None:
         self._scene, self._aovs = scene, aovs
         self._settings = replace(settings, measures=True) if settings.program.blurs else settings
         self.error, self._most = error, most
-        # seeds of the first samples, and of the later ones, which are shared out
+        # seeds of the first samples, and of the later ones, which may be distributed unevenly
         self._seeds = [int(seed) for seed in np.random.SeedSequence(settings.seed).generate_state(4)]
         self._shares = not (settings.program.splats or settings.program.blurs)
         self._goal = FIRST
         self._lost = 0  # samples of discarded pictures that were too blurred
-        self._narrowed = 0  # how many times that happened
+        self._narrowed = 0  # how many times pictures were discarded
         self._halves = self._begun(settings.radius)
         self._wide: _Wide | None = None  # the last discarded halves
-        self._before = 0  # samples that determined the shares
+        self._before = 0  # samples that determined the distribution of the others
         self._pilot: tuple[Picture, Picture] | None = None  # their pictures
         self._share: Share | None = None
-        self._gain = 1.0  # samples needed with shares, over those without, at the same error
+        self._gain = 1.0  # samples needed when distributed unevenly, divided by those needed evenly, at the same error
 
     def _pair(self, seeds: list[int], share: Share | None) -> tuple[Render, Render]:
         a, b = (Render(self._scene, replace(self._settings, seed=seed), aovs=self._aovs, share=share) for seed in seeds)
@@ -162,7 +166,7 @@ class Until:
 
     @property
     def goal(self) -> int:
-        """Samples per pixel at the next estimate of the error; once the error is small enough, those that are done."""
+        """Samples per pixel at the next estimate of the error; once the error is small enough, the number done."""
         if self.done == self._goal:
             noise, blur = self._errors()
             # The estimate is uncertain if few pixels contain most of the error.
@@ -172,7 +176,7 @@ class Until:
         return min(self._goal, self._most)
 
     def advance(self, count: int) -> None:
-        """Render so many samples, or those that one half still needs: the halves alternate."""
+        """Render `count` samples, or as many as one half still needs; the halves alternate."""
         each = _halved(min(self._goal, self._most) - self._lost - self._before)
         needed = [most - n for most, n in zip(each, self._counts, strict=True)]
         behind = 0 if needed[0] >= needed[1] else 1
@@ -219,7 +223,7 @@ class Until:
         return min(noise.value + blur.value, least)
 
     def _errors(self) -> tuple[Estimate, Estimate]:
-        """The errors by noise and by blur."""
+        """The errors due to noise and to blur."""
         a, b = self._pictures()
         noise = Estimate.mean(squares(a, b))
         if not self._settings.measures:
@@ -228,7 +232,7 @@ class Until:
         if not blurs:
             return noise, Estimate(0.0, 0.0)
         blur = blur_error(a, b, blurs)
-        if self._wide is not None:  # at a small radius the noise of the blur dominates; the earlier estimate helps
+        if self._wide is not None:  # at a small radius noise dominates the measured blur; the earlier estimate helps
             expected = self._wide.blur.value * (self._width() / self._wide.width) ** BLUR_POWER
             blur = blur.with_another(Estimate(expected, expected))
         return noise, Estimate(max(blur.value, 0.0), blur.deviation)
@@ -248,8 +252,8 @@ class Until:
     # ------------------------------------------------------------------ how far
 
     def _go_on(self, error: float, noise: Estimate, blur: Estimate) -> None:
-        """Set the next goal if the error is too large; after the first samples, share out the rest."""
-        # the factor of the radius when the noise will be small enough
+        """Set the next goal if the error is too large; after the first samples, distribute the rest."""
+        # the factor by which the radius will have shrunk once the noise is small enough
         later = max(noise.value / ((1.0 - BLUR_AIM) * self.error), 1.0)
         later **= self._settings.program.shrinking
         sure = (blur.value - SURE * blur.deviation) * later**BLUR_POWER
@@ -261,7 +265,7 @@ class Until:
             return
         if self._shares and self._share is None and self.done == FIRST:
             self._share_out(error)
-        # number of samples without shares that would be as good as those so far
+        # number of evenly distributed samples that would be equivalent to those so far
         worth = self._before + (self.done - self._before) / self._gain
         factor = min(max((error / self.error) ** (1.0 / POWER), MIN_STEP), MAX_STEP)
         more = (factor - 1.0) * worth * self._gain
@@ -283,7 +287,7 @@ class Until:
         self._wide, self._halves = wide, self._begun(radius)
 
     def _begun(self, radius: float) -> tuple[Render, Render]:
-        """Two halves with a radius, with separate seeds."""
+        """Two halves with the given radius and separate seeds."""
         self._settings = replace(self._settings, radius=radius)
         if self._narrowed == 0:
             return self._pair(self._seeds[:2], None)
@@ -305,7 +309,8 @@ class Until:
         return result | _sums("half", self._halves)
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on to the same bits. Raises ValueError, LookupError or ArithmeticError for sums of another film."""
+        """Resume with bit-identical results. Raises ValueError, LookupError or ArithmeticError for sums of another
+        film."""
         if "share" in state:
             pilot = state["pilot0"], state["pilot1"]
             shape = self._halves[0].height, self._halves[0].width, 3
@@ -341,24 +346,24 @@ def _halved(samples: int) -> tuple[int, int]:
 
 
 def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
-    """Distribute samples by each pixel's squared error: (share per lane, samples needed for the same error over those
-    of equal shares).
+    """Distribute samples by each pixel's squared error: (relative number of samples per lane, samples needed divided by
+    those of an even distribution with the same error).
 
-    The error is least for shares proportional to the root of the noise (Neyman's allocation); tiles, as in `Render`,
-    keep coherent rays together.
+    The error is smallest if the numbers are proportional to the square root of the noise (Neyman's allocation); tiles,
+    as in `Render`, keep coherent rays together.
     """
     from scipy import ndimage
 
     height, width = noise.shape
     order = tiles(width, height)
-    smooth = 0.5 * (noise + np.maximum(ndimage.uniform_filter(noise, WINDOW), 0.0))  # rounding may give values below 0
+    smooth = 0.5 * (noise + np.maximum(ndimage.uniform_filter(noise, WINDOW), 0.0))  # rounding errors may be negative
     lane = smooth.ravel()[order]
     starts = np.arange(0, len(lane), TILE * TILE)
     sizes = np.diff([*starts, len(lane)])
     variance = np.add.reduceat(lane, starts) / sizes
     wanted = np.sqrt(variance)
     scale = 1.0
-    for _ in range(20):  # until the mean share is right despite the clipping
+    for _ in range(20):  # until the mean is SHARE despite the clipping
         result = np.clip(np.rint(scale * SHARE * wanted / max(float(np.mean(wanted)), 1e-300)), LOW, HIGH)
         scale *= SHARE / float(np.average(result, weights=sizes))
     total = float(np.average(variance, weights=sizes))

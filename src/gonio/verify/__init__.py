@@ -1,10 +1,10 @@
-"""The laws: test any BSDF, Gonio's, Mitsuba's or your own.
+"""The laws: tests for any BSDF, whether Gonio's, Mitsuba's or your own.
 
     gonio verify conductor --param alpha=0.3
     go.verify(go.Conductor(alpha=0.3)).passed
 
-There is one file per law in `laws`, or in a package of your own. This package knows the BSDF protocol, but no material.
-Names load on first use: `gonio verify` starts the process that judges before it loads anything itself.
+Each law has its own file, in `laws` or in a package of your own. This package depends on the BSDF protocol, but on no
+material. Names are imported on first use: `gonio verify` starts its worker process before it imports anything itself.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The parameter values at which a BSDF is judged, besides the given ones: corners, edges and random points of the
-declared ranges, and the values behind every discontinuity in a scan along one parameter. A material that is right at
-its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of two parameters.
+"""The parameter values at which a BSDF is tested in addition to the given ones: corners, edges and random points of the
+declared ranges, and the values just past every discontinuity in a scan along one parameter. A material that is correct
+at its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of two parameters.
 
     for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
 
@@ -26,9 +26,9 @@ from .subject import Fault, Subject
 
 SCAN = 64  # values along one parameter
 RAYS = 96  # pairs of directions per value
-JUMP = 6.0  # least ratio of a jump to the neighboring steps
+JUMP = 6.0  # smallest ratio of a jump to the neighboring steps
 MIN_JUMP = 0.004  # smallest jump, relative to the value: smaller ones are invisible
-UNIFORM_PLACES = 1  # places of a material whose values must not vary from ray to ray
+UNIFORM_PLACES = 1  # places for a material whose values must be the same for all rays
 PLACES_PER_CHOICE = 9
 LEAST_CHOICES = 2
 
@@ -37,10 +37,10 @@ LEAST_CHOICES = 2
 class Place:
     """A point in the ranges of the parameters.
 
-    values   those that differ from the given material, by path
+    values   the parameter values that differ from those of the given material, by path
     why      "given", "choice", "color", "corner", "edge", "interior", "jump" or "pair"
     subject  the BSDF there
-    along    the parameters that vary; those of the subject itself for the given point
+    along    the parameters that vary; if empty, all axes of `subject`
     """
 
     values: dict[str, Any]
@@ -53,7 +53,7 @@ class Place:
         moved = {}
         for number, axis in enumerate(self.along or axes(self.subject)):
             value = tree.value_at(self.subject.model, axis.path)
-            # not all by the same amount: at eta = k the formula of a conductor has a kink
+            # different margins: at eta = k the formula of a conductor has a kink
             margin = MARGIN * (1.0 + 0.1 * number) * (axis.high - axis.low)
             if axis.path in self.values:
                 moved[axis.path] = _plain(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
@@ -64,7 +64,7 @@ class Place:
         values = {path: moved.get(path, value) for path, value in self.values.items()}
         try:
             return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
-        except InputError:  # at the end of its range one parameter restricts another
+        except InputError:  # at the end of its range, a parameter may restrict another
             return self
 
     @property
@@ -74,7 +74,7 @@ class Place:
 
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
-    """The points besides the given one, without repetition, in order of importance."""
+    """The places other than the given one, without duplicates, in order of importance."""
     along, others = axes(subject), _choices(subject)
     if not (along or others) or effort.places <= 0:
         return []
@@ -112,15 +112,15 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     return made
 
 
-# of three channels, as shares of a range: all different, one alone, one at the low end
+# positions of the three channels in their range: all different, one low, or one high
 COLORS = ((0.95, 0.1, 0.5), (0.0, 0.9, 0.9), (0.9, 0.0, 0.0), (0.5, 0.95, 0.1), (0.0, 0.9, 0.0), (0.9, 0.0, 0.9))
-NARROW = 0.1  # share of a range of widths
-WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # of the two axes, as shares of a range
+NARROW = 0.1  # position of a narrow width in its range
+WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # positions of the widths along the two axes in their range
 
 
 def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Saturated values of all colors together, the channels of each in another order; every second one with narrow
-    lobes, which lose so little by shadowing that a Fresnel term above 1 is seen."""
+    """Saturated values for all colors at once, with the channels of each color permuted differently; every second one
+    with narrow lobes, whose shadowing loss is too small to hide a Fresnel term above 1."""
     colors = [axis for axis in along if axis.kind == "color"]
     narrow = {axis.path: _plain(axis.at(NARROW)) for axis in along if axis.kind == "alpha"}
     return [
@@ -132,13 +132,13 @@ def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
 
 
 def _unequal(subject: Subject, along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Two unequal widths where one number, or two equal ones, are given."""
+    """Two unequal widths where one number or two equal ones are given."""
     alphas = [axis for axis in along if axis.kind == "alpha" and _equal(tree.value_at(subject.model, axis.path))]
     return [{axis.path: _plain([float(axis.at(s)) for s in shares]) for axis in alphas} for shares in WIDTHS if alphas]
 
 
 def _inside(along: list[Axis], rng: np.random.Generator) -> dict[str, Any]:
-    """Random values of all parameters; of widths two, for the two axes."""
+    """Random values of all parameters; two per width, one for each axis."""
     return {axis.path: axis.at(rng.uniform(size=2) if axis.kind == "alpha" else rng.uniform()) for axis in along}
 
 
@@ -153,8 +153,8 @@ def _plain(value: Any) -> Any:
 
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
-    """Each other option of a choice, and each flag inverted; first one per choice, then the next, since a change of
-    code costs more than a change of a number."""
+    """Each other option of a choice and each inverted flag, in rounds of one per parameter: only the first few are
+    tested, since each compiles new code."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
     turns: list[list[dict[str, str | bool]]] = []
@@ -167,7 +167,7 @@ def _choices(subject: Subject) -> list[dict[str, str | bool]]:
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
-    """The tested parameter values, in a sentence."""
+    """A sentence that lists the tested parameter values."""
     if not tried:
         return "judged at the given values only" + ("" if axes(subject) else ": no parameter declares a range")
     kinds = Counter(place.why for place in tried)
@@ -185,7 +185,7 @@ _PLURAL |= {"jump": "jumps", "pair": "unequal widths"}
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:
     try:
         changed = subject.replace(**values)
-        if subject.guided:  # a guide per place would take most of the time
+        if subject.guided:  # computing a guide for each place would take most of the time
             changed = dataclasses.replace(changed, drawn_by=subject)
         return Place(values, why, changed, along)
     except InputError:
@@ -196,16 +196,16 @@ def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis,
 
 
 def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]]:
-    """Values behind a jump, the largest jump first.
+    """Values just past a jump, the largest jump first.
 
-    Each parameter is moved through its range, with the others as given. A step of eval, pdf or the mean weight from one
-    value to the next that is many times the neighboring steps is a jump.
+    Each parameter is swept through its range, with the others as given. A step of eval, pdf or the mean weight from one
+    value to the next that is many times as large as the neighboring steps is a jump.
     """
     sized: list[tuple[float, dict[str, Any]]] = []
     for axis in along:
-        if axis.path in subject.model.fixed:  # tables would be computed for each value
+        if axis.path in subject.model.fixed:  # each value would need new tables
             continue
-        # not from 0 for equal ratios: the first step would differ from all others
+        # a range in equal ratios does not start at 0: the first step would differ from all others
         first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
         values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)
         try:
@@ -214,7 +214,7 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
             continue
         for curve in curves:
             for size, at in _steps(curve):
-                # the value just behind the step, and the next: the change may end soon
+                # both the value just past the step and the one after it: the new values may end soon
                 sized.append((size, {axis.path: float(values[at])}))
     sized.sort(key=lambda one: -one[0])
     values_: list[dict[str, Any]] = []
@@ -225,9 +225,9 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
 
 
 def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
-    """Sizes of the jumps of curves (SCAN, N) along the first axis, and the index behind each.
+    """Sizes of the jumps in curves (SCAN, N) along the first axis, and the index just past each.
 
-    The bend is a second difference relative to the value, 0 for linear curves. Its median over the N curves shows a
+    The bend is a second difference divided by the value, 0 for linear curves. Its median over the N curves shows a
     small factor for all directions, its 90th percentile a change for a few.
     """
     least = 1e-6 * float(np.max(np.abs(curve), initial=0.0, where=np.isfinite(curve)))
@@ -251,7 +251,7 @@ def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
 def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], seed: int) -> list[np.ndarray]:
     """eval, pdf and weights (SCAN, N) at the same directions and random numbers for every value.
 
-    along  the paths of all parameters that are moved in turn: each is given as an array, so that one kernel serves
+    along  the paths of all parameters that are swept in turn: each is passed as an array, so that one kernel serves
            them all
     """
     rng = np.random.default_rng([seed, 72])
@@ -271,7 +271,7 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
     moved = {path: np.repeat(values, RAYS)}
     together = per_ray(subject, {**others, **moved}) or per_ray(subject, moved)
     shape = (count, RAYS)
-    # a guide has no jumps of its own, and one would be computed for every value, which takes seconds
+    # a guide has no jumps of its own, and computing one for every value would take seconds
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
     else:
@@ -292,13 +292,13 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
 
 
 def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
-    """The value of a parameter in the form that `per_ray` takes."""
+    """The value of a parameter, repeated `count` times in the form that `per_ray` takes."""
     value = np.asarray(tree.value_at(subject.model, path), float)
     return np.full(count, float(value)) if value.ndim == 0 else np.tile(value, (count, 1))
 
 
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
-    """`per_ray_of`; None if the subject takes no arrays."""
+    """The result of `per_ray_of`, or None if the subject takes no arrays."""
     try:
         together = per_ray_of(subject, values)
         probe = directions.at(np.full(len(next(iter(values.values()))), 30.0), 10.0)
@@ -309,8 +309,8 @@ def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | Non
 
 
 def per_ray_of(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject:
-    """The subject with one value per ray of some parameters, by path: for a color (N,) or (N, 3), for a pair of alphas
-    (N,) or (N, 2). Raises InputError for values that it rejects."""
+    """The subject with one value per ray for some parameters, by path: (N,) or (N, 3) for a color, (N,) or (N, 2) for a
+    pair of alphas. Raises InputError for values that it rejects."""
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():

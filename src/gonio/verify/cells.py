@@ -1,9 +1,9 @@
 """Cells of the sphere that follow a BSDF's samples, for the chi-square test.
 
-A lobe of width 0.005 fills a hundred-thousandth of the sphere: fixed cells would hold it in one, or number millions. So
-a first, small draw (the pilot) places the edges: 100 rows per side of the surface and 200 columns per row, at quantiles
-of the pilot, at equal steps, and at growing distances from its middle for the tails. The coordinates are
-(1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no cancellation near the pole.
+A lobe of width 0.005 covers a hundred-thousandth of the sphere: fixed cells would put all of it into one, or number
+millions. So a small first draw (the pilot) places the edges: 100 rows per side of the surface and 200 columns per row,
+at quantiles of the pilot, at equal steps, and at increasing distances from its median for the tails. The coordinates
+are (1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no cancellation near the pole.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from .subject import Subject
 
 CELLS = (100, 200)  # rows and columns per side of the surface
 PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
-FINEST = 3e-5  # spread of the azimuth: 120 steps of float32 directions
+FINEST = 3e-5  # smallest spread of the azimuth that is tested: 120 steps of float32 directions
 
-Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
+Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps rows (wo, wi), (N, 3) each, to (N,)
 
 
 class Grid(NamedTuple):
-    """Cells of several wo.
+    """The cells for several wo.
 
     wo     (N, 3)
-    sides  which sides of the surface have cells
+    sides  the sides of the surface that have cells, 1 above and -1 below
     rows   edges of 1 - |z|, (N, sides, rows + 1), float32
     columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
-    pilot  the samples that placed them, (n, 3) of each wo
+    pilot  the samples that placed the cells, (n, 3) for each wo
     """
 
     wo: np.ndarray
@@ -49,7 +49,7 @@ class Grid(NamedTuple):
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Cells around the pilot's samples; None if no sample has a density."""
+    """Cells placed by the pilot's samples; None if no sample has a density."""
     rng = np.random.default_rng([seed, 11])
     pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
     many = np.repeat(wo, pilot, axis=0)
@@ -62,7 +62,7 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
 
 
 def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Cells around some samples (n, 3) of each wo, on the sides with samples or with a positive pdf.
+    """Cells placed by given samples (n, 3) of each wo, on the sides with samples or with a positive pdf.
 
     A wo whose samples are so close together that the rounding of float32 directions matters is skipped.
     """
@@ -81,13 +81,13 @@ def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cell
             rows[i, j] = _edges(heights, 0.0, 1.0, many_rows)
             for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
                 first, last = np.searchsorted(heights, [a, b])
-                more = max(300 - (last - first), 0) // 2  # a row with few samples takes those of its neighbors
+                more = max(300 - (last - first), 0) // 2  # a row with few samples also uses those of its neighbors
                 columns[i, j, r] = _edges(turns[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
     return Grid(wo, sides, rows, columns, pilot)
 
 
 def _spread(wi: np.ndarray) -> float:
-    """Spread in azimuth of the middle half of directions; infinite where there are too few."""
+    """Interquartile range of the pseudo-angles of directions; infinite for fewer than 20."""
     if len(wi) < 20:
         return float("inf")
     first, last = np.percentile(pseudo_angle(wi), [25.0, 75.0])
@@ -95,7 +95,7 @@ def _spread(wi: np.ndarray) -> float:
 
 
 def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
-    """Whether the pdf is positive anywhere on that side."""
+    """Whether the pdf is positive on that side, at any of 256 random wi per wo."""
     rng = np.random.default_rng(3)
     wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
     return bool(np.any(pdf(np.repeat(wo, 256, axis=0), wi) > 0.0))
@@ -107,7 +107,7 @@ def height(w: np.ndarray) -> np.ndarray:
 
 
 def pseudo_angle(w: np.ndarray) -> np.ndarray:
-    """Pseudo-angle in [0, 4]: monotone in the azimuth, y / (|x| + |y|) in the first quarter."""
+    """Pseudo-angle in [0, 4]: monotonic in the azimuth, y / (|x| + |y|) in the first quadrant."""
     reach = np.abs(w[:, 0]) + np.abs(w[:, 1])
     t = w[:, 1] / np.where(reach > 0, reach, 1.0)
     return np.where(w[:, 0] < 0, 2.0 - t, np.where(w[:, 1] < 0, 4.0 + t, t))
@@ -121,7 +121,7 @@ def azimuth(turn: np.ndarray) -> np.ndarray:
 
 
 def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """count + 1 edges over [low, high]: half at quantiles, a quarter evenly, a quarter at growing distances."""
+    """count + 1 edges on [low, high]: half at quantiles, a quarter evenly spaced, a quarter at increasing distances."""
     inside = values[(values > low) & (values < high)]
     if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
@@ -131,28 +131,29 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
     first, middle, last = own[many // 4], own[many // 2], own[3 * many // 4]
     edges = np.full(count + 1, high)
     edges[:many] = own
-    # a density with a step at its end has it just beyond the outermost samples
+    # a density that ends in a step has that step just beyond the outermost samples
     edges[many : many + 2] = own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])
     edges[many + 2 : many + 2 + even] = low + (high - low) / (even + 1) * np.arange(1, even + 1)
     tail = many + 2 + even
     for sign, reach in ((1, last - middle), (-1, middle - first)):
         edges[tail : tail + far // 2] = middle + sign * _growing(reach, high - low, far // 2)
         tail += far // 2
-    # clipped tails leave several edges at an end: cells of zero width, which count and expect nothing
+    # clipped tails leave several equal edges at an end: cells of zero width, with no samples and none expected
     edges = np.sort(edges.clip(low, high))
     edges[0], edges[-1] = low, high
     return edges.astype(np.float32)
 
 
 def _growing(first: float, last: float, count: int) -> np.ndarray:
-    """Distances in equal ratios, up to 1e4 at least: a lobe of width 1e-4 has its tail at a million of its heights."""
+    """Distances in geometric progression, up to a ratio of at least 1e4: the tail of a lobe of width 1e-4 extends to a
+    million times its height."""
     first = max(first, 1e-10)
     return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
 
 
 def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(a, b, c, d) of each cell [a, b] x [c, d] of (1 - |z|, azimuth), (..., rows, columns) each, by the edges of rows
-    (..., rows + 1) and columns (..., rows, columns + 1)."""
+    """Bounds (a, b, c, d), (..., rows, columns) each, of the cells [a, b] x [c, d] in (1 - |z|, azimuth), from the
+    edges of rows (..., rows + 1) and columns (..., rows, columns + 1)."""
     turn = azimuth(columns.astype(float))
     c, d = turn[..., :-1], turn[..., 1:]
     heights = rows.astype(float)[..., None]
@@ -161,13 +162,13 @@ def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def direction(height: np.ndarray, azimuth: np.ndarray, side: np.ndarray | float) -> np.ndarray:
-    """Unit vectors (..., 3) of 1 - |z| and azimuth, on a side of the surface."""
+    """Unit vectors (..., 3) with the given 1 - |z| and azimuth, on a side of the surface."""
     r = np.sqrt(height * (2.0 - height))
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), (1.0 - height) * side], -1)
 
 
 def cell_of(grid: Grid, which: Array, wi: Array) -> tuple[Array, Array]:
-    """The number of each direction's cell, and whether it is on a side that has cells."""
+    """The index of each direction's cell, and whether the direction is on a side that has cells."""
     dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
@@ -191,6 +192,6 @@ def cell_of(grid: Grid, which: Array, wi: Array) -> tuple[Array, Array]:
 
 
 def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> Array:
-    """The cell of a value: the last whose lower edge is not above it."""
+    """The index of the cell that contains a value: the last whose lower edge is not above it."""
     dr = backend.drjit()
     return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)

@@ -1,4 +1,4 @@
-"""Directions: from and to angles, uniform, rounded and rotated."""
+"""Directions: conversion from and to angles, uniform sampling, rounding and rotation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import InputError
 def at(theta: float | np.ndarray, phi: float | np.ndarray = 0.0) -> np.ndarray:
     """Unit vectors (..., 3) at theta from +z and azimuth phi, both in degrees; exactly (0, 0, 1) at theta = 0."""
     t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
-    # from the nearer pole: sin(pi) is not 0 in floating point
+    # measured from the nearer pole: sin(pi) is not 0 in floating point
     below = t > 0.5 * np.pi
     from_pole = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
     z = np.where(below, -np.cos(from_pole), np.cos(from_pole))
@@ -18,20 +18,20 @@ def at(theta: float | np.ndarray, phi: float | np.ndarray = 0.0) -> np.ndarray:
 
 
 def angles(w: np.ndarray) -> np.ndarray:
-    """(theta, phi) of unit vectors (..., 3), degrees, phi in [0, 360)."""
+    """(theta, phi) of unit vectors (..., 3) in degrees, phi in [0, 360)."""
     w = np.asarray(w, float)
     theta = np.degrees(np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2]))
     return np.stack([theta, np.degrees(np.arctan2(w[..., 1], w[..., 0])) % 360.0], axis=-1)
 
 
 def text(w: np.ndarray) -> str:
-    """ "theta,phi" of one direction, degrees, as `--at` takes it."""
+    """One direction as "theta,phi" in degrees, the form that `--at` takes."""
     theta, phi = angles(w)
     return f"{theta:.9g},{phi:.9g}"
 
 
 def parse(pair: str) -> tuple[np.ndarray, np.ndarray]:
-    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees. InputError where the text is malformed."""
+    """(wo, wi) from "theta_o,phi_o/theta_i,phi_i" in degrees. Raises InputError if the text is malformed."""
     try:
         (to, po), (ti, pi) = ([float(x) for x in part.split(",")] for part in pair.split("/"))
     except ValueError:
@@ -56,7 +56,7 @@ def on_side(w: np.ndarray, side: int) -> np.ndarray:
 
 
 def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Uniform numbers (count, 3) in [0, 1), exact in float32, so that no rounding reaches 1."""
+    """Uniform numbers (count, 3) in [0, 1), exact in float32, so that none rounds up to 1."""
     return rng.random((count, 3), dtype=np.float32).astype(np.float64)
 
 

@@ -14,12 +14,12 @@ class Effort:
     pairs            pairs of directions for the pointwise laws
     log_samples      binary logarithm of the samples of the chi-square test, per direction
     furnace          directions wo of the furnace
-    furnace_samples  of `sample`, per direction
-    accuracy         of integrals
-    widths           other widths of microfacet distributions at which sampling is judged
+    furnace_samples  calls of `sample` in the furnace, per direction
+    accuracy         requested of integrals
+    widths           other widths of microfacet distributions at which sampling is tested
     cells            rows and columns of the chi-square test, per side of the surface
-    full             whether these are the given values: directions go to 89.9 degrees, and claims are checked
-    places           number of other parameter values at which every law is judged, `gonio.verify.box`
+    full             whether the given values are tested: directions reach 89.9 degrees, and claims are checked
+    places           number of other parameter values at which every law is tested, see `gonio.verify.box`
     """
 
     name: str
@@ -39,8 +39,8 @@ EFFORTS = {
     "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 22),
     "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 72),
 }
-# At the other parameter values. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
-# of float32 directions.
+# At the other parameter values, directions stop short of the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower
+# than the steps of float32 directions.
 ELSEWHERE = {
     "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), full=False),
     "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), full=False),

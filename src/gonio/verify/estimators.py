@@ -1,8 +1,9 @@
-"""The albedos that different integrators measure of a BSDF, and the bias of a picture that follows.
+"""The albedos of a BSDF that different integrators measure, and the resulting bias of a picture.
 
-A path tracer uses a BSDF in two ways. It follows samples, whose mean weight is an albedo; and it samples lights with
-`eval` and `pdf` and weights both by the balance heuristic (Veach1997, eq. 9.10). In a furnace of radiance 1, every
-estimator must return int eval dwi. The difference, as a share of the reflected light, is the bias of a picture.
+A path tracer uses a BSDF in two ways. It traces the sampled directions, whose mean weight is an albedo; and it samples
+lights, with `eval` as the value and `pdf` for the balance heuristic that weights both (Veach1997, eq. 9.10). In a
+furnace of radiance 1, every estimator must return int eval dwi. The difference, as a fraction of the reflected light,
+is the bias of a picture.
 
     bias = estimators.sampling_bias(subject)     bias.worst, bias.average, bias.share, bias.words
 """
@@ -22,10 +23,10 @@ from .severity import ACCURACY, Bias, Grade, percent, seeds, summed, views
 from .subject import Subject
 
 SAMPLES = 1 << 13  # per wo; stratified, so that the mean is accurate to about 1e-3 of a weight
-NEGLIGIBLE = 2e-4  # difference of two albedos that counts as none
-SPHERE = 0.25 / np.pi  # density of light samples: those of a constant environment
-BINS = 16  # four quarters of the azimuth, within 45 degrees of the normal and beyond, on each side of the surface
-UNDEFINED = 512  # random wi per wo, to count values that are not finite
+NEGLIGIBLE = 2e-4  # largest difference of two albedos that is ignored
+SPHERE = 0.25 / np.pi  # density of light samples: uniform on the sphere, as for a constant environment
+BINS = 16  # four quadrants of azimuth, within 45 degrees of the normal and beyond, on each side of the surface
+UNDEFINED = 512  # random wi per wo at which non-finite values are counted
 TAIL = 64  # largest weights per wo, from which the exponent of the tail is estimated
 
 Part: TypeAlias = Literal["all", "weights", "pdf"]
@@ -35,17 +36,17 @@ class Estimates(NamedTuple):
     """Directional albedos by each estimator, for N directions wo.
 
     wo, mass  as `severity.views` returns them
-    value     int eval dwi plus the delta lobes' shares, (N, channels): the limit of light sampling
+    value     int eval dwi plus the light of the delta lobes, (N, channels): the limit of light sampling
     sampled   mean weight (N, channels): the limit of BSDF sampling
     both      the two combined by the balance heuristic, light samples uniform on the sphere
-    consistent, consistent_both  the last two with each sample weighted by eval / pdf: the rest of the difference to
-              `sampled` and `both` is due to the weights, the rest of that to `value` due to the pdf
+    consistent, consistent_both  `sampled` and `both` with each sample weighted by eval / pdf: what remains of the
+              difference between them and `value` is due to the pdf, the rest to the weights
     noise     two standard errors of `sampled` and `both`
     parts     `value`, `sampled` and `consistent`, means over the channels, per bin of wi: (3, N, BINS)
-    doubt     three standard errors of the latter two, (N, BINS)
+    doubt     three standard errors of the last two, (N, BINS)
     unseen    fraction of light that rare samples of huge weight may add beyond those observed, (N,)
     claimed   int pdf dwi, (N,)
-    drawn     share of samples that did not fail and are not delta samples, (N,)
+    drawn     fraction of samples that did not fail and are not delta samples, (N,)
     """
 
     wo: np.ndarray
@@ -64,7 +65,7 @@ class Estimates(NamedTuple):
 
 
 def of_subject(subject: Subject) -> Estimates:
-    """The estimates of radiance: computed when a law first fails, once for all laws."""
+    """The estimates for radiance, computed when a law first fails and cached for all laws."""
     if "estimates" not in subject.memo:
         subject.memo["estimates"] = estimate(subject)
     estimates: Estimates = subject.memo["estimates"]
@@ -72,7 +73,7 @@ def of_subject(subject: Subject) -> Estimates:
 
 
 def estimate(subject: Subject, mode: Mode = "radiance") -> Estimates:
-    """The results of the three integrators for each of `views`."""
+    """The results of the three integrators for each direction of `severity.views`."""
     wo, mass = views(subject.sides)
     n = len(wo)
     many = np.repeat(wo, SAMPLES, axis=0)
@@ -121,8 +122,8 @@ def _followed_weight(subject: Subject, wo: np.ndarray, s: SampleArrays) -> np.nd
 
 
 def _integral(subject: Subject, many: np.ndarray, wo: np.ndarray, channels: int, mode: Mode) -> np.ndarray:
-    """Integrals over wi of eval, of eval times the light samples' heuristic, of pdf, and of mean eval per bin:
-    (N, 2 channels + 1 + BINS)."""
+    """Integrals over wi of eval, of eval times the balance heuristic of light samples, of pdf, and of mean eval per
+    bin: (N, 2 channels + 1 + BINS)."""
 
     def answers(o: np.ndarray, i: np.ndarray) -> np.ndarray:
         value = np.nan_to_num(subject.eval(o, i, mode), posinf=0.0, neginf=0.0)
@@ -149,7 +150,7 @@ def _integral(subject: Subject, many: np.ndarray, wo: np.ndarray, channels: int,
 def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
     """Contribution to the mean of samples beyond the largest observed weight, (N, 1); 0 where weights are bounded.
 
-    The tail's exponent is Hill's: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) beyond t.
+    By Hill's estimate of the tail's exponent: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) beyond t.
     """
     largest = np.partition(weight.mean(1).reshape(n, SAMPLES), -TAIL, axis=1)[:, -TAIL:]
     least, most = np.maximum(largest.min(1), 1e-30), largest.max(1)
@@ -159,14 +160,14 @@ def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
 
 
 def _bins(w: np.ndarray) -> np.ndarray:
-    """1 in the column of a direction's bin, (N, BINS); the edges are those of the first cells of the cubature."""
+    """1 in the column of a direction's bin, (N, BINS); the bin edges are those of the first cells of the cubature."""
     number = (w[:, 0] > 0.0) + 2 * (w[:, 1] > 0.0) + 4 * (np.abs(w[:, 2]) > np.sqrt(0.5)) + 8 * (w[:, 2] > 0.0)
     return (number[:, None] == np.arange(BINS)).astype(float)
 
 
 def _split(value: Scalar, w: Direction) -> list[Scalar]:
-    """A Dr.Jit value in its bin, 0 in the others. It runs in the kernel that sums them: sixteen columns of NumPy take
-    longer than most models."""
+    """A Dr.Jit value in the entry of its bin, 0 in the others. This runs in the kernel that sums them: sixteen columns
+    of NumPy take longer than most models."""
     dr = backend.drjit()
     sides = [(~side, side) for side in (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)]
 
@@ -192,14 +193,14 @@ def _eval_over_pdf(
 
 
 def _stratified(count: int) -> np.ndarray:
-    """A sequence of low discrepancy in [0, 1)^3: multiples of powers of the root of x^4 = x + 1."""
+    """A low-discrepancy sequence in [0, 1)^3: multiples of inverse powers of the positive root of x^4 = x + 1."""
     steps = 1.2207440846057596 ** -np.arange(1.0, 4.0)
     u = (0.5 + np.arange(count)[:, None] * steps) % 1.0
     return directions.single(np.minimum(u, 1.0 - 2.0**-24))
 
 
 def _batched(values: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over each wo's samples, and its standard error from eight interleaved parts, (N, channels) each."""
+    """Mean over each wo's samples, and its standard error from eight interleaved batches, (N, channels) each."""
     parts = values.reshape(n, SAMPLES // 8, 8, -1).mean(1)
     return parts.mean(1), parts.std(1) / np.sqrt(7.0)
 
@@ -220,10 +221,11 @@ def _deltas(wi: np.ndarray, weight: np.ndarray, pdf: np.ndarray, delta: np.ndarr
 
 
 def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None = None) -> Bias:
-    """The error of BSDF sampling, with and without light samples, against the limit of light sampling.
+    """The error of BSDF sampling, with and without light samples, relative to the limit of light sampling.
 
-    part  the share of it that is due to weights other than eval / pdf, or to a pdf other than that of the samples
-    The larger of the two errors counts; `both` of the result is the one with light samples.
+    part  "weights" or "pdf" for the part that is due to weights other than eval / pdf, or to a pdf other than that of
+          the samples
+    The larger of the two errors counts; the field `both` of the result is the error with light samples.
     """
     light = light or of_subject(subject)
     biases = []
@@ -232,10 +234,10 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
         off = np.where(np.abs(off) > light.noise + NEGLIGIBLE, off, 0.0)
         biases.append(summed(off, np.maximum(light.value, 0.0), light.wo, light.mass))
     by_samples, both = biases
-    # the same light from a lamp, per bin: an excess on one side does not make up for a lack on another
+    # the same under a small light, per bin: an excess on one side does not cancel a deficit on another
     value, drawn, own = light.parts
     apart = np.abs((own if part == "pdf" else drawn) - (own if part == "weights" else value))
-    # the edge of a bin may cut a lobe, which puts samples on either side by chance: half a percent of all light is
+    # a bin edge may cut a lobe, whose samples then fall on either side by chance: half a percent of all light is
     # ignored
     doubt = light.doubt + 5e-3 * np.abs(value).sum(1, keepdims=True)
     apart = np.where(apart > doubt, apart, 0.0).sum(1, keepdims=True)
@@ -262,21 +264,21 @@ def _of_power(subject: Subject) -> Estimates:
 
 
 def gain_bias(subject: Subject) -> Bias:
-    """The power that is reflected beyond the incident power, as a share of the latter."""
+    """The power reflected in excess of the incident power, as a fraction of the latter."""
     light = _of_power(subject)
     over = np.where(light.value > 1.0 + 5.0 * NEGLIGIBLE, light.value - 1.0, 0.0)
     return summed(over, np.ones_like(over), light.wo, light.mass, "gained")
 
 
 def loss_bias(subject: Subject) -> Bias:
-    """The power that a subject which claims to reflect all of it, a lossless variant, loses."""
+    """The power lost by a subject that claims to reflect all of it, a lossless variant."""
     light = _of_power(subject)
     lost = np.maximum(1.0 - light.value, 0.0)
     return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")
 
 
 def stated_bias(subject: Subject) -> Bias:
-    """The power by which a base, weighted by the albedo that is stated, is too bright or too dark."""
+    """The reflected power minus the stated albedo: a base that is weighted by that albedo is wrong by as much."""
     light = _of_power(subject)
     stated = subject.model.stated_albedo(light.wo)
     off = light.value - stated.value
@@ -284,7 +286,7 @@ def stated_bias(subject: Subject) -> Bias:
 
 
 def undefined_bias(subject: Subject, seed: int) -> Bias:
-    """The share of directions with values that are not finite, at random wi."""
+    """The fraction of random wi for which values are not finite."""
     wo, mass = views(subject.sides)
     many = np.repeat(wo, UNDEFINED, axis=0)
     rng = np.random.default_rng([seed, 10])

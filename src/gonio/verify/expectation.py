@@ -1,6 +1,6 @@
-"""What the chi-square test expects: a pdf's integral over every cell.
+"""The expectation of the chi-square test: a pdf's integral over every cell.
 
-Cells whose error exceeds what the noise of their counts allows are divided, also where only the samples that placed the
+Cells whose error exceeds what the noise of their counts allows are divided, even if only the samples that placed the
 cells show a lobe that is narrower than a cell.
 
     expected = expect(subject, grid, tolerance)
@@ -18,15 +18,15 @@ from ..ops.backend import Array
 from .cells import Density, Grid, boxes, cell_of, direction, height
 from .subject import Subject, guarded
 
-DEPTH = 9  # divisions of a cell; cells with a step, such as that of total reflection, are divided to the last
+DEPTH = 9  # divisions of a cell; cells with a step, such as that of total reflection, are divided to the last level
 ASIDE = 1.1  # ratio: a step of a tenth at the edges of a ring of cells is 1e-4 of the total
-MAX_CELLS = 400_000  # of one round, some 10 M directions
+MAX_CELLS = 400_000  # cells per round, about 10 M directions
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), its error from cells
-    that were not fully divided, and an estimate of what each cell lacks of lobes that no sample of the pilot has shown
-    (`cubature`), (N, sides, rows, columns)."""
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all cells (N,), its error from
+    cells that were not fully divided, and an estimate of what each cell lacks of lobes that no sample of the pilot has
+    shown (see `cubature`), (N, sides, rows, columns)."""
 
     cells: np.ndarray
     total: np.ndarray
@@ -37,8 +37,8 @@ class Expectation(NamedTuple):
 def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     """The pdf's integral over every cell; cells whose error exceeds what their noise allows are divided.
 
-    pdf        of a subject, or a function of rows
-    tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
+    pdf        the subject with this pdf, or a function of rows
+    tolerance  allowed error of a cell, relative to the square root of its expected count at `1 / tolerance^2` samples
     """
     look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
     a, b, c, d = (edge.ravel() for edge in boxes(grid.rows, grid.columns))
@@ -48,13 +48,13 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     unresolved = np.zeros(len(grid.wo))
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
-    points, shown = _points(look, grid, owner), np.zeros(len(owner), bool)  # by a single sample
+    points, shown = _points(look, grid, owner), np.zeros(len(owner), bool)  # shown by a single sample
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
         two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
         four = last.integral
-        # The error of four nodes is far below the difference from two: for smooth cells its square, over the value.
-        # With a step through the middle, two and four agree by chance, and three does not.
+        # The error of four nodes is far below their difference from two nodes: for smooth cells about its square
+        # divided by the value. With a step through the middle, two and four agree by chance, but three does not.
         rough = np.abs(four - three.integral)
         off = np.maximum(0.3 * np.abs(four - two.integral), rough)
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
@@ -85,7 +85,7 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
 def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N, 2)."""
     a, b, c, d = box.T
-    # the heights of a narrow lobe span decades: they are halved in ratio
+    # the heights of a narrow lobe span decades: they are halved geometrically
     m = np.where(b > 4.0 * a, np.maximum(np.sqrt(a * b), b / 64.0), 0.5 * (a + b))
     q = 0.5 * (c + d)
     parts = [(a, m, c, q), (m, b, c, q), (a, m, q, d), (m, b, q, d)]
@@ -93,8 +93,8 @@ def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
-    """The samples that placed a grid's cells, in the boxes of the cells `owner`: at (1 - |z|, azimuth); their light is
-    a fraction of all samples."""
+    """The samples that placed a grid's cells, at (1 - |z|, azimuth) in the boxes of the cells `owner`; their light is a
+    fraction of all samples."""
     dr = backend.drjit()
     kind = backend.types("float32")
     which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
@@ -111,7 +111,7 @@ def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
 
 
 def _within(points: Points, divided: np.ndarray, middle: np.ndarray) -> Points:
-    """The points in divided boxes, numbered by the quarters, which meet at `middle` (boxes, 2)."""
+    """The points in divided boxes, renumbered by their quarters, which meet at `middle` (boxes, 2)."""
     inside = Points(*[column[divided[points.cell]] for column in points])
     box = (np.cumsum(divided) - 1)[inside.cell]
     return inside._replace(cell=4 * box + (inside.at > middle[box]) @ [1, 2])
@@ -202,7 +202,7 @@ class _InKernel:
         pdf = guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, wi))
         value = exact.float(pdf) + dr.zeros(exact.float, len(index))
         weighed = value * of_node(weight) * (b - a) * (d - c)
-        dr.eval(value, weighed)  # together: each reduction would evaluate the pdf anew
+        dr.eval(value, weighed)  # together: each reduction would evaluate the pdf again
         integral = dr.block_sum(weighed, len(s))
         least, most = (dr.block_reduce(op, value, len(s)) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max))
         dr.eval(integral, least, most)

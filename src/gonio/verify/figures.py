@@ -1,4 +1,4 @@
-"""The evidence of laws, and the report's figures of it, as Matplotlib's SVG."""
+"""The evidence that laws collect, and its figures for the report, drawn as SVG by Matplotlib."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def _label(axis: Axes, x: str, y: str, title: str = "") -> None:
 
 @dataclass
 class SampleCells:
-    """The cells of the chi-square test of one wo.
+    """The cells of the chi-square test for one wo.
 
     expected, observed  samples in each cell, (sides, rows, columns)
     rows, columns       edges of the cells, see `gonio.verify.cells`
-    drawn               samples in all
-    wo, sides           the direction of the test, and the sides of the surface with cells
+    drawn               total number of samples
+    wo, sides           the tested direction, and the sides of the surface with cells
     """
 
     expected: np.ndarray
@@ -68,14 +68,14 @@ class SampleCells:
     sides: tuple[int, ...] = (1,)
 
     def draw(self) -> tuple[str, str]:
-        """Samples, their expectation by the pdf, and the difference in standard deviations, around the main lobe."""
+        """Samples, the number that the pdf predicts, and the difference in standard deviations, near the main lobe."""
         observed, expected = self.observed, self.expected
         side = int(np.argmax(observed.sum((1, 2))))
         o, e = observed[side].astype(float), expected[side]
         a, b, c, d = cells.boxes(self.rows[side], self.columns[side])
         area = np.maximum((b - a) * (d - c), 1e-30)
         x, y, _ = np.moveaxis(cells.direction(0.5 * (a + b), 0.5 * (c + d), 1.0), -1, 0)
-        # the window that holds 95 % of the samples, square
+        # the square window that holds 95 % of the samples
         order = np.argsort(-(e / area).ravel())
         inside = order[: max(int(np.searchsorted(np.cumsum(e.ravel()[order]), 0.95 * e.sum())), 8)]
         span = [(np.min(v.ravel()[inside]), np.max(v.ravel()[inside])) for v in (x, y)]
@@ -113,9 +113,9 @@ class SampleCells:
 
 @dataclass
 class AlbedoCurves:
-    """Directional albedo of wo (N, 3), by two estimators.
+    """Directional albedo for wo (N, 3), by two estimators.
 
-    quadrature, error  (N, channels)
+    quadrature, error  the integral of eval and its error, (N, channels)
     sampling, noise    mean weight and its standard error, (N, channels)
     furnace, loss      albedo of the lossless variant, if there is one, and its average loss
     """
@@ -129,7 +129,7 @@ class AlbedoCurves:
     loss: float = 0.0
 
     def draw(self) -> tuple[str, str]:
-        """Albedo over angle by both estimators, and the loss in the white furnace."""
+        """Albedo against angle by both estimators, and the loss in the white furnace."""
         wo = self.wo
         theta = np.degrees(np.arctan2(np.hypot(wo[:, 0], wo[:, 1]), wo[:, 2]))
         order = np.argsort(theta)
@@ -165,7 +165,7 @@ class AlbedoCurves:
 
 @dataclass
 class ReciprocityMap:
-    """The largest relative difference of f, by (theta_o, theta_i), over azimuths.
+    """The largest relative difference of f over azimuths, by (theta_o, theta_i).
 
     below  whether the angles extend to 180 degrees
     """
@@ -198,14 +198,14 @@ class ReciprocityMap:
 
 @dataclass
 class RoundingErrors:
-    """The relative error of float32 per pair, and both cosines, (N,)."""
+    """The relative error of float32 per pair, and the cosines of wo and wi, (N,) each."""
 
     error: np.ndarray
     cos_o: np.ndarray
     cos_i: np.ndarray
 
     def draw(self) -> tuple[str, str]:
-        """Error of float32 over the smaller cosine."""
+        """Error of float32 against the smaller cosine."""
         cos = np.minimum(self.cos_o, self.cos_i)
         error = np.maximum(self.error, 1e-10)
         pick = np.argsort(-error)[:400]

@@ -1,8 +1,8 @@
 """Pearson's chi-square test of a model's samples against its pdf, in cells that follow the samples.
 
-A second draw, independent of the pilot that placed the cells, is counted: sampling, binning and counting are one
-kernel, in which only the counts are stored. Failed samples, delta samples and those outside all cells are counted too:
-their expectation is 1 - int pdf.
+The counts come from a second draw, independent of the pilot that placed the cells: sampling, binning and counting are
+one kernel, which stores only the counts. Failed samples, delta samples and samples outside all cells are counted too:
+their expected fraction is 1 - int pdf.
 
     grid = cells.place(subject, wo, seed)
     outcome = compare(expect(subject, grid, tolerance), count(subject, grid, log_samples, seed), row)
@@ -22,12 +22,12 @@ from .cells import Grid, cell_of
 from .expectation import Expectation
 from .subject import Subject, guarded
 
-COARSE = (10, 10)  # rows and columns per cell of the coarse test, which detects small errors of broad lobes
-MIN_EXPECTED = 10.0  # of a pooled cell: Pearson's statistic then follows its limit well within the noise
+COARSE = (10, 10)  # rows and columns that the coarse test merges into one cell, to detect small errors of broad lobes
+MIN_EXPECTED = 10.0  # samples in a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 
 class Counts(NamedTuple):
-    """Samples in each cell (N, sides, rows, columns), all others (N,), and samples drawn per wo."""
+    """Samples in each cell (N, sides, rows, columns), all others (N,), and the number of samples drawn per wo."""
 
     cells: np.ndarray
     others: np.ndarray
@@ -35,7 +35,7 @@ class Counts(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """p-values of one wo: of all cells, of coarse ones, and of the number of samples outside of all cells."""
+    """p-values for one wo: of all cells, of the coarse cells, and of the number of samples outside all cells."""
 
     fine: float
     coarse: float
@@ -61,14 +61,14 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
 
 
 def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
-    """As `count`, for given samples (n, 3) of a grid's only wo; the other samples failed."""
+    """As `count`, for given samples (n, 3) of a grid with a single wo; the rest of the `drawn` samples failed."""
     kind = backend.types("float32")
     wi = backend.vector_of(samples, 3, kind)
     return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
 
 
 def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> Counts:
-    """Count of valid directions in each cell; `which` is the number of each direction's wo."""
+    """Count of valid directions in each cell; `which` is the index of each direction's wo."""
     dr = backend.drjit()
     UInt = backend.types("float32").module.UInt32
     cell, inside = cell_of(grid, which, wi)
@@ -91,9 +91,9 @@ def random_numbers(kind: Types, index: Array, seed: int) -> Array:
 
 
 def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None = None) -> Outcome:
-    """p-values of one wo.
+    """p-values for one wo.
 
-    grid  the cells, to allow for rounding: cells hardly larger than the spacing of float32 directions gain or lose
+    grid  the cells, to allow for rounding: cells barely larger than the spacing of float32 directions gain or lose
           samples by rounding alone
     """
     n = counts.drawn
@@ -109,12 +109,13 @@ def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None =
     )
 
 
-STEP = 2.0**-24  # of a component of a float32 direction, half a unit of its last digit
+STEP = 2.0**-24  # rounding error of a component of a float32 direction, half a unit in the last place
 
 
 def _rounding(grid: Grid, row: int) -> np.ndarray:
-    """Share of a cell's samples that rounding moves to the next one, (sides, rows, columns): a step of the coordinates
-    over the cell's width, along both. A step of a component moves 1 - |z| by sin theta, and the azimuth by 1 / sin."""
+    """Fraction of a cell's samples that rounding moves to the next one, (sides, rows, columns): the rounding error of a
+    coordinate divided by the cell's width, summed over both. An error of a component changes 1 - |z| by sin theta
+    times as much, and the azimuth by 1 / sin theta."""
     edges = grid.rows[row].astype(float)
     heights, middle = np.diff(edges, axis=-1), 0.5 * (edges[..., 1:] + edges[..., :-1])
     sin = np.sqrt(np.maximum(middle * (2.0 - middle), STEP))
@@ -127,10 +128,12 @@ def _rounding(grid: Grid, row: int) -> np.ndarray:
 def _pearson(
     expected: np.ndarray, observed: np.ndarray, unseen: np.ndarray, rounded: np.ndarray | float = 0.0
 ) -> float:
-    """Chi-square of cells, small ones pooled; conditional on the number of samples in them, which `_others` tests.
+    """p-value of the chi-square test over cells, with small ones pooled, conditional on their total number of samples,
+    which `_others` tests.
 
     unseen   samples that the expectation of each cell may lack; its square adds to the variance
-    rounded  samples that rounding may move to the next cell, which adds likewise; pooled cells are wide
+    rounded  samples that rounding may move to the next cell; treated likewise, but ignored for pooled cells, which are
+             wide
     """
     inside, total = expected.sum(), observed.sum()
     if total < MIN_EXPECTED or inside <= 0.0:
@@ -140,7 +143,7 @@ def _pearson(
     e, o, unseen = expected[order], observed[order], unseen[order]
     off = np.hypot(unseen, np.broadcast_to(rounded, order.shape)[order])
     cumulative = np.cumsum(e)
-    # one pool for all cells below the least expectation
+    # one pool for all cells below the minimum expectation
     small = np.searchsorted(e, MIN_EXPECTED)
     while small < len(e) and small and cumulative[small - 1] < MIN_EXPECTED:
         small += 1
@@ -159,10 +162,10 @@ QUADRATURE = 3e-5  # error of float32 pdfs summed over thousands of cells
 
 
 def _others(total: float, error: float, others: int, drawn: int) -> float:
-    """p-value of the number of samples outside of all cells, expected 1 - int pdf.
+    """p-value of the number of samples outside all cells, whose expected fraction is 1 - int pdf.
 
-    The integral is known to `QUADRATURE` and its own error; of the expectations within these, the nearest to the
-    observation counts.
+    The integral is known to within `QUADRATURE` plus its own error; of the expectations in this interval, the one
+    nearest to the observation is used.
     """
     known = QUADRATURE + error
     share = float(np.clip(others / drawn, 1.0 - total - known, 1.0 - total + known))

@@ -1,5 +1,5 @@
-"""Checks of delta lobes: direction, index, radiance against power, the way back, Fresnel's equations, rotation, tint,
-float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` turns them into a verdict.
+"""Checks of delta lobes: direction, index, radiance versus power, the reverse path, Fresnel's equations, rotation,
+tint, float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` turns them into a verdict.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from .forensics.factors import dielectric, schlick_curve
 from .lobes import Lobes
 from .subject import Subject, guarded
 
-SINGLE = 2e-3  # error of float32
-SLOPES = 1e-4  # error of derivatives
+SINGLE = 2e-3  # tolerated error of float32
+SLOPES = 1e-4  # tolerated error of derivatives
 FORWARD = 1e-4  # fraction of light below which a lobe need not be reciprocal
-CLOSE = 0.9  # share of the oblique views at which a lobe that misses the mirror direction lies next to it
-BOUNCED = 1e-6  # relative deviation from a line that is no rounding
-FLAT = 1e-3  # difference of an index from 1 that refracts nothing
+CLOSE = 0.9  # fraction of the oblique views at which a lobe that misses the mirror direction lies next to it
+BOUNCED = 1e-6  # relative deviation from a line that rounding cannot explain
+FLAT = 1e-3  # difference of an index from 1 below which nothing is refracted
 
 
 class Probe(NamedTuple):
-    """A subject, directions wo (N, 3), and its delta lobes for them, of radiance and of power."""
+    """A subject, directions wo (N, 3), and its delta lobes at these, for radiance and for power."""
 
     subject: Subject
     wo: np.ndarray
@@ -36,7 +36,7 @@ class Probe(NamedTuple):
     seed: int
 
     def lobes(self, part: Lobes) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
-        """For each number n of a lobe: the rows of the directions that have one, n, and wo and wi of those."""
+        """For each lobe number n: the rows of the directions that have it, n, and wo and wi of these rows."""
         for n in range(part.valid.shape[1]):
             rows = np.flatnonzero(part.valid[:, n])
             if len(rows):
@@ -46,10 +46,10 @@ class Probe(NamedTuple):
 class Miss(NamedTuple):
     """One error.
 
-    size     relative, of the worst direction
-    text     the error in words
+    size     relative error of the worst direction
+    text     description of the error
     wo, wi   the worst direction and its lobe
-    average  over the directions that have the lobe; `share` of them off by more than a hundredth
+    average  mean error of the directions that have the lobe; `share` is the fraction of them with more than 0.01
     cause    the probable mistake
     """
 
@@ -75,7 +75,7 @@ def _miss(off: np.ndarray, text: str, wo: np.ndarray, wi: np.ndarray, cause: str
 
 
 def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Largest difference over channels, relative to the larger brightest channel, (N,)."""
+    """Largest difference over channels, relative to the brightest channel of either, (N,)."""
     size = np.maximum(np.maximum(np.abs(a).max(1), np.abs(b).max(1)), 1e-6)
     return np.asarray(np.abs(a - b).max(1) / size)
 
@@ -93,9 +93,11 @@ def distinct(a: float, b: float) -> tuple[str, str]:
 
 
 def direction(probe: Probe) -> Misses:
-    """Directions are unit vectors, and refraction follows Snell's law with the lobe's own eta. Reflection off the
-    mirror direction, and transmission without refraction, are tested for reciprocity only: gratings and corner cubes
-    have them."""
+    """Check that directions are unit vectors, and that refraction follows Snell's law with the lobe's own eta.
+
+    Reflection far from the mirror direction, and transmission without refraction, are tested for reciprocity only:
+    gratings and corner cubes have them.
+    """
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
         off = np.abs(np.linalg.norm(i, axis=1) - 1.0)
@@ -108,13 +110,13 @@ def direction(probe: Probe) -> Misses:
         if straight.any():
             yield from _unstated_index(o, i, straight)
         mirror = o * [-1.0, -1.0, 1.0]
-        # a grating's orders lie next to the mirror direction, and one of them in it
+        # a grating has orders next to the mirror direction, and one exactly along it
         _, exact = lobes.along(lobes.rows_of(probe.radiance, rows), mirror)
-        # not about the normal, where all these and the way back to wo coincide
+        # not near the normal, where the mirror direction and the way back to wo coincide
         oblique = ~through & (np.hypot(o[:, 0], o[:, 1]) > 0.2)
         close = oblique & ~exact & (np.abs(i - mirror).max(1) < 0.1)
         if close.sum() < CLOSE * oblique.sum():
-            continue  # its way through all views crosses the mirror direction
+            continue  # the lobe only crosses the mirror direction at some views
         yield _miss(np.abs(i - mirror).max(1) * close, "a lobe next to the mirror direction", o, i)
 
 
@@ -132,7 +134,7 @@ def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray)
 
 
 def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misses:
-    """Samples with eta = 1 do not refract."""
+    """Check that samples with eta = 1 do not refract."""
     sin_o, sin_i = np.hypot(o[:, 0], o[:, 1]), np.hypot(i[:, 0], i[:, 1])
     usable = straight & (sin_o > 0.1) & (sin_i > 0.1)
     index = sin_o[usable] / sin_i[usable]
@@ -143,8 +145,8 @@ def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misse
 
 
 def indices(probe: Probe) -> Misses:
-    """Reflection has eta = 1; eta from below is the inverse of that from above; it agrees with a parameter that names
-    the index."""
+    """Check that eta is 1 in reflection, that eta from below is the inverse of eta from above, and that it agrees with
+    a parameter that gives the index."""
     named = _named_index(probe.subject)
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -152,7 +154,7 @@ def indices(probe: Probe) -> Misses:
         yield _miss(np.abs(eta - 1.0) * ~through, "eta of a reflected sample is not 1", o, i)
         above = np.where(o[:, 2] > 0.0, eta, 1.0 / np.where(eta > 0.0, eta, np.nan))[through]
         if not len(above) or np.all(np.abs(above - 1.0) < FLAT):
-            continue  # nothing is transmitted, or without an index
+            continue  # nothing is transmitted, or nothing is refracted
         off = np.zeros(len(o))
         if named is not None:
             off[through] = np.abs(above / named - 1.0)
@@ -164,7 +166,7 @@ def indices(probe: Probe) -> Misses:
 
 
 def _named_index(subject: Subject) -> float | None:
-    """The index below over that above, where a parameter of the material itself names it."""
+    """The index below divided by that above, if a parameter of the material itself gives it."""
     names = subject.parameters
     try:
         if "eta" in names and names["eta"].kind == "float":
@@ -180,7 +182,7 @@ def _named_index(subject: Subject) -> float | None:
 
 
 def modes(probe: Probe) -> Misses:
-    """Radiance is 1 / eta^2 times power in transmission, and equals it in reflection (Veach1997, 5.2)."""
+    """Check that radiance is 1 / eta^2 times power in transmission, and equals it in reflection (Veach1997, 5.2)."""
     if not probe.subject.transmits:
         return
     for rows, n, o, i in probe.lobes(probe.radiance):
@@ -203,8 +205,10 @@ def modes(probe: Probe) -> Misses:
 def _power_of_index(
     radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, total: np.ndarray
 ) -> str:
-    """The cause where radiance over power is one power of the index for all of transmission. If the power of all lobes,
-    `total` (N, channels), is 1 only without a factor, power is the wrong one of the two."""
+    """The cause if radiance divided by power is the same power of the index for all transmission.
+
+    If the power of all lobes, `total` (N, channels), is 1 only without such a factor, power is wrong, not radiance.
+    """
     if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
         return ""
     ratio = radiance[usable].sum(1) / np.maximum(power[usable].sum(1), 1e-12)
@@ -230,7 +234,7 @@ def _power_of_index(
 
 
 def _one_side(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, outside: np.ndarray) -> str:
-    """The cause where radiance over power is right from one side of the surface only."""
+    """The cause if radiance divided by power is correct from one side of the surface only."""
     ratio = radiance.sum(1) / np.maximum(power.sum(1), 1e-12)
     for right, wrong, name in ((outside, ~outside, "inside"), (~outside, outside, "outside")):
         a, b = usable & right, usable & wrong
@@ -244,7 +248,7 @@ def _one_side(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: 
 
 
 def way_back(probe: Probe) -> Misses:
-    """The lobe along wi, viewed from wi, leads back to wo and carries the same power."""
+    """Check that the lobe along wi, viewed from wi, leads back to wo and carries the same power."""
     for rows, _, o, i in probe.lobes(probe.power):
         there, _ = lobes.along(lobes.rows_of(probe.power, rows), i)
         fine = np.isfinite(i).all(1) & (np.abs(np.linalg.norm(i, axis=1) - 1.0) < SINGLE) & (np.abs(i[:, 2]) > 1e-3)
@@ -262,8 +266,8 @@ def way_back(probe: Probe) -> Misses:
 
 
 def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarray, through: np.ndarray) -> str:
-    """The cause where light carried one way and the other has one ratio for all views of a side, or where reflection
-    from the denser side follows Schlick's curve of the angle there."""
+    """The cause if the light carried one way is a constant times that carried back for all views of a side, or if
+    reflection from the denser side follows Schlick's curve of the angle there."""
     off = (_relative(there, back) > 1e-4) & through
     if off.sum() < 4:
         return ""
@@ -279,9 +283,9 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
     for side, where in ((1.0, "outside"), (-1.0, "inside")):
         rows = (wo[:, 2] * side > 0.0) & (reflected > 0.0) & (reflected < 0.999)
         x = (1.0 - np.abs(wo[rows, 2])) ** 5
-        if rows.sum() < 4 or np.ptp(x) < 2e-4 or not np.all(eta[rows] < 1.0):  # the denser side is meant
+        if rows.sum() < 4 or np.ptp(x) < 2e-4 or not np.all(eta[rows] < 1.0):  # only from the denser side
             continue
-        r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))  # of r0 + (1 - r0) x
+        r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))  # fit of r0 + (1 - r0) x
         if np.abs(r0 + (1.0 - r0) * x - reflected[rows]).max() < 1e-5:
             return (
                 f"from {where} it reflects by Schlick's curve of the angle there: that of the transmitted angle is due?"
@@ -290,15 +294,16 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
 
 
 def fresnel(probe: Probe) -> Misses:
-    """A material that names its index reflects by Fresnel's equations, or by Schlick's curve, up to a constant."""
+    """Check that a material that gives its index reflects by Fresnel's equations, or by Schlick's curve, up to a
+    constant factor."""
     subject, wo, power = probe.subject, probe.wo, probe.power
     index = _named_index(subject)
     through = power.through(wo)
     refracted = through & (np.abs(power.eta - 1.0) > FLAT)
     if index is None or abs(index - 1.0) < FLAT or (subject.transmits and not refracted.any()):
-        return  # a thin slab transmits without refraction, or nothing if it is black, and has another curve
+        return  # a thin slab transmits without refraction, or nothing if it is black, and follows another curve
     if "delta" in subject.breaches:
-        return  # declared, as of a film: its reflectance does not depend on this index alone
+        return  # declared, as for a film: its reflectance does not depend on this index alone
     cosine, ratio = np.abs(wo[:, 2]), np.where(wo[:, 2] > 0.0, index, 1.0 / index)
     carried = {
         "reflects": np.sum(power.carried * (power.valid & ~through)[..., None], axis=1),
@@ -330,8 +335,8 @@ def fresnel(probe: Probe) -> Misses:
 
 
 def _absorbs(value: np.ndarray, share: np.ndarray, cosine: np.ndarray, ratio: np.ndarray, least: float) -> bool:
-    """Whether transmitted light (N, channels) is 1 - F times a constant times exp(-depth / cos), as of a stain on the
-    denser side of the surface (Beer's law)."""
+    """Whether transmitted light (N, channels) is 1 - F times a constant times exp(-depth / cos), as for an absorbing
+    layer on the denser side of the surface (Beer's law)."""
     dense = np.where(ratio > 1.0, np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / ratio**2, 0.0)), cosine)
     rows = (share < 0.99) & (dense > 0.1)
     if rows.sum() < 4:
@@ -348,8 +353,8 @@ def _absorbs(value: np.ndarray, share: np.ndarray, cosine: np.ndarray, ratio: np
 
 
 def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The error of values (N, channels) against the nearest multiple of a curve (N,), relative to the largest, (N,);
-    and that multiple."""
+    """The error of values (N, channels) against the best-fitting multiple of a curve (N,), relative to the largest
+    value, (N,); and that multiple."""
     size = float(np.sum(curve**2))
     scale = value.T @ curve / size if size > 0.0 else np.zeros(value.shape[1])
     most = np.maximum(np.abs(value).max(0), 1e-6)
@@ -361,7 +366,7 @@ KEPT = (("y", np.array([-1.0, 1.0, 1.0])), ("x", np.array([1.0, -1.0, 1.0])), ("
 
 
 def rotation(probe: Probe) -> Misses:
-    """Isotropic lobes rotate with wo."""
+    """Check that isotropic lobes rotate with wo."""
     if not probe.subject.isotropic:
         return
     angle = np.random.default_rng([probe.seed, 92]).uniform(0.0, 2.0 * np.pi, len(probe.wo))
@@ -379,7 +384,7 @@ def rotation(probe: Probe) -> Misses:
 
 
 def tint(probe: Probe) -> Misses:
-    """The light of a lobe is affine in each albedo, unless values are declared to be otherwise."""
+    """Check that the light of a lobe is affine in each albedo, unless the material declares otherwise."""
     if "linearity" in probe.subject.breaches:
         return
     for name, parameter in probe.subject.parameters.items():
@@ -390,7 +395,7 @@ def tint(probe: Probe) -> Misses:
         )
         for rows, _, o, i in probe.lobes(middle):
             (a, dim), (b, _), (c, _) = (lobes.along(lobes.rows_of(part, rows), i) for part in (low, high, middle))
-            # a lobe that carries next to nothing may be missed at the lower albedo
+            # a lobe that carries almost nothing may be missed at the lower albedo
             off = _relative(c, 0.75 * a + 0.25 * b) * (dim | (c.max(1) > FORWARD))
             if off.max(initial=0.0) > BOUNCED and _bounces(probe, name, rows, i):
                 continue
@@ -398,7 +403,8 @@ def tint(probe: Probe) -> Misses:
 
 
 def _bounces(probe: Probe, name: str, rows: np.ndarray, i: np.ndarray) -> bool:
-    """Whether a lobe's light passes or meets this albedo once, twice, and so on, as between two panes."""
+    """Whether a lobe's light passes through or reflects off this albedo once, twice, and so on, as between two
+    panes."""
     values = []
     for albedo in statistics.STEPS:
         changed = lobes.of(probe.subject.replace(**{name: float(albedo)}), probe.wo, probe.seed)
@@ -407,7 +413,8 @@ def _bounces(probe: Probe, name: str, rows: np.ndarray, i: np.ndarray) -> bool:
 
 
 def float32(probe: Probe) -> Misses:
-    """float32 has the same lobes with the same light, except within 3 degrees of grazing, where an edge may be near."""
+    """Check that float32 has the same lobes with the same light, except within 3 degrees of the horizon, where an edge
+    may be near."""
     rounded = lobes.of(probe.subject, probe.wo, probe.seed, precision="float32")
     for rows, _, o, i in probe.lobes(probe.radiance):
         exact, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
@@ -422,7 +429,8 @@ def float32(probe: Probe) -> Misses:
 
 
 def derivatives(probe: Probe) -> Misses:
-    """d (weight x pdf) / d parameter by autodiff equals differences, at fixed random numbers."""
+    """Check that d (weight x pdf) / d parameter by automatic differentiation equals finite differences, at fixed random
+    numbers."""
     model = probe.subject.model
     if not isinstance(model, BSDF) or probe.subject.stochastic:
         return
@@ -439,7 +447,8 @@ def derivatives(probe: Probe) -> Misses:
     ]
 
     def carried(own: dict[str, Any], shift: Any) -> tuple[Any, Any]:
-        """weight x pdf with parameters moved, each by its own share of a shift, and whether it is a delta sample."""
+        """weight x pdf with each parameter moved by its own multiple of a shift, and whether the sample is a delta
+        sample."""
         bound = model.bind(kind)
         for path, much in own.items():
             bound = binding.shift(bound, path, functools.partial(operator.add, much * shift))
@@ -447,7 +456,7 @@ def derivatives(probe: Probe) -> Misses:
         return kind.vec3(s[1]) * s[2], kind.bool(s[3]) & (s[2] > 0.0)
 
     for leaf in numeric:
-        # all parameters are moved, the others by 0, so that one kernel serves for each of them
+        # all parameters are moved, the others by 0, so that one kernel serves them all
         own = {one.path: dr.opaque(kind.float, float(one is leaf)) for one in numeric}
         exact, lit = _autodiff(functools.partial(carried, own), len(many))
         if not np.isfinite(exact).all():  # another parameter has no derivative, and 0 times NaN is NaN
@@ -458,11 +467,11 @@ def derivatives(probe: Probe) -> Misses:
         yield _miss(np.where(off > SLOPES, off, 0.0), text, many, many * [-1.0, -1.0, 1.0])
 
 
-Carried: TypeAlias = Callable[[Any], tuple[Any, Any]]  # of a shift: values, and whether they exist
+Carried: TypeAlias = Callable[[Any], tuple[Any, Any]]  # maps a shift to values, and whether they exist
 
 
 def _autodiff(carried: Carried, count: int) -> tuple[np.ndarray, Any]:
-    """Derivatives by the shift at 0, (N, 3), and whether the values exist."""
+    """Derivatives with respect to the shift at 0, (N, 3), and whether the values exist."""
     dr = backend.drjit()
     delta = dr.opaque(backend.types("float64").float, 0.0)
     dr.enable_grad(delta)
@@ -474,7 +483,7 @@ def _autodiff(carried: Carried, count: int) -> tuple[np.ndarray, Any]:
 
 
 def _slope_error(exact: np.ndarray, lit: Any, carried: Carried, size: float) -> np.ndarray:
-    """Relative error of derivatives (N, 3) against differences, (N,); 0 where the values have an edge."""
+    """Relative error of derivatives (N, 3) against finite differences, (N,); 0 where the values have an edge."""
     dr, kind, count = backend.drjit(), backend.types("float64"), len(exact)
     step = 1e-4 * size
     ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0, 0.0)]
@@ -484,7 +493,7 @@ def _slope_error(exact: np.ndarray, lit: Any, carried: Carried, size: float) -> 
     before, after = (values[4] - values[1]) / (0.5 * step), (values[2] - values[4]) / (0.5 * step)
     smooth = np.all(exists, axis=0) & np.all(np.abs(wide - narrow) <= 1e-3 * np.abs(narrow) + 1e-7 / size, axis=1)
     differences = narrow + (narrow - wide) / 3.0
-    # a kink at the very value, as where black is clamped above 0: any slope between those of its sides is right
+    # a kink exactly at the value, as where black is clamped above 0: any slope between the one-sided ones is correct
     kink = np.abs(after - before) > 0.01 * (np.abs(after) + np.abs(before))
     between = np.clip(exact, np.minimum(before, after), np.maximum(before, after))
     differences = np.where(kink, between, differences)

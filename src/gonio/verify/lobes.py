@@ -1,7 +1,7 @@
 """The delta lobes of a BSDF, from its own samples: their directions, the light they carry, and their probabilities.
 
 `eval` is 0 for a delta lobe, but `sample` determines it completely: the direction, the probability (`pdf` of a delta
-sample), and the light that it carries, weight x pdf, which does not depend on how it is chosen.
+sample), and the light that it carries, weight x pdf, which does not depend on how the lobe is selected.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from ..ops import Mode, Precision
 from . import directions
 from .subject import Subject
 
-DRAWN = 256  # samples per wo, in equal steps of the number that chooses the lobe
-ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # and near its ends, where lobes of small probability are
+DRAWN = 256  # samples per wo, in equal steps of the random number that selects the lobe
+ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # further values near its ends, where lobes of small probability are
 MAX_LOBES = 6  # per wo
 NEAR = 1e-3  # directions that differ by less belong to one lobe
 
@@ -27,8 +27,8 @@ class Lobes(NamedTuple):
     wi      (N, L, 3)
     weight  (N, L, channels)
     pdf     (N, L) probability
-    eta     (N, L) index on wi's side over that on wo's, as sampled
-    share   (N, L) of the samples, known to about a hundredth
+    eta     (N, L) index on wi's side divided by that on wo's, as sampled
+    share   (N, L) fraction of the samples, accurate to about 0.01
     """
 
     valid: np.ndarray
@@ -40,7 +40,7 @@ class Lobes(NamedTuple):
 
     @property
     def carried(self) -> np.ndarray:
-        """Share of the light in each lobe, (N, L, channels)."""
+        """Light carried by each lobe, weight x pdf, (N, L, channels)."""
         return self.weight * self.pdf[..., None]
 
     def through(self, wo: np.ndarray) -> np.ndarray:
@@ -49,7 +49,7 @@ class Lobes(NamedTuple):
 
 
 def chosen(count: int, seed: int) -> np.ndarray:
-    """Random numbers (n, 3) that choose every lobe of one wo: the first in equal steps and near both ends."""
+    """Random numbers (n, 3) that select every lobe of one wo: the first in equal steps and near both ends."""
     first = np.concatenate([(np.arange(count) + 0.5) / count, ENDS, 1.0 - np.array(ENDS)])
     u = directions.numbers(np.random.default_rng([seed, 31]), len(first))
     u[:, 0] = np.minimum(first, 0.99999994)
@@ -73,7 +73,7 @@ def of(
         first = np.argmax(left, axis=1)
         there = left[rows, first]
         direction = wi[rows, first]
-        # two orders of a grating may leave along one direction: their probabilities distinguish them
+        # two orders of a grating may share a direction: their probabilities distinguish them
         mine = (np.abs(wi - direction[:, None]).max(2) <= NEAR) & (
             np.abs(pdf - pdf[rows, first][:, None]) <= 1e-5 * pdf[rows, first][:, None]
         )
@@ -87,11 +87,11 @@ def of(
 
 
 def along(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The light of all lobes along wi (N, 3), (N, channels), and whether there are any, (N,)."""
+    """The total light of the lobes along wi (N, 3), (N, channels), and whether there are any, (N,)."""
     mine = lobes.valid & (np.abs(lobes.wi - wi[:, None]).max(2) < NEAR)
     return np.sum(lobes.carried * mine[..., None], axis=1), mine.any(1)
 
 
 def rows_of(lobes: Lobes, rows: np.ndarray) -> Lobes:
-    """The lobes of some of the directions wo."""
+    """The lobes of the given rows of wo."""
     return Lobes(*[part[rows] for part in lobes])

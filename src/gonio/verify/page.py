@@ -1,6 +1,7 @@
 """The report as files: report.json, and one self-contained report.html with pictures.
 
-The page needs no network and no script: figures are inline SVG, and colors follow the reader's light or dark setting.
+The page needs neither network nor scripts: figures are inline SVG, and colors follow the reader's light or dark
+setting.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 
 
 def write(report: Report, folder: Path) -> Path:
-    """Write report.json and report.html into a folder, both or none; returns the path of the page."""
+    """Write report.json and report.html into a folder, both or neither; returns the path of the page."""
     contents = {"report.json": json.dumps(report.as_dict(), indent=2) + "\n", "report.html": page(report)}
     files.write_all(files.check_folder(folder), {name: text.encode() for name, text in contents.items()})
     return folder / "report.html"

@@ -1,4 +1,4 @@
-"""The quality of a BSDF's sampling: figures, not verdicts.
+"""The quality of a BSDF's sampling: measurements, not verdicts.
 
     gonio models --quality
     go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples lost, variance 0.013, ..."
@@ -22,9 +22,9 @@ from . import directions
 from .subject import Fault, Subject
 from .subject import of as subject_of
 
-THETA = (6.0, 17.0, 28.0, 39.0, 51.0, 62.0, 73.0, 84.0)  # of wo, degrees: the middles of eight equal parts
-SAMPLES = 1 << 12  # per wo: the share of failed samples is accurate to half a percent
-INNER = ("conductor", "lambert")  # inner materials of those that require some
+THETA = (6.0, 17.0, 28.0, 39.0, 51.0, 62.0, 73.0, 84.0)  # of wo, degrees: the midpoints of eight equal intervals
+SAMPLES = 1 << 12  # per wo: the fraction of failed samples is accurate to half a percent
+INNER = ("conductor", "lambert")  # inner materials for those that require some
 POWER = "importance"
 ROUNDING = 1e-9  # relative variance below which it counts as 0
 
@@ -33,10 +33,10 @@ ROUNDING = 1e-9  # relative variance below which it counts as 0
 class Quality:
     """Means over the directions wo with reflected or transmitted light.
 
-    failed    fraction of failed samples: pdf = 0
-    variance  of the weight, relative to the square of its mean; a failed sample has weight 0
-    cosine    variance of the albedo if wi is sampled by the cosine (on both sides for transmitting materials), over the
-              model's own; None with a delta lobe, which cosine sampling never hits, or without any variance
+    failed    fraction of failed samples, those with pdf = 0
+    variance  variance of the weight, divided by its squared mean; a failed sample has weight 0
+    cosine    variance if wi is cosine-sampled (on both sides for transmitting materials), divided by the model's own;
+              None with a delta lobe, which cosine sampling never hits, or if the model has no variance
     ideal     mean^2 / (mean^2 + variance): efficiency relative to sampling without variance
     """
 
@@ -55,7 +55,7 @@ class Quality:
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """The four figures as text; "" for one that is None."""
+        """The four values as text; "" for one that is None."""
         return (
             f"{100.0 * self.failed:.2g} % of samples lost",
             f"variance {_short(self.variance)}",
@@ -65,7 +65,7 @@ class Quality:
 
 
 def _short(value: float) -> str:
-    """Two digits: 0.013, 31, 4200."""
+    """The value with two significant digits: 0.013, 31, 4200."""
     if value < ROUNDING:
         return "0"
     value = float(f"{value:.2g}")
@@ -79,7 +79,7 @@ def of(subject: Subject, seed: int = 1) -> Quality | None:
             warnings.simplefilter("ignore", GonioWarning)
             return _measured(subject, seed)
     except (Fault, TimeoutError, GonioError):
-        return None  # which the laws report
+        return None  # the laws report the failure
 
 
 def of_models() -> dict[str, tuple[str, Quality | None]]:
@@ -105,7 +105,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
     rows = directions.single(np.repeat(wo, SAMPLES, axis=0))
-    # of power: the factor eta^2 of radiance cancels where light exits, and is not noise
+    # power: the factor eta^2 of radiance cancels where light exits, and is not noise
     s = subject.sample(rows, directions.numbers(rng, len(rows)), POWER, "float32")
     shape = (len(wo), SAMPLES)
     valid = (s.pdf > 0.0).reshape(shape)
@@ -116,7 +116,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
         return None
     spread = np.where(lit, weight.var(1) / np.square(mean), 0.0)
     # The second moment of eval / p_cos under cosine sampling is the mean of eval^2 / (p_cos pdf) under the model's own,
-    # which samples the narrow lobes that a few thousand cosine samples would miss.
+    # which finds the narrow lobes that a few thousand cosine samples would miss.
     eval_ = s.weight.mean(1) * s.pdf
     if subject.stochastic:  # the weight and eval use different random numbers
         eval_ = subject.eval(rows, s.wi, POWER, "float32").mean(1)
@@ -127,7 +127,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     if not ((math.isfinite(model) and math.isfinite(cosine)) or delta):
         return None
     quotient = None
-    if not delta and max(model, cosine) < 1e-6:  # both without variance but for rounding: equal
+    if not delta and max(model, cosine) < 1e-6:  # no variance beyond rounding in either: equal
         quotient = 1.0
     elif not delta and model > ROUNDING:
         quotient = max(cosine, 0.0) / model

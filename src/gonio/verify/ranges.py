@@ -1,4 +1,4 @@
-"""The ranges that the parameters of a BSDF declare, as the axes along which it is judged."""
+"""The ranges that the parameters of a BSDF declare, as the axes along which it is tested."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..material import BSDF, Parameter, tree
 from ..material.parameters import pair_of
 from .subject import Subject
 
-WIDE = 30.0  # ratio of the ends beyond which a range is scanned and sampled in equal ratios
-MARGIN = 0.02  # fraction of a range, if its ends are excluded
-MIN_ALBEDO = 0.01  # of plugins whose failed samples have weight 0: black samples would count as failed
-TURNS = (0.4, 5.8)  # of angles: no rotation, and a whole turn, would hide what is not rotated
-MIN_RATIO = 1e-4  # first value over the last of a range that starts at 0 and is divided in equal ratios
+WIDE = 30.0  # ratio of the ends above which a range is scanned and sampled in equal ratios
+MARGIN = 0.02  # fraction of a range that is left out at an excluded end
+MIN_ALBEDO = 0.01  # for plugins whose failed samples have weight 0: black samples would count as failed
+TURNS = (0.4, 5.8)  # range of angles: no rotation, or a full turn, would hide that something is not rotated
+MIN_RATIO = 1e-4  # first value divided by the last, for a range that starts at 0 and is divided in equal ratios
 
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The range of one parameter; `ratio` if it is divided in equal ratios."""
+    """The range of one parameter; `ratio` is whether it is divided in equal ratios."""
 
     path: str
     low: float
@@ -31,7 +31,7 @@ class Axis:
     kind: str = "float"
 
     def at(self, share: float | np.ndarray) -> Any:
-        """The value at a share of the range, 0 to 1."""
+        """The value at a position in the range, 0 at the low end and 1 at the high end."""
         if not self.ratio:
             return self.low + share * (self.high - self.low)
         low = self.low if self.low > 0.0 else MIN_RATIO * self.high
@@ -40,7 +40,7 @@ class Axis:
 
 
 def axes(subject: Subject) -> list[Axis]:
-    """The parameters that declare a range, including those of inner materials."""
+    """The ranges of all parameters that declare one, including those of inner materials."""
     if not isinstance(subject.model, BSDF):
         return []
     axes_ = []
@@ -53,17 +53,17 @@ def axes(subject: Subject) -> list[Axis]:
             low = max(low, min(MIN_ALBEDO, high))
         if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
             low += MARGIN * (high - low)
-        # fitted widths and powers are spectra too, but no colors
+        # fitted widths and powers are spectra too, but not colors
         color = leaf.parameter.kind == "spectrum" and leaf.parameter.high <= 1.0
         axes_.append(Axis(leaf.path, low, high, ratio, "color" if color else leaf.parameter.kind))
     return axes_
 
 
 def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
-    """Whether an inner material has a delta lobe at this value, while the outer one declares none: it was not written
-    for such lobes."""
+    """Whether an inner material has a delta lobe at this value although the outer one declares none, so that it was not
+    written for such lobes."""
     if _hides_delta(subject.model):
-        return False  # it already does at the given values, which are tested anyway
+        return False  # this is already so at the given values, which are tested anyway
     try:
         return _hides_delta(subject.replace(**{path: value}).model)
     except InputError:
@@ -84,7 +84,7 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
     if not math.isfinite(low):
         return None
     if not math.isfinite(high):
-        # no upper end is declared, and none is assumed: up to the given value
+        # no upper end is declared or assumed: the range ends at the given value
         high = float(np.max(np.asarray(pair_of(value) if parameter.kind == "alpha" else value, float)))
     if not low < high:
         return None

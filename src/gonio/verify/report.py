@@ -21,7 +21,7 @@ SIGNIFICANCE = 0.01  # probability of a false rejection in a whole report
 
 
 def significance(tests: int) -> float:
-    """p-value below which one of that many tests rejects, by Sidak's correction; SIGNIFICANCE if there are none."""
+    """The p-value below which each of `tests` tests rejects, by Sidak's correction; SIGNIFICANCE if there are none."""
     return statistics.sidak(SIGNIFICANCE, tests)
 
 
@@ -32,7 +32,7 @@ class Report:
     tests      statistical tests in the whole report
     threshold  p-value below which one of them rejects, by Sidak's correction
     mended     failures of the baseline that no longer occur, as text
-    unread     shaders that cannot be read, beside others that were judged
+    unread     shaders that could not be read, next to others that were tested
     """
 
     cards: list[Card]
@@ -50,8 +50,8 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        """0 if nothing fails, 1 if something does, 4 if no picture shows any of the failures, 2 if something is
-        unread."""
+        """0 if nothing fails, 1 if something does, 4 if every failure is invisible in pictures, 2 if something could
+        not be read."""
         if self.unread or self.passed:
             return InputError.code if self.unread else 0
         return 4 if all(verdict.grade is Grade.INVISIBLE for verdict in self.failures) else 1
@@ -62,7 +62,7 @@ class Report:
 
     @property
     def untried(self) -> list[str]:
-        """The laws that could not be tried here, or not completely."""
+        """The laws that could not be tested here, or only in part."""
         verdicts = [verdict for card in self.cards for verdict in card.verdicts]
         return list(dict.fromkeys(verdict.law for verdict in verdicts if verdict.status == NOT_TRIED))
 
@@ -109,7 +109,7 @@ class Report:
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
 
     def _holding(self) -> str:
-        """ "all laws hold", or the laws that were judged where not all were; and those that break as declared."""
+        """ "all laws hold", or the laws that hold if not all were tested; and those that are violated as declared."""
         statuses = [(verdict.law, verdict.status) for card in self.cards for verdict in card.verdicts]
         judged = dict.fromkeys(law for law, _ in statuses)
         declared = dict.fromkeys(law for law, status in statuses if status == DECLARED)
@@ -121,7 +121,7 @@ class Report:
         return ", ".join(filter(None, [holding, breaking]))
 
     def __str__(self) -> str:
-        """The same as plain text."""
+        """The report as plain text."""
         from rich.console import Console
 
         out = io.StringIO()
@@ -129,7 +129,7 @@ class Report:
         return out.getvalue()
 
     def _repr_html_(self) -> str:
-        """The same in a notebook."""
+        """The report as HTML for a notebook."""
         from rich.console import Console
 
         console = Console(file=io.StringIO(), width=120, record=True, force_jupyter=False)

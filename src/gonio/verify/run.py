@@ -30,10 +30,10 @@ from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, NOT_APPLICABLE, NOT_TRIED, PASS, Card, DoesNotApply, Finding, Verdict
 
 DEFAULT_SEED = 1
-# steps of judging a subject besides the laws
+# steps of a trial besides the laws
 PLACES, QUALITY = "other values", "sampling quality"
-GUIDES = 2  # other values at which the laws of sampling judge a guide: each takes seconds
-CONFIRMATION = 0.001  # p-value of the test with a second seed, below which a rejection is confirmed
+GUIDES = 2  # other values at which the laws of sampling test a guide: each takes seconds
+CONFIRMATION = 0.001  # p-value with a second seed below which a rejection is confirmed
 Target: TypeAlias = "MaterialLike | Subject"
 Begin = Callable[[str], None]
 
@@ -60,25 +60,25 @@ def verify(
     timeout: float | None = None,
     memory: float | None = None,
 ) -> Report:
-    """Judge a BSDF, or several, by the laws.
+    """Test a BSDF, or several, against the laws.
 
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
-    target    anything that `go.material` takes; or a target's name as `gonio verify` takes it; or a list of them
-    vary      of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
+    target    anything that `go.material` accepts; a target's name as `gonio verify` takes it; or a list of these
+    vary      for a target's name: "alpha=0.01..1" for five values, each with its own card, or "alpha=0.1,0.5"
     quick     a fast first check; `deep` has more samples, more directions, more widths
     seed      of all random numbers, 1 if None; the same seed gives the same report
-    law       a law's name, or several; all where None
+    law       a law's name, or several; all if None
     output    folder for report.html and report.json
     junit     file for JUnit's XML; `sarif` one for SARIF
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
     tolerate  "invisible", "small" or "visible": failures of that grade and below do not fail the report
-    progress  called with the steps done, all steps, and the name of the next
-    isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
-    workers   such processes at a time; the report is the same
-    timeout   seconds per law there, 300 if not given
+    progress  called with the number of steps done, the number of all steps, and the name of the next
+    isolated  whether each BSDF is tested in its own process, which it may crash or block; by default, if it is named
+    workers   number of such processes at a time; the report is the same
+    timeout   seconds per law in such a process, 300 if not given
     memory    GB per process, half of the machine's if not given
-    Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` gives the table of the terminal.
+    Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` shows the table of the terminal.
     Raises InputError for unknown laws and targets. A failing BSDF fails the law and raises nothing.
     """
     seed = DEFAULT_SEED if seed is None else seed
@@ -115,7 +115,7 @@ def _target(given: Target) -> BSDF | Subject | str:
 def _effort(quick: bool, deep: bool) -> str:
     """The key of `EFFORTS`."""
     if quick and deep:
-        raise InputError("quick and deep together", "--quick", "give one of them")
+        raise InputError("both quick and deep given", "--quick", "give one of them")
     return "quick" if quick else "deep" if deep else "default"
 
 
@@ -129,7 +129,7 @@ def _isolable(targets: Sequence[BSDF | Subject | str]) -> bool:
 def _here(
     subjects: list[Subject], laws: list[Law], effort: str, seed: int, progress: Callable[[int, int, str], None] | None
 ) -> Report:
-    """The trial in this process."""
+    """The trial, run in this process."""
     started = time.perf_counter()
     steps, done = len(subjects) * len(laws), 0
     results = []
@@ -158,14 +158,14 @@ class Judged(NamedTuple):
 
     @property
     def p_values(self) -> list[float]:
-        """Those of its statistical tests."""
+        """The p-values of its statistical tests."""
         findings = [asked.what for _, all_ in self.laws for asked in all_ if isinstance(asked.what, Finding)]
         return [trial.p for finding in findings for trial in finding.trials]
 
     def card(self, threshold: float | None, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
-        """The verdicts by a threshold, the severity of failures and their causes; the BSDF is called again for both.
+        """The verdicts, with the severity and the cause of each failure, for which the BSDF is called again.
 
-        threshold  None for that of a separate report
+        threshold  p-value below which a test rejects; None for that of a report on this subject alone
         """
         threshold = significance(len(self.p_values)) if threshold is None else threshold
         answers = []
@@ -197,7 +197,7 @@ def judged(
     """The findings of the laws on a subject.
 
     begin  called with the name of the next law, or of another step
-    skip   steps to skip, and why: the BSDF ended the process there, or did not return
+    skip   steps to skip, and why: the BSDF crashed the process there, or did not return
     result called with a law's name and its preliminary result: its size and cause come with the verdict
     """
     begin(PLACES)
@@ -223,9 +223,9 @@ class Asked(NamedTuple):
 
 
 def _preliminary(all_: list[Asked], declared: bool) -> str:
-    """A law's result at all places, without the threshold of its statistical tests, which depends on all laws.
+    """A law's result at all places, before its statistical tests are decided: their threshold depends on all laws.
 
-    declared  whether a violation of it is declared, whose size the verdict compares
+    declared  whether a violation of the law is declared; the verdict compares its size
     """
     verdicts = [asked.what for asked in all_ if isinstance(asked.what, Verdict)]
     findings = [asked.what for asked in all_ if isinstance(asked.what, Finding)]
@@ -239,7 +239,7 @@ def _preliminary(all_: list[Asked], declared: bool) -> str:
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
-    """The other parameter values; none if the BSDF fails when they are chosen, which the laws will report."""
+    """The other parameter values; none if the BSDF fails while they are chosen, which the laws will report."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", GonioWarning)  # the ends of the ranges are chosen on purpose
         try:
@@ -249,7 +249,7 @@ def _places(one: Subject, effort: str, seed: int) -> list[Place]:
 
 
 def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
-    """The law at the given values, and, unless it fails there, at the others."""
+    """The law's results at the given values and, unless it fails there, at the others."""
     results = []
     if law.samples and one.guided:
         others = others[:GUIDES]
@@ -262,7 +262,7 @@ def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: 
         if isinstance(what, Verdict) and what.failed:
             break  # an exception or a timeout, which would repeat
         if isinstance(what, Finding) and place.why == "given" and (what.problems or not what.figure <= what.tolerance):
-            break  # it fails, or breaks as declared, at the given values
+            break  # it fails, or is violated as declared, at the given values
     return results
 
 
@@ -275,8 +275,8 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
 
 
 def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
-    """The verdict over all places, and its result: that at the given values, unless the law holds there and fails
-    elsewhere. After three failures, no more tests are repeated."""
+    """The verdict over all places, and the result behind it: that at the given values, unless the law holds there and
+    fails elsewhere. After three failures, the remaining places are skipped."""
     first = _verdict(law, all_[0], threshold, seed)
     answer, where = first, all_[0]
     failed: list[Asked] = []
@@ -311,7 +311,7 @@ def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdi
 
 
 def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
-    """A verdict without a figure."""
+    """A verdict without a measured value."""
     command = one.command("--law", law.name)
     return Verdict(law.number, law.name, law.title, status, why=[why], command=command, meaning=law.meaning)
 
@@ -319,7 +319,7 @@ def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
 def decide(
     law: Law, one: Subject, finding: Finding, threshold: float, seed: int, place: Place | None = None
 ) -> Verdict:
-    """The verdict on a finding, by the p-value below which a test rejects."""
+    """The verdict on a finding, with the p-value below which a test rejects."""
     why = list(finding.problems)
     statistical: list[str] = []
     lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
@@ -378,7 +378,7 @@ def decide(
 
 
 def _exceeds(finding: Finding) -> str:
-    """A description of a figure above its tolerance."""
+    """A sentence that states a measured value above its tolerance."""
     figure = finding.shown or f"{finding.figure:.3g}"
     return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
 

@@ -1,7 +1,7 @@
-"""The severity of a violated law: the bias of a picture, and the grade that follows from it.
+"""The severity of a violated law: the resulting bias of a picture, and its grade.
 
-A bias is a share of the reflected light, at the worst direction wo, and averaged over the hemisphere of wo with the
-cosine, which is the average over a ball under an orthographic camera. `estimators` computes that of sampling.
+A bias is a fraction of the reflected light, at the worst direction wo, and averaged over the hemisphere of wo with the
+cosine, which is the average over a sphere seen by an orthographic camera. `estimators` computes the bias of sampling.
 
     bias = severity.between(subject, pair)     bias.worst, bias.average, bias.share, bias.words
 """
@@ -20,11 +20,11 @@ from . import directions
 from .subject import Subject
 
 Kind: TypeAlias = Literal["bias", "lost", "gained", "nan", "noise", "derivatives", "interface"]
-# (wo, wi), (N, 3) each: two values (N, channels) that should be equal, the right one first where it is known
+# maps (wo, wi), (N, 3) each, to two values (N, channels) that should be equal, the correct one first if known
 Pair: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-ACCURACY = 4e-3  # stated of integrals; the division of cells makes them ten times better
-FLOOR = 0.02  # of the brightest channel: an error of a nearly black one is invisible
+ACCURACY = 4e-3  # requested of integrals; the division of cells makes them ten times as accurate
+FLOOR = 0.02  # fraction of the brightest channel: an error of a nearly black one is invisible
 PER_VIEW = 2048  # samples per wo of `by_samples`
 
 
@@ -55,17 +55,17 @@ _KINDS = {"nan": Grade.NAN, "noise": Grade.NOISE, "derivatives": Grade.FITTING, 
 
 @dataclasses.dataclass(frozen=True)
 class Bias:
-    """The effect of a violation on a picture, in shares of the reflected light (1 is all of it).
+    """The effect of a violation on a picture, as fractions of the reflected light (1 is all of it).
 
     worst    at the worst wo, in the worst channel
-    average  over the hemisphere of wo, with the cosine
-    share    of that hemisphere over which it exceeds 1 %
+    average  cosine-weighted over the hemisphere of wo
+    share    fraction of that hemisphere where it exceeds 1 %
     where    the worst wo, or another description of the place
-    kind     "bias", "lost" or "gained" energy; "nan", whose shares are those of directions; "noise", which costs
-             samples and biases nothing; "derivatives", which affects fitting only; "interface", which affects only
-             callers of the methods that `where` names
-    furnace  the average under uniform light, where errors of both signs cancel; None where sampling is not concerned
-    both     the same where light and BSDF samples are combined
+    kind     "bias", "lost" or "gained" energy; "nan", with fractions of directions instead of light; "noise", which
+             costs samples and biases nothing; "derivatives", which affects fitting only; "interface", which affects
+             only callers of the methods that `where` names
+    furnace  the average under uniform light, where errors of opposite sign cancel; None if sampling is not concerned
+    both     the same with light and BSDF samples combined
     """
 
     worst: float
@@ -124,8 +124,9 @@ def percent(share: float) -> str:
 
 
 def views(sides: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """16 directions wo per side, and their shares of the cosine-weighted hemisphere, which sum to 1 over all sides."""
-    # Equal steps of sin^2 theta are equal shares; their middles are not the round angles at which a material may
+    """16 directions wo per side, and their fractions of the cosine-weighted hemispheres of all sides, which sum to
+    1."""
+    # Equal steps of sin^2 theta have equal fractions; their midpoints avoid the round angles at which a material may
     # change. The normal itself, where azimuths are undefined, is left out.
     middles = np.degrees(np.arcsin(np.sqrt((np.arange(12) + 0.5) / 12.0)))
     theta = np.concatenate([[1.0], middles, [82.0, 86.0, 89.5]])
@@ -141,7 +142,7 @@ def summed(
 ) -> Bias:
     """The bias of values with the error `off` where `light` is reflected, (N, channels) each.
 
-    off  signed; without a `kind`, an error with one sign nearly everywhere is lost or gained energy
+    off  signed; without a `kind`, an error of the same sign nearly everywhere is lost or gained energy
     """
     floor = np.maximum(FLOOR * light.max(1, keepdims=True), 1e-3 * light.max(initial=0.0))
     relative = off / np.maximum(np.maximum(light, floor), 1e-12)
@@ -160,7 +161,7 @@ def summed(
 
 
 def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """The bias of one value against another that it should equal: int |a - b| dwi / int |a| dwi.
+    """The bias of a value relative to another that it should equal: int |a - b| dwi / int |a| dwi.
 
     None if nothing is reflected, or if values are random.
     """
@@ -178,7 +179,7 @@ def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """As `between`, over sampled directions, half of them uniform: for differences too ragged for cells."""
+    """As `between`, by Monte Carlo, with half of the directions uniform: for differences too irregular for cells."""
     if subject.stochastic or not subject.steady:
         return None
     wo, mass = views(subject.sides)
@@ -195,7 +196,7 @@ def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def seeds(subject: Subject) -> cubature.Sampler:
-    """The subject's samples as the cubature places its cells by them; those without a unit direction fail."""
+    """A sampler by which the cubature places its cells: the subject's samples; those that are not unit vectors fail."""
 
     def sample(wo: np.ndarray, u: np.ndarray) -> object:
         s = subject.sample(wo, u, precision="float32")

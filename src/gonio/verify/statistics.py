@@ -1,6 +1,6 @@
 """Probabilities of the statistical tests.
 
-`scipy.special` has these tails too, but takes 0.4 s to import, a tenth of a quick trial; the tests compare with it.
+`scipy.special` has these tails too, but takes 0.4 s to import, a tenth of a quick trial; the tests compare against it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def normal_two_sided(z: float) -> float:
 
 
 def binomial_two_sided(count: int, trials: int, probability: float) -> float:
-    """Probability of a count as far from its expectation, on either side: twice the smaller tail."""
+    """Probability of a count at least as far from its expectation, on either side: twice the smaller tail."""
     at_least = _beta(count, trials - count + 1, probability) if count > 0 else 1.0
     at_most = _beta(trials - count, count + 1, 1.0 - probability) if count < trials else 1.0
     return min(1.0, 2.0 * min(at_most, at_least))
@@ -76,7 +76,7 @@ def _fraction(first: float, terms: Callable[[int], tuple[float, float]]) -> floa
 
 
 def sidak(significance: float, tests: int) -> float:
-    """Significance per test, such that the probability of a false alarm in all tests is the given one."""
+    """Significance per test, such that the probability of a false rejection in any of them is the given one."""
     return -math.expm1(math.log1p(-significance) / max(tests, 1))
 
 
@@ -86,12 +86,12 @@ STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 
 def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) -> bool:
-    """Whether values are a sum of powers of an albedo with no negative factor: light that is reflected once, twice, and
-    so on. A color that is decoded, or multiplied twice, has no first power.
+    """Whether values are a power series of an albedo with no negative coefficient: light that is reflected once, twice,
+    and so on. A color that is gamma-decoded, or multiplied twice, has no first power.
 
     rows         values at the albedos STEPS, (7, N)
-    noise        of the values, relative
-    first_power  whether it must occur; light that crosses five panes has none
+    noise        relative noise of the values
+    first_power  whether the first power must occur; light that crosses five panes has none
     """
     moved = rows[-1] > rows[0] * (1.0 + 1e-6) + 1e-9 * rows.max(initial=0.0)
     if not moved.any():
@@ -111,15 +111,15 @@ def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) ->
     return bool(np.median(first[first > 0.0] / (rows[2] - rows[1])[first > 0.0]) > 0.5)
 
 
-LAYERS = 4  # times that light may pass a layer
+LAYERS = 4  # maximum number of times that light passes a layer
 
 
 def is_dimmed(rows: np.ndarray, noise: float) -> bool:
-    """Whether values are a + b r + sum c_k (1 - r)^k of a reflectance r, a + b r and all c_k >= 0: light of a layer,
-    and light below that passes the layer several times. A color that is multiplied twice, r^2, has a < 0.
+    """Whether values are a + b r + sum c_k (1 - r)^k for a reflectance r, with a + b r and all c_k >= 0: the light of a
+    layer, and light from below that passes the layer several times. A color that is multiplied twice, r^2, has a < 0.
 
     rows   values at the reflectances STEPS, (7, N)
-    noise  of the values, relative
+    noise  relative noise of the values
     """
     size = rows.max(0)
     rows = rows[:, size > 1e-6 * rows.max(initial=0.0)]

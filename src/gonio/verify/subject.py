@@ -1,8 +1,8 @@
-"""A BSDF as seen by the laws: its protocol, and the facts that it declares about itself.
+"""A BSDF as the laws see it: its protocol, and the facts that it declares about itself.
 
-A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions it has, and gives a bound copy for
-wavefronts of Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a `Fault` that names
-the line. Nothing here depends on the material.
+A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions that the BSDF supports, and provides a
+copy bound for wavefronts of Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a
+`Fault` that names the line. Nothing here depends on the material.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Subject:
     model     the material or plugin
     target    its name: "conductor", "glass.py:Glass", "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
-    drawn_by  the subject whose samples show where light is, if its own guide would take seconds; else None
+    drawn_by  the subject whose samples show where light is, if a guide of its own would take seconds; else None
     memo      cache of values that are expensive to compute: `estimators`
     """
 
@@ -77,7 +77,7 @@ class Subject:
 
     @functools.cached_property
     def guided(self) -> bool:
-        """Whether it, or a material inside it, has only an `eval`, and is sampled by a guide computed from that."""
+        """Whether it, or a material inside it, has only an `eval` and is sampled by a guide computed from that."""
         return isinstance(self.model, BSDF) and any(one.guided for _, one in tree.walk(self.model))
 
     @property
@@ -87,7 +87,7 @@ class Subject:
 
     @property
     def stochastic(self) -> bool:
-        """Whether `eval` and the weight are random numbers with the right expectation."""
+        """Whether `eval` and the weight are random numbers with the correct expectation."""
         return bool(getattr(self.model, "stochastic", False))
 
     @property
@@ -110,12 +110,12 @@ class Subject:
 
     @property
     def breaches(self) -> dict[str, KnownViolation]:
-        """Laws that it declares to violate."""
+        """The violations of laws that it declares, by the law's name."""
         return self.model.violations()
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """Laws that its kind violates by nature, with the reasons."""
+        """Laws that this kind of material violates by nature, with the reasons."""
         return getattr(self.model, "by_nature", {})
 
     @property
@@ -150,7 +150,7 @@ class Subject:
 
     @functools.cached_property
     def has_density(self) -> bool:
-        """Whether some lobe is not a delta lobe: it has values, or samples with a density."""
+        """Whether some lobe is not a delta lobe: `eval` is positive somewhere, or samples have a density."""
         rng = np.random.default_rng(6)
         wo, wi = (directions.single(directions.uniform(rng, 2048)) for _ in range(2))
         if np.any(self.eval(wo, wi, precision="float32") > 0.0):
@@ -163,7 +163,7 @@ class Subject:
 
     @functools.cached_property
     def steady(self) -> bool:
-        """Whether repeated calls of `eval` and `sample` give the same results, `eval` with fewer pairs too."""
+        """Whether repeated calls of `eval` and `sample` give the same results, for `eval` also with fewer pairs."""
         rng = np.random.default_rng(7)
         wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
         first = self.eval(wo, wi)
@@ -182,12 +182,12 @@ class Subject:
         return Subject(changed, self.target, {**self.settings, **values}, drawn_by=self.drawn_by)
 
     def rebuilt(self) -> Subject | None:
-        """A new object of the same BSDF, which has not been called; None where it cannot be made."""
+        """A new object of the same BSDF that has not been called yet; None if none can be made."""
         make = getattr(self.model, "rebuilt", None)
         return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:
-        """The command line that judges this BSDF."""
+        """The command line that tests this BSDF."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
             # a file of the user's relative to the current folder
@@ -234,16 +234,16 @@ class Subject:
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
 
     def bound(self, precision: Precision = "float32") -> Any:
-        """The model for wavefronts of Dr.Jit arrays of that precision; new values do not recompile kernels."""
+        """The model bound to Dr.Jit arrays of that precision; new parameter values do not recompile kernels."""
         if isinstance(self.model, BSDF):
             return self.model.bind(backend.types(precision))
         return self.model
 
     def power(self) -> Callable[[Direction, Direction], Spectrum]:
-        """`eval` of power (mode "importance") as a function of Dr.Jit vectors of 64 bits, in the best precision."""
+        """`eval` for power (mode "importance") as a function of 64-bit Dr.Jit vectors, in the best precision."""
         own, exact = backend.types(self.best), backend.types("float64")
         model = self.bound(self.best)
-        # without transmission both modes are equal, and one kernel is enough
+        # without transmission the two modes are equal, and one kernel is enough
         mode: Mode = "importance" if self.transmits else "radiance"
 
         def eval(wo: Direction, wi: Direction) -> Spectrum:
@@ -254,7 +254,7 @@ class Subject:
 
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
         if not (self.transmits or method == "sample" or "mode" not in more):
-            more["mode"] = "radiance"  # both modes are equal, and one kernel is enough
+            more["mode"] = "radiance"  # the two modes are equal, and one kernel is enough
         if "mode" in more and not (isinstance(self.model, BSDF) or self._takes_mode(method)):
             del more["mode"]
         return guarded(self.model, method, lambda: getattr(self.model, method)(first, second, **more))
@@ -279,7 +279,7 @@ class Subject:
 
 @dataclasses.dataclass(frozen=True)
 class Described(Subject):
-    """A subject judged in another process: its names, without the model."""
+    """A subject that is tested in another process: its names, without the model."""
 
     heading: str = ""
 
@@ -294,7 +294,7 @@ class Described(Subject):
 
 
 def guarded(model: Any, method: str, run: Any) -> Any:
-    """The result of `run`; an exception inside the model becomes a Fault that names its line."""
+    """The result of calling `run`; an exception inside the model becomes a Fault that names its line."""
     try:
         with watch.calling(model, method) if watch.calling else contextlib.nullcontext():
             return run()
@@ -331,7 +331,7 @@ def _place(model: Any, method: str) -> str:
 
 
 def of(model: Any) -> Subject:
-    """The subject of a Python object: named by its class, with the parameters that are not the default."""
+    """The subject of a Python object, named by its class, with the parameters that differ from their defaults."""
     if isinstance(model, Subject):
         return model
     if not isinstance(model, BSDF):

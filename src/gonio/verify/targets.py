@@ -1,12 +1,12 @@
 """Subjects from the targets that a user names:
 
-conductor                a model's name; a material in it is a name again: --param a=lambert
-glass.py:Glass           a class in a Python file, which runs because the user named it
-glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that name or by its class
-mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS, with its properties as parameters,
+conductor                a model's name; materials inside it are given by name too: --param a=lambert
+glass.py:Glass           a class in a Python file, which is executed because the user named it
+glass.py:my_glass        a Mitsuba plugin that the file registers, by that name or by its class
+mitsuba:roughplastic     a plugin of Mitsuba, or one in a folder of GONIO_PLUGINS, with its properties as parameters,
                          also as in mitsuba:roughplastic(alpha=0.3)
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
-leather.bsdf             a measured material in the RGL's format
+leather.bsdf             a measured material in the RGL format
 chest.gltf:Wood          a material of a glTF file
 gold.json                the result of a fit, or a material in Gonio's notation
 """
@@ -27,7 +27,7 @@ JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
 def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[Subject]:
-    """The subjects that a target names, one for each value that varies.
+    """The subjects that a target names, one per value of the parameter that varies.
 
     settings  "name=value" each
     vary      "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."

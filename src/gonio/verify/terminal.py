@@ -42,7 +42,7 @@ def show_card(card: Card, console: Console) -> None:
         console.print(f"[dim]{escape(line)}[/]")
     console.print()
     ordered = diagnosis.in_order(card.verdicts)
-    same = [v for v in ordered if v.figure is None and v.cause.startswith("follows")]  # the exception of another law
+    same = [v for v in ordered if v.figure is None and v.cause.startswith("follows")]  # the exception is another law's
     for v in ordered:
         if v not in same:
             _explain(v, console)
@@ -118,7 +118,7 @@ def pair(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> dict[str, object]:
 
 
 def show_pair(subject: Subject, wo: np.ndarray, wi: np.ndarray, console: Console) -> None:
-    """Print `pair`."""
+    """Print the values that `pair` returns."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table

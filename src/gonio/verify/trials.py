@@ -1,7 +1,7 @@
-"""A trial in parts, one per target: each is stored once it is done, and other processes or machines may do them.
+"""A trial in parts, one per target: each is stored when it is done, and other processes or machines may compute it.
 
 The threshold of a statistical test depends on the number of tests in the whole report, which is known only at the end.
-A part is therefore tested with the number of its own tests, and again if the difference matters.
+A part is therefore decided first by the number of its own tests, and again if the final number makes a difference.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def trial(
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """As `child.trial`, by the current executor of parts."""
-    # Several processes here share the targets; quick looks end before anything could be lost.
+    """As `child.trial`, computed by the current executor of parts."""
+    # Several local processes split the targets themselves; quick trials end before anything could be lost.
     if not executor.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     began = time.perf_counter()
@@ -76,7 +76,7 @@ def _judged(
     hashes: Mapping[str, str],
     progress: Progress | None,
 ) -> dict[int, list[Card | Unread]]:
-    """The cards of some targets, by number; of a shader that cannot be read the error."""
+    """The cards of some targets, by number; for a shader that cannot be read, the error."""
     ones = [task._replace(items=[task.items[number]]) for number in numbers]
     arguments = [(one, threshold, limit, memory, dict(hashes)) for one in ones]
     keys = [parts.key_of(one, threshold, sorted(hashes.items()), facts.code(), facts.versions()) for one in ones]
@@ -84,7 +84,7 @@ def _judged(
     judged: dict[int, list[Card | Unread]] = {}
     for index, arrays in executor.each(part, arguments, keys, files):
         if index >= 0:
-            # from the user's own folder, or from a worker that executes what it receives anyway
+            # trusted: from the user's own folder, or from a worker that executes whatever it receives anyway
             judged[numbers[index]] = pickle.loads(arrays["cards"].tobytes())
             if progress:
                 target = task.items[numbers[index]].target
@@ -107,7 +107,7 @@ def _files(item: Item) -> list[Path]:
 def part(
     task: Task, threshold: float | None, limit: float | None, memory: float | None, hashes: dict[str, str]
 ) -> Arrays:
-    """One target's cards, tested in a separate process."""
+    """One target's cards, computed in a separate process."""
     with tempfile.TemporaryDirectory(prefix="gonio-verify-") as folder:
         (item,) = task.items
         for name, content in hashes.items():

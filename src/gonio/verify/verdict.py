@@ -1,7 +1,7 @@
 """The findings of laws on a subject, and the verdicts and cards derived from them.
 
-A law returns a `Finding`: a figure, and the p-values of its statistical tests. They are decided once the number of such
-tests in the whole report is known: `gonio.verify.run`.
+A law returns a `Finding`: a measured value, and the p-values of its statistical tests. `gonio.verify.run` decides the
+tests once their number in the whole report is known.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Evidence(Protocol):
     """The observations of a law, for the report's figure."""
 
     def draw(self) -> tuple[str, str]:
-        """(SVG, caption)."""
+        """(SVG, caption) of the figure."""
 
 
 @dataclasses.dataclass
@@ -46,14 +46,14 @@ class Finding:
     """The result of a law.
 
     figure     measured size of the violation; compared with `tolerance`
-    tolerance  largest figure that passes; `reason` is its justification
-    shown      the figure as text, if a number alone is unclear; `allowed` is the tolerance in the same unit
+    tolerance  largest size that passes; `reason` justifies it
+    shown      the size as text, if a number alone is unclear; `allowed` is the tolerance in the same unit
     worst      description of the worst case; `at` is its pair of directions, for the command that repeats it
     settings   parameter values of the worst case, if they are not the given ones
-    problems   violations that fail the law regardless of the figure
-    untried    why some of it could not be tried here, so that the law cannot pass; "" if all was tried
+    problems   violations that fail the law regardless of the size
+    untried    why part of the law could not be tested here, so that it cannot pass; "" if all was tested
     notes      further information
-    breach     size to compare with a declared violation, if that is not the figure
+    breach     size to compare with a declared violation, if that is not `figure`
     evidence   data of the report's figure
     details    data for the law's own `bias` and `ratios`
     """
@@ -119,12 +119,12 @@ class Verdict:
     @property
     def cause_in_words(self) -> str:
         """The probable mistake of a failure, or that none is known."""
-        unknown = self.failed and self.figure is not None  # an exception tells itself
+        unknown = self.failed and self.figure is not None  # an exception explains itself
         return self.cause or ("not found: it is none of the known mistakes" if unknown else "")
 
     @property
     def excused(self) -> bool:
-        """Whether it violates the law, and fails no report."""
+        """Whether it violates the law without failing the report."""
         return self.status in (KNOWN, TOLERATED)
 
     def as_dict(self) -> dict[str, object]:
@@ -134,7 +134,7 @@ class Verdict:
 
 
 class Unread(NamedTuple):
-    """A target among several that cannot be read, so that no law judges it, and the error.
+    """One of several targets that could not be read, so that no law tests it, and the error.
 
     where  the file and line, or what else the error names
     """
@@ -145,7 +145,7 @@ class Unread(NamedTuple):
     hint: str
 
     def words(self) -> str:
-        """The error in a line."""
+        """The error in one line."""
         place = f"{self.where}: " if self.where else ""
         return f"{place}{self.what}" + (f" ({self.hint})" if self.hint else "")
 
@@ -156,7 +156,7 @@ class Card:
 
     covered    the parameter values at which it was tested
     notes      its behavior: what it printed, what ended its process
-    quality    of its sampling; None if it could not be measured
+    quality    quality of its sampling; None if it could not be measured
     p_values   p-values of its statistical tests, and `threshold` below which they rejected
     """
 

@@ -24,8 +24,8 @@ MAX_PERCENT = 50.0  # upper limit of the scales of differences and of errors
 
 
 def draw(capture: Capture) -> Drawing:
-    """The first photograph of a sample with the fit to it and the difference, the fate of its pixels, and over theta_h
-    and theta_d the samples' values and their standard errors; gray without samples."""
+    """The first photograph of a sample, the fit to it, their difference, and the classification of its pixels; and the
+    values and standard errors of the samples over theta_h and theta_d, gray where there are none."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -77,7 +77,7 @@ def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
     image = axes[2].imshow(off, cmap="RdBu_r", vmin=-end, vmax=end, interpolation="nearest")
     axes[2].set_title("difference", fontsize=12)
     axes[2].set_axis_off()
-    for axis in axes:  # the box of these pixels, with a margin
+    for axis in axes:  # crop to the box of these pixels, with a margin
         axis.set_xlim(column.min() - 4, column.max() + 4)
         axis.set_ylim(row.max() + 4, row.min() - 4)
     assert axes[2].figure is not None
@@ -89,7 +89,7 @@ def _photograph(axis: Axes, shot: Photograph, title: str) -> None:
 
 
 def _picture(axis: Axes, radiance: Floats, white: float, title: str) -> None:
-    """Linear radiance encoded for a screen; light gray without a value."""
+    """Linear radiance encoded as sRGB; light gray where there is no value."""
     shown = np.clip(np.nan_to_num(radiance / white, nan=0.8), 0.0, 1.0) ** (1.0 / 2.2)
     axis.imshow(shown, interpolation="nearest")
     axis.set_title(title, fontsize=12)
@@ -124,7 +124,7 @@ def _values(axis: Axes, capture: Capture) -> None:
 
 
 def _cube_root_bar(axis: Axes, white: float) -> None:
-    """The scale of f: brightness is its cube root, in which dark lobes and peaks are both seen."""
+    """The color scale of f. Brightness is its cube root, which shows both dark lobes and peaks."""
     from matplotlib.cm import ScalarMappable
 
     steps = np.linspace(0.0, 1.0, 5)

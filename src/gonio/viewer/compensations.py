@@ -1,4 +1,4 @@
-"""`gonio compensation` and `go.compensation`: the ways to restore the light lost by single scattering, compared."""
+"""`gonio compensation` and `go.compensation`: compare methods that restore light lost by single-scattering models."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ SAMPLES = 200_000
 
 @public
 def compensation(*models: MaterialLike, output: str | Path | None = None, samples: int = SAMPLES) -> dict[str, Any]:
-    """Compare the ways to restore the light lost by single-scattering models: furnace, error, reciprocity, cost.
+    """Compare methods that restore light lost by single-scattering models: furnace, error, reciprocity, cost.
 
         go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
 
-    models   materials to compare too: one with a base as a method, any other as a base
+    models   more materials to compare: one with a base as a method, any other as a base
     output   folder for a picture and JSON; None writes nothing
     samples  random walks per point of the reference
-    Returns what `gonio compensation --json` prints: `albedo` [material][method] over `roughness` and `mu`, `rms` to
-    the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`, and the `cost`.
+    Returns the dictionary that `gonio compensation --json` prints: `albedo` [material][method] over `roughness` and
+    `mu`, its `rms` distance to the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`,
+    and the `cost`.
     """
     folder = None if output is None else files.check_folder(Path(output))
     own = [material(model) for model in models]

@@ -40,15 +40,15 @@ from .variations import Variation, parse_variation, variation, with_cell
 
 __all__ = ["Sheet", "Variation", "draw", "parse_variation", "render_sheet", "study", "variation", "with_cell"]
 
-MAX_CELLS = 256  # more pictures are hard to compare, and usually a typing error
+MAX_CELLS = 256  # more pictures are hard to compare, and usually the result of a typo
 
 
 @dataclass(frozen=True)
 class Sheet:
     """The result of a study; `cells` are the values of each picture, in the order of `itertools.product`.
 
-    size      of each picture, pixels
-    exposure  of all of them, stops
+    size      width and height of each picture, pixels
+    exposure  exposure of all pictures, stops
     output    file that the sheet was written to, or None
     """
 
@@ -160,7 +160,7 @@ def render_sheet(
         heading = encodable(title or _scene_name(request.scene))
         subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
         drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
-        if output is not None:  # in here: where it fails, the same command goes on from the pictures
+        if output is not None:  # inside, so that the pictures remain stored if writing fails
             drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)

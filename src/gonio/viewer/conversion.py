@@ -20,10 +20,10 @@ class Conversion:
     """A file that has been written in another format.
 
     output   the file
-    summary  what it is, in one line
-    notices  what the format does not hold, and what was clipped
-    facts    of pictures `exposure` (stops, or None), of tables `kind`, `resampled`, `error`, `size` (bytes), and the
-             parts of the error, `resolution` and `reciprocity`
+    summary  a one-line description
+    notices  properties that the format cannot hold, and values that were clipped
+    facts    for pictures `exposure` (stops, or None); for tables `kind`, `resampled`, `error`, `size` (bytes), and the
+             components of the error, `resolution` and `reciprocity`
     """
 
     output: Path
@@ -51,10 +51,11 @@ def convert(
     source    a picture, a file of measured values, one that describes a material (.gltf, .mtlx, .json), or a material
               as a text, such as "openpbr(base_metalness=1)" or FILE.py:CLASS
     output    the file to write
-    exposure  of a .png: stops, or "auto"
+    exposure  for a .png: stops, or "auto"
     phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
               nonreciprocal values; by default that of the table if it has such cells, otherwise 180
-    Warns (GonioWarning) of what the format does not hold. Raises InputError for formats that cannot be read or written.
+    Warns (GonioWarning) about properties that the format cannot hold. Raises InputError for formats that cannot be read
+    or written.
     """
     result = converted(str(source), Path(output), exposure, phi)
     for notice in result.notices:
@@ -89,7 +90,7 @@ def converted(
 
 
 def _table_summary(table: compare.Converted) -> str:
-    """What was written, its error, and the causes of it."""
+    """A summary of what was written, its error, and the causes of the error."""
     how = "resampled" if table.resampled else "the same values"
     text = f"{table.path}  {table.size / 1e6:.2f} MB, {table.kind}, {how}: {100.0 * table.error:.2g} % off on average"
     if table.reciprocity:

@@ -1,4 +1,4 @@
-"""Scattering by a material as numbers to plot: values and density in the plane of incidence, albedo.
+"""Scattering by a material as numbers to plot: values and density in the plane of incidence, and albedo.
 
 `wo`, toward the viewer, is tilted to the left by theta_o; angles to the right of the normal, on the side of the mirror
 direction, are positive.
@@ -22,8 +22,8 @@ SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, 
 
 @dataclass(frozen=True)
 class Curve:
-    """One view: values and density over the angle of wi (degrees), and the reflectance of delta lobes. The former are
-    nan where the material's values are not known."""
+    """One view: values and density over the angle of wi (degrees), and the reflectance of delta lobes. Values and
+    density are nan where they are not known."""
 
     view: float
     angles: Floats
@@ -47,7 +47,7 @@ class Curve:
 
     @property
     def full(self) -> bool:
-        """Whether it extends below the surface."""
+        """Whether the curve extends below the surface."""
         return bool(self.angles[-1] > 90)
 
     def side(self, side: int) -> NDArray[np.bool_]:

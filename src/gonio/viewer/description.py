@@ -1,4 +1,4 @@
-"""`gonio info` and `go.info`: what a file holds."""
+"""`gonio info` and `go.info`: the contents of a file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ACCEPTED = frozenset({Kind.TABLE, Kind.DOCUMENT, Kind.TABLES})
 
 @public
 def info(path: str | Path) -> dict[str, Any]:
-    """What a file holds, as JSON has it: measured values, described materials, or baked tables.
+    """The contents of a file, as a dictionary for JSON: measured values, described materials, or baked tables.
 
         go.info("gold.binary")["albedo"]
         go.info("chest.gltf")["materials"]      # name -> notation
@@ -28,7 +28,7 @@ def info(path: str | Path) -> dict[str, Any]:
 
 
 def described(path: str, location: str) -> tuple[Kind, dict[str, Any]]:
-    """What a file is, and what it holds; `location` is the place of an error about the path."""
+    """The kind of a file, and its contents; `location` is the place named in errors about the path."""
     kind = operands.kind_of(path, ACCEPTED, location)
     if kind is Kind.DOCUMENT:
         return kind, {"path": path, "materials": documents.described(path)}

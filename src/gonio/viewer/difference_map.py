@@ -1,4 +1,4 @@
-"""Where two materials differ: a map over the angles of view and light, and both albedos."""
+"""Where two materials differ: a map over the angles of view and light, and the two albedos."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .figures import Drawing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-STEPS = 180  # cells along each axis: half a degree of view, a degree of light
-_LONGEST = 44  # letters of a name
+STEPS = 180  # cells along each axis: half a degree of view, one degree of light
+_LONGEST = 44  # characters of a name
 
 
 def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDArray[np.float64]:
     """(f_A - f_B) / max(f_A, f_B) in the plane of incidence, over theta_o (rows, 0 first) and theta_i from -90 to 90
-    degrees (columns, the mirror's side positive); nan if one is not known, or both are 0."""
+    degrees (columns, positive on the side of the mirror direction); nan if one is not known, or both are 0."""
     view = (np.arange(steps) + 0.5) / steps * 90.0
     light = (np.arange(steps) + 0.5) / steps * 180.0 - 90.0
     theta_o, theta_i = (np.radians(angles.ravel()) for angles in np.meshgrid(view, light, indexing="ij"))
@@ -35,7 +35,7 @@ def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDAr
 
 
 def draw(name_a: str, name_b: str, a: BSDF, b: BSDF, compared: Difference) -> Drawing:
-    """The map in the plane of incidence, red where A is brighter, and the albedos over the angle of view."""
+    """The map in the plane of incidence, red where A is brighter, and the albedos as functions of the viewing angle."""
     matplotlib = figures.load_matplotlib()
 
     title = f"{_short(name_a)} (A) and {_short(name_b)} (B)"

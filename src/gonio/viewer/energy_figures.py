@@ -1,4 +1,4 @@
-"""Figures of energy: baked tables with axes, and a comparison of compensations."""
+"""Figures of energy: baked tables with axes, and a comparison of compensation methods."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from . import figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SLICES = 4  # of a table with three axes, at most
+SLICES = 4  # most slices of a table with three axes
 
 
 class _Panel(NamedTuple):
@@ -31,7 +31,7 @@ class _Panel(NamedTuple):
 def draw_tables(folder: str | Path) -> figures.Drawing:
     """Plot a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
 
-    Slices of a third axis are placed side by side; E_avg, and anything that depends on the cosine alone, is a curve.
+    Slices of a third axis are placed side by side; E_avg, and anything that depends only on the cosine, is a curve.
     """
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
@@ -60,7 +60,7 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
 
 
 def _levels(baked: Baked) -> Figure:
-    """The levels of an environment encoded for a screen, with an exposure at which a twentieth of the map is white."""
+    """The levels of an environment encoded as sRGB, with an exposure at which a twentieth of the map is white."""
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -97,7 +97,7 @@ def _title(manifest: dict[str, Any]) -> str:
 
 
 def _rows(baked: Baked, name: str) -> list[list[_Panel]]:
-    """The panels of one table, a row per distinct channel: slices of a third axis."""
+    """The panels of one table: a row per distinct channel, with slices of a third axis side by side."""
     values, dims = baked.arrays[name], baked.manifest["dims"][name]
     if not dims:
         return []
@@ -142,7 +142,7 @@ def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
 
 
 def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
-    """Write compensation.png and compensation.json to a folder: albedo against roughness, and distance to the walk."""
+    """Write compensation.png and compensation.json to a folder: albedo over roughness, and distance to the walk."""
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -151,7 +151,7 @@ def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
         axes = figure.subplots(2, len(comparison["albedo"]), sharey="row", squeeze=False)
         _compare(comparison, axes)
         entries: dict[str, Any] = {}
-        for one in axes[0]:  # methods may apply to some materials only
+        for one in axes[0]:  # some methods apply to some materials only
             entries |= dict(zip(*reversed(one.get_legend_handles_labels()), strict=True))
         figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=4, fontsize=12)
         picture = io.BytesIO()
@@ -161,7 +161,7 @@ def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
 
 
 def _compare(comparison: dict[str, Any], axes: Any) -> None:
-    """One column per material: albedo by every method above, its distance to the walk below."""
+    """One column per material: above, the albedo by every method; below, its distance to the random walk."""
     roughness = comparison["roughness"]
     middle = len(comparison["mu"]) // 2
     colors = {m: f"C{index}" for index, m in enumerate(comparison["cost"])}
@@ -170,7 +170,7 @@ def _compare(comparison: dict[str, Any], axes: Any) -> None:
         by_method = {m: np.asarray(v) for m, v in comparison["albedo"][name].items()}
         reference = by_method["random walk"]
         for method, value in by_method.items():
-            order = list(colors).index(method)  # curves that coincide: the first is the widest, and dashes lie on top
+            order = list(colors).index(method)  # if curves coincide, the first is the widest and dashed ones lie on top
             line = {
                 "color": colors[method],
                 "linestyle": ("-", (0, (6, 3)), (0, (3, 3)), (0, (1, 2)))[max(order - 1, 0) % 4],

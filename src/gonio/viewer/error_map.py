@@ -1,4 +1,4 @@
-"""`gonio compare` and `go.compare`: the difference between two pictures, or two materials, and where it is."""
+"""`gonio compare` and `go.compare`: the difference between two pictures or two materials, and where it is."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def compare(
     output: str | Path | None = None,
     encoding: str = "srgb",
 ) -> metrics.Comparison | Difference:
-    """Measure the difference of a picture from another, or of a material from another.
+    """Measure the difference between two pictures or two materials.
 
         go.compare("mine.exr", "reference.exr", metric="flip", tolerance=0.05).passed
         go.compare(go.OrenNayar(sigma=0.5), "lambert").largest
@@ -70,9 +70,9 @@ def compare(
     tolerance        the largest value that passes
     output           file of a map of the error, .png, .pdf or .svg; None writes nothing
     encoding         of .png files: "srgb", or "linear" for data such as a table
-    Returns a Comparison with all metrics and whether it passed; for materials, a Difference: where f and the albedo
-    differ. FLIP is that of high dynamic range, unless a picture is a .png. Raises InputError for pictures that cannot
-    be read or differ in size, and for arguments that are neither pictures nor materials.
+    Returns a Comparison with all metrics and whether it passed; for materials, a Difference, which says where f and the
+    albedo differ. FLIP is HDR-FLIP, unless a picture is a .png. Raises InputError for pictures that cannot be read or
+    differ in size, and for arguments that are neither pictures nor materials.
     """
     if output is not None:
         figures.check_output(Path(output))
@@ -92,7 +92,7 @@ def compare(
 def compare_materials(
     test: Any, reference: Any, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
-    """As `compare`, for two materials, both of which may be text."""
+    """As `compare`, for two materials, either of which may be text."""
     named = []
     for one in (test, reference):
         if not _is_material(one):
@@ -107,7 +107,7 @@ def compare_materials(
 
 
 def _is_material(given: object) -> bool:
-    """Whether a material is given; a word that may be a picture is one."""
+    """Whether the argument is a material; text that may name a picture counts as a picture."""
     if not isinstance(given, str | Path):
         return is_material(given)
     return operands.readings(str(given))[0] in operands.MATERIALS

@@ -12,17 +12,17 @@ from . import families, manual
 
 @dataclass(frozen=True)
 class Explanation:
-    """One page, or one for each member that has the name; `print` gives their text."""
+    """One page, or one per member with the given name; `print` shows their text."""
 
     pages: tuple[manual.Page | families.MemberPage | families.FamilyPage, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON: the first page, with the others as `also`."""
+        """Dictionary for JSON: the first page, with the others as `also`."""
         first, *others = (page.as_dict() for page in self.pages)
         return {**first, "also": others} if others else first
 
     def text(self, width: int = families.WIDTH) -> str:
-        """For a terminal of so many columns."""
+        """The text for a terminal with `width` columns."""
         return "\n\n".join(page.text(width) for page in self.pages)
 
     def __str__(self) -> str:
@@ -38,7 +38,7 @@ def explain(name: MaterialLike = "") -> Explanation:
 
     name  a material, as `go.material` takes it, a distribution of normals, a masking term, an integrator, a law, ...;
           or a family, such as "fresnel", whose members are listed; "" lists the families
-    Raises InputError, with the nearest known name.
+    Raises InputError, with the closest known name, for an unknown one.
     """
     if not name:
         return Explanation((families.index(),))

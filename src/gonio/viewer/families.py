@@ -47,11 +47,11 @@ HOMES = (
 class MemberPage:
     """The description of a member.
 
-    kind      "masking term"
-    doc       its docstring
+    kind      kind of the family's members, such as "masking term"
+    doc       docstring of the member
     formulas  its own methods: name -> first line of the docstring
     use       how it is used
-    source    file
+    source    file that defines it
     """
 
     name: str
@@ -92,7 +92,7 @@ class FamilyPage:
 
 
 def families() -> dict[str, tuple[Family[Any], Home]]:
-    """Every family by the kind of its members, "masking term"."""
+    """Every family by the kind of its members, such as "masking term"."""
     pairs = ((getattr(import_module(home.module), home.base).family, home) for home in HOMES)
     return {family.kind: (family, home) for family, home in pairs}
 
@@ -106,7 +106,7 @@ def index() -> FamilyPage:
 
 
 def pages(name: str) -> list[MemberPage | FamilyPage]:
-    """The pages for a name: one per member of that name, or that of a family. InputError for an unknown name."""
+    """The pages for a name: one per member of that name, or that of a family. Raises InputError for an unknown name."""
     if outside.names_code(name):
         return [_of_code(name)]
     known = families()
@@ -126,7 +126,7 @@ def _hint(name: str, names: list[str]) -> str:
 
 
 def _of_code(name: str) -> MemberPage:
-    """The page of a class in a file that is a member of a family, or could be."""
+    """The page of a class in a file that is, or could be, a member of a family."""
     cls = outside.thing(name, where="MODEL")
     home = next((home for home in HOMES[1:] if isinstance(cls, type) and issubclass(cls, _base(home))), None)
     if home is None:
@@ -152,7 +152,7 @@ def _page(member: Any, home: Home, called: str = "") -> MemberPage:
     source = f"src/{cls.__module__.replace('.', '/')}.py"
     if not cls.__module__.startswith("gonio."):
         source = str(inspect.getsourcefile(cls))
-    kind = _base(home).family.kind  # type: ignore[attr-defined]  # of a family's base
+    kind = _base(home).family.kind  # type: ignore[attr-defined]  # the base class has a family
     return MemberPage(
         name,
         kind,
@@ -169,7 +169,7 @@ def _aliases(kind: str, family: Family[Any]) -> set[str]:
 
 
 def _key(name: str) -> str:
-    """A name in singular, without the separators between its words."""
+    """A name in the singular, without separators between its words."""
     return "".join(letter for letter in name.lower() if letter.isalnum()).removesuffix("s")
 
 

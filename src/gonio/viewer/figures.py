@@ -47,9 +47,9 @@ STYLE: Any = {  # Matplotlib types its keys one by one
 
 
 def load_matplotlib() -> ModuleType:
-    """Matplotlib, with the user's settings and not those of the current folder.
+    """Matplotlib, with the user's settings instead of those of the current folder.
 
-    On import it reads a file `matplotlibrc` there before any other; such a file may name modules and programs to run.
+    On import, Matplotlib prefers a file `matplotlibrc` there; such a file may name modules and programs to run.
     """
     hidden = "matplotlib" not in sys.modules and os.path.exists("matplotlibrc")
     with contextlib.chdir(os.sep) if hidden else contextlib.nullcontext():
@@ -59,7 +59,7 @@ def load_matplotlib() -> ModuleType:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure: a notebook shows it, `save` writes it.
+    """A figure, which a notebook shows and `save` writes.
 
     path  the file that it was written to, or None
     """
@@ -70,7 +70,7 @@ class Drawing:
     path: Path | None = None
 
     def save(self, path: str | Path) -> Drawing:
-        """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
+        """Write it as .png, .pdf or .svg, completely or not at all; returns the drawing with that path."""
         suffix = _suffix(Path(path))
         return replace(self, path=files.write_whole(path, self._file(suffix[1:])))
 
@@ -78,11 +78,11 @@ class Drawing:
         return self._file("png")
 
     def _file(self, kind: str) -> bytes:
-        """The figure in a format, the same bytes each time."""
+        """The figure in a file format; the bytes are the same each time."""
         matplotlib = load_matplotlib()
         from matplotlib.text import Text
 
-        for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse
+        for text in self.figure.findobj(Text):  # file names may contain invalid text, which fonts reject
             text.set_text(encodable(text.get_text()))
         name = "Subject" if kind == "pdf" else "Description"
         no_date = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
@@ -94,7 +94,7 @@ class Drawing:
 
 
 def check_output(path: Path) -> Path:
-    """Raise InputError where no figure can be written to `path`: before anything is computed."""
+    """Raise InputError if no figure can be written to `path`, before anything is computed."""
     _suffix(path)
     files.check_file(path)
     return path
@@ -109,7 +109,7 @@ def _suffix(path: Path) -> str:
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """An empty figure with a heading, its size in inches; no window, whatever backend the notebook uses."""
+    """An empty figure with a heading, its size in inches; it opens no window, whatever the backend."""
     load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -123,7 +123,7 @@ def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
 
 
 def legend_size(handles: Sequence[Artist], width: float) -> tuple[int, float]:
-    """The number of columns of a legend along the lower edge, `width` inches wide, and its height in inches."""
+    """The number of columns and the height, in inches, of a legend along the lower edge that is `width` inches wide."""
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = min(len(handles), max(1, int(width / (0.75 + 0.075 * longest))))
     return columns, 0.3 + 0.2 * math.ceil(len(handles) / columns)

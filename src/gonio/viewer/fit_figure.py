@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Values = Callable[[Floats, Floats], Floats]
-SIZE = 160  # pixels of a sphere, and of an image over theta_h and theta_d
+SIZE = 160  # size in pixels of a sphere, and of an image over theta_h and theta_d
 LIGHT = np.array([-0.5, 0.6, 0.62])  # direction toward the light of the spheres
 SLICES = (20.0, 60.0)  # angles of view, degrees
 

@@ -1,4 +1,4 @@
-"""`gonio plot fresnel`: reflectances over the angle, from both sides, and the errors of the approximations."""
+"""`gonio plot fresnel`: reflectances over angle, from both sides, and the errors of approximations."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Index(NamedTuple):
 
 
 def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> Drawing:
-    """The figure of one interface: of an index eta + i k, or of a metal by name at red, green and blue.
+    """The figure of one interface: an index eta + i k, or a metal by name at red, green and blue.
 
     Raises InputError for an impossible index, and for an unknown metal.
     """
@@ -143,7 +143,7 @@ def _phases(axes: Axes, lines: Sequence[Index]) -> None:
 
 
 def _differences(axes: Axes, lines: Sequence[Index]) -> None:
-    """The phase difference of s and p: linear light becomes elliptic, circular at 90 degrees."""
+    """The phase difference of s and p, by which linearly polarized light becomes elliptical, or circular at 90 degrees."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         retardance = np.degrees(np.unwrap(np.angle(-at.r_p * np.conj(at.r_s))))
@@ -173,7 +173,7 @@ def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
         angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud", rasterized=True
     )
     levels = np.linspace(-top, top, 16)  # none at 0, where rounding errors would draw extra lines
-    # without labels, which would lie upon one another in the corners: the color bar has the values
+    # without labels, which would overlap in the corners; the color bar has the values
     axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
     for line in lines:
         axes.axhline(line.eta, color=line.color, linewidth=1.2, linestyle=figures.DASHES)
@@ -208,7 +208,7 @@ def _legend(lines: Sequence[Index]) -> list[Artist]:
 
 
 def approximation(name: str, degrees: Reals, index: Index) -> Reals:
-    """R of a Fresnel kind over angles, from the side given by eta."""
+    """R of a Fresnel term at the given angles, from the side given by eta."""
     types = backend.types("float64")
     kind = fresnel.kind(name)
     cos, eta = types.float(np.maximum(np.cos(np.radians(degrees)), 0.0)), types.float(index.eta)

@@ -14,11 +14,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
-MAX_CONNECTIONS = 200  # that have not sent a request yet
+MAX_CONNECTIONS = 200  # connections that have not sent a request yet
 REQUEST_SECONDS = 10.0  # limit for the headers of a request to arrive
 MAX_ANSWERS, ANSWER_SECONDS = 32, 120.0  # pages being sent at once, and the limit for each: 9 kB/s
 CLOSE_SECONDS = 2.0  # for the last messages to be sent
-READ_BYTES = 16 << 10  # per read of a socket
+READ_BYTES = 16 << 10  # bytes per read of a socket
 MAX_FRAGMENTS = 1 << 14  # per message: 4 KiB each in the largest upload; browsers send far longer ones
 MAX_CONTROLS = 10_000  # pings and pongs per connection: one per 20 s for two days
 FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
@@ -63,9 +63,9 @@ class AccessControl:
 
 
 class GuardedHTTP(H11Protocol):
-    """HTTP that ends connections whose request does not arrive, or whose answer is not received in time.
+    """HTTP that ends connections whose request does not arrive, or whose answer is not received, in time.
 
-    If there are too many of one kind, the oldest is ended.
+    If there are too many of either kind, the oldest is ended.
     """
 
     waiting: dict[GuardedHTTP, asyncio.TimerHandle]  # for requests; `Server` sets these two, one pair per server
@@ -77,7 +77,7 @@ class GuardedHTTP(H11Protocol):
 
     def handle_events(self) -> None:
         super().handle_events()
-        if self.transport.get_protocol() is not self:  # a WebSocket now
+        if self.transport.get_protocol() is not self:  # it is now a WebSocket
             self._rest()
         elif self.cycle is not None and self not in self.answering:
             self._rest()
@@ -106,9 +106,8 @@ class GuardedHTTP(H11Protocol):
 class GuardedSocket(WebSocketsSansIOProtocol):
     """A WebSocket with limits that uvicorn lacks.
 
-    Its connection ends with its session, even if the other side reads nothing any more, and after an invalid
-    handshake. Frames that are not messages are limited too, since they cost time and memory: empty fragments, pings,
-    pongs.
+    Its connection ends with its session, even if the peer no longer reads, and after an invalid handshake. Frames that
+    are not messages (empty fragments, pings, pongs) are limited too, since they cost time and memory.
     """
 
     controls = 0
@@ -119,7 +118,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         transport.max_size = READ_BYTES  # type: ignore[attr-defined]
 
     def connection_lost(self, exc: Exception | None) -> None:
-        while not self.queue.empty():  # requests of a page that has disconnected
+        while not self.queue.empty():  # drop requests of a page that has disconnected
             self.queue.get_nowait()
         super().connection_lost(exc)
 

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STEPS = 180  # pixels along each axis
-ACROSS = 4  # panels in a row
-LONGEST = 32  # letters of a panel's title
+ACROSS = 4  # most panels in a row
+LONGEST = 32  # most characters in a panel's title
 
 
 def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
-    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, at which all pairs are above the
-    surface; nan if it is not known."""
+    """f over theta_d (rows, 90 degrees first) and theta_h (columns); nan if it is not known. At phi_d = 90 degrees, all
+    pairs are above the surface."""
     middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
     theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
     wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))

@@ -1,4 +1,4 @@
-"""A lab scene's materials on balls, under its light, for `gonio view SCENE`."""
+"""The materials of a lab scene on balls, under its light, for `gonio view SCENE`."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
     """The materials of a lab scene on balls, under its light.
 
     Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
-    directional light from the lamp's direction, as seen from the point that the camera looks at, with the lamp's
-    unoccluded irradiance there. An environment, and a lamp that surrounds that point, becomes an environment. A texture
-    cannot be shown by sliders: it is replaced by its parameter's default, with a note.
+    directional light with the lamp's direction and unoccluded irradiance at the point that the camera looks at. An
+    environment, or a lamp that surrounds that point, becomes an environment. A texture cannot be shown by sliders, so
+    it is replaced by its parameter's default, with a note.
 
     Raises InputError as the reader of scenes does, including for a file outside the scene's folder.
     """
@@ -117,8 +117,8 @@ def _code(bsdf: BSDF) -> tuple[object, ...]:
 
 
 def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
-    """A ball per material, labeled by its distinguishing values; it stores those that differ from the first
-    material."""
+    """One ball per material, labeled by its distinguishing values; it stores the values that differ from the first
+    material's."""
     values = [
         {leaf.path: _listed(leaf.value) for leaf in tree.leaves(member) if leaf.parameter.numeric} for member in members
     ]

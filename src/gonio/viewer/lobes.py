@@ -22,8 +22,8 @@ _RADIUS = 1.45  # radius of a panel's disk, inches
 
 
 def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """The figure. `panels` has a list for each view, with the curve of each material in the order of the labels.
-    `known` states the angles at which values are known.
+    """The figure. `panels` has one list per view, with the curve of each material in the order of the labels. `known`
+    states the angles at which values are known.
 
     Each panel has its own scale, since peaks differ by orders of magnitude.
     """
@@ -113,7 +113,7 @@ def _peak(curve: Curve, side: int) -> float:
 
 
 def _lobe(axes: Axes, curve: Curve, side: int, radius: float, color: str) -> None:
-    """Values and density on one side of the surface, times `radius`; `color` is the material's, "" for a single one."""
+    """Values and density on one side of the surface, times `radius`. `color` is "" if there is a single material."""
     theta = np.radians(curve.angles)
 
     def place(values: Floats) -> tuple[Floats, Floats]:

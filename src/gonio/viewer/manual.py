@@ -26,7 +26,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Page:
-    """The manual page of a material; `breaks` has the reason by the name of the law, `presets` the title by name."""
+    """The manual page of a material; `breaks` maps names of laws to reasons, `presets` maps names to titles."""
 
     name: str
     title: str
@@ -48,7 +48,7 @@ class Page:
             allowed = "<br>".join(f"`{key}`: {text}" for key, text in row.choices.items()) or row.range
             lines.append(f"| `{row.name}` | {row.kind} | {allowed} | {row.unit or '-'} | {default} | {row.doc} |")
         for law, reason in self.breaks.items():
-            lines += ["", f"Breaks **{law}** by nature: {reason}."]
+            lines += ["", f"Violates **{law}** by design: {reason}."]
         if self.presets:
             named = ", ".join(f"`{name}`{_also(name, title)}" for name, title in self.presets.items())
             lines += ["", f"Presets: {named}."]
@@ -75,7 +75,7 @@ class Page:
         if self.presets:
             named = ", ".join(f"{name}{_also(name, title)}" for name, title in self.presets.items())
             lines += [filled(named, 11, "  presets"), ""]
-        lines += [filled(f"Breaks {law} by nature: {reason}.", 0) for law, reason in self.breaks.items()]
+        lines += [filled(f"Violates {law} by design: {reason}.", 0) for law, reason in self.breaks.items()]
         return "\n".join([*lines, f"Mitsuba plugin: {self.plugin}", f"Source: {self.source}"])
 
 
@@ -84,7 +84,7 @@ def _also(name: str, title: str) -> str:
 
 
 def page(model: type[BSDF]) -> Page:
-    """The manual page of a material's class."""
+    """The manual page of a material class."""
     rows = tuple(
         Row(
             parameter.name,

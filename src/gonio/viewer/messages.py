@@ -41,7 +41,7 @@ def _direction(vector: Vector) -> Vector:
 
 
 class Part(BaseModel):
-    """The base of messages: no unknown keys, no text for a number."""
+    """The base class of messages: unknown keys, and text in place of numbers, are invalid."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -67,7 +67,7 @@ class Area(Part):
 
 
 class Image(Part):
-    """A picture that was uploaded, or is part of the page."""
+    """A picture that was uploaded or is part of the page."""
 
     key: Key
 
@@ -139,8 +139,8 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Request a material's shader with other choices, with these weights (`on`) although they are off, and with tables
-    for these values (`fixed`)."""
+    """Request a material's shader with other choices, with the weights `on` included although they are off, and with
+    tables for the values `fixed`."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -156,7 +156,7 @@ _message: TypeAdapter[Message] = TypeAdapter(Message)
 
 
 def parse(text: str) -> Scene | Ack | Upload | Wish:
-    """The message in a text; InputError describes an invalid one."""
+    """The message in a text. Raises InputError, which describes the fault, if it is invalid."""
     if len(text) > TEXT_BYTES:
         raise InputError(f"a message of {len(text)} characters", "message", f"send at most {TEXT_BYTES}")
     try:
@@ -176,7 +176,7 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
 
 
 def _short(text: str, most: int = 200) -> str:
-    """The text, shortened: an error may be as long as the message."""
+    """The text, shortened, since an error may be as long as the message."""
     return text if len(text) <= most else text[: most - 4] + " ..."
 
 
@@ -191,7 +191,7 @@ def _check(scene: Scene) -> None:
 
 
 def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
-    """The pixels of an upload: (height, width, 3) float32; InputError if they do not match the announcement."""
+    """The pixels of an upload: (height, width, 3) float32. Raises InputError if they do not match the announcement."""
     if len(content) != upload.size:
         raise InputError(f"{len(content)} bytes received, {upload.size} were announced", "upload", "send float16 RGBA")
     pixels = np.frombuffer(content, "<f2").reshape(upload.height, upload.width, 4)[..., :3].astype(np.float32)

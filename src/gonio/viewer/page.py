@@ -100,7 +100,7 @@ TABLES = {
 
 @exclusive
 def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> PageData:
-    """The page's data for JSON.
+    """The data of the page, for JSON.
 
     socket    address of the live reference, such as "/ws?token=..."; None for a page without a server
     revision  how many times the stage was rebuilt before
@@ -224,7 +224,7 @@ def variant_data(
     fields = {field["path"] for field in manifest["fields"]}
     off = [p["path"] for p in manifest["parameters"] if p["off"] is not None and p["path"] not in fields]
     held = {p["path"]: p["value"] for p in manifest["parameters"] if p["fixed"] and p["value"] is not None}
-    for parameter in manifest["parameters"]:  # the values of a variant are not the declared ones
+    for parameter in manifest["parameters"]:  # a variant has other values than the declared defaults
         if parameter["path"] in held:
             parameter["value"] = np.asarray(own[parameter["path"]], float).tolist()
     return {
@@ -289,7 +289,7 @@ def html(data: PageData, policy: bool = True) -> str:
 
 
 def content_policy(socket: str = "") -> str:
-    """The page's permissions: run its own scripts, read files that the user drops, connect to its own socket."""
+    """The Content-Security-Policy: the page may run its own scripts, read dropped files, and connect to its socket."""
     connect = " ".join(["blob:", "data:", *([socket] if socket else [])])
     parts = {
         "default-src": "'none'",

@@ -10,11 +10,11 @@ from . import figures
 from .figures import Drawing
 
 MAX_PERCENT = 50.0  # upper limit of the scale of differences
-LINES = 4  # of values, two in each
+LINES = 4  # lines of values, two in each
 
 
 def draw(fit: PictureFit) -> Drawing:
-    """The picture | the fit | the difference, and the loss after each step."""
+    """The picture, the fit and the difference side by side, and the loss after each step."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 KINDS = ("lobe", "slice", "albedo", "image")
 Color = str | tuple[float, float, float, float]
 VIEWS = (0.0, 30.0, 60.0, 80.0)
-_LONGEST = 70  # letters of a title or a label
+_LONGEST = 70  # characters of a title or a label
 
 
 @public
@@ -40,7 +40,7 @@ def plot(
     metal: str | None = None,
     output: str | Path | None = None,
 ) -> Drawing:
-    """Plot materials over each other: their lobes, a slice over angle, their albedo, or image slices side by side.
+    """Plot materials: their lobes, slices or albedos in common axes, or image slices side by side.
 
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
         go.plot("fresnel", eta=1.5)
@@ -49,8 +49,8 @@ def plot(
                the reflectance of an interface over angle, from both sides, with its approximations and their errors
     kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
                vector and difference angle)
-    angles     of wo from the normal, degrees, 0 to below 90; up to 8; not for "albedo" and "image"
-    eta, k     for "fresnel": the index inside over that outside, 1.5 if None; and its imaginary part
+    angles     up to 8 angles of wo from the normal, degrees, in [0, 90); not for "albedo" and "image"
+    eta, k     for "fresnel": the index inside divided by that outside, 1.5 if None; and its imaginary part
     metal      for "fresnel", instead of an index: "Au", at red, green and blue
     output     file to write, .png, .pdf or .svg; None writes nothing
     Returns a Drawing, which a notebook shows; `.figure` is Matplotlib's.
@@ -71,19 +71,19 @@ def plot(
 
 
 def is_tables(text: str | Path) -> bool:
-    """Whether this is a folder of baked tables. InputError if it is not a material either."""
+    """Whether this is a folder of baked tables. Raises InputError if it is not a material either."""
     return operands.kind_of(text, {Kind.TABLES, *operands.MATERIALS}, "MODEL") is Kind.TABLES
 
 
 def _named(given: MaterialLike) -> tuple[str, BSDF]:
     """A material and its label."""
     if isinstance(given, str | Path):
-        operands.kind_of(given, operands.MATERIALS, "MODEL")  # of another kind it is an error that says so
+        operands.kind_of(given, operands.MATERIALS, "MODEL")  # raises an error that names the kind
     return title_of(given), material(given)
 
 
 def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) -> tuple[float, ...]:
-    """The plotted directions of view, degrees: those at which values are known."""
+    """The plotted viewing angles in degrees, by default angles at which values are known."""
     known = [bsdf.angular_range.view for _, bsdf in named]
     low, high = min((ends[0] for ends in known), default=0.0), max((ends[1] for ends in known), default=90.0)
     if angles is None:
@@ -136,9 +136,9 @@ def _shortened(text: str) -> str:
 
 
 def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """One material: all views in one frame. Several: one frame per view, on the same axes.
+    """All views of a single material in one frame, or one frame per view of several materials, on the same axes.
 
-    Logarithmic if the peaks differ by a factor of more than 30.
+    The scale is logarithmic if the peaks differ by a factor of more than 30.
     """
     from matplotlib.lines import Line2D
 
@@ -207,7 +207,7 @@ def _line(axes: Axes, curve: Curve, color: Color, index: int) -> None:
     axes.axvline(curve.view, color=color, linewidth=0.8, linestyle=":", zorder=0)
     for angle, strength in curve.deltas:
         axes.axvline(angle, color=color, linewidth=2)
-        left = not 90 < angle < 145  # reflection and transmission on different sides, both within the frame
+        left = not 90 < angle < 145  # labels of reflection and transmission on different sides
         axes.annotate(
             f"δ {strength:.2f}",
             (angle, 0.97 - 0.06 * index),
@@ -240,7 +240,7 @@ def _color_of_view(index: int, count: int) -> Color:
 
 
 def _albedo(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
-    """Directional albedo over the angle of wo, and the limit of energy conservation."""
+    """Directional albedo as a function of the angle of wo, and the limit of energy conservation."""
     known = _known(labels, bsdfs)
     subtitle = "fraction of the power that leaves, over wo"
     subtitle += known or f"; {curves.SAMPLES**2} stratified samples per point"

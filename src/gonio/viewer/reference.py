@@ -11,7 +11,7 @@ Two kinds of light transport:
 "local"  Direct light, one bounce (depth 2). The balls are in one scene and the lights in another, so that each
          point is lit by every light without occlusion, and no ball illuminates or shadows another: the result of a
          fragment shader. Light and BSDF sampling are combined (multiple importance sampling).
-"path"   Balls and lights in one scene, with shadows, interreflection, and refraction.
+"path"   Balls and lights in one scene, with shadows, interreflection and refraction.
 
 Pixels are averaged over a box one pixel wide. A changed value compiles nothing: parameters, lights and camera are
 kernel data and are written into the existing scene. Another model, choice, number of balls or kind of light creates a
@@ -140,8 +140,8 @@ class Reference:
         """Add samples: one at first, so that there is a picture soon; then as many as there are already, within
         PASS_SECONDS.
 
-        A pass has an overhead in Python besides its samples, which the first pass, of one sample, measures. Otherwise a
-        busy machine would appear to need all its time for one sample, and would never try two.
+        In addition to its samples, a pass has an overhead in Python, which the first pass (one sample) measures. If it
+        were ignored, a busy machine would appear to need all its time for one sample, and would never try two.
         """
         if self.done:
             return
@@ -156,11 +156,11 @@ class Reference:
             self._first_pass, self._per_sample = took, MIN_SECONDS
         elif count > 1:
             self._per_sample = max((took - self._first_pass) / (count - 1), MIN_SECONDS)
-        else:  # the delay may be over: soon two are tried again
+        else:  # the delay may be over, so two are soon tried again
             self._per_sample = max(self._per_sample / 2, MIN_SECONDS)
 
     def image(self) -> Pixels:
-        """(height, width, 4) float32: linear radiance of the balls alone, averaged over the pixel, and coverage."""
+        """(height, width, 4) float32: linear radiance of the balls only, averaged over the pixel, and coverage."""
         if self._render is None:
             raise InputError("nothing to show yet", "Reference.image", "call show first")
         return self._render.image()

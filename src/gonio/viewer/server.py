@@ -47,7 +47,7 @@ from .watch import Watch
 LOOPBACK = "127.0.0.1"
 MAX_SESSIONS = 8  # each holds a scene and a picture in memory
 # Limit for a frame to be acknowledged: a page in a hidden tab draws nothing, and may not return. Also for a first
-# request: a page that shows what the reference cannot, one term alone, requests nothing.
+# request: a page that shows a single term, which the reference cannot, requests nothing.
 STALL_SECONDS = 600.0
 FULL_SECONDS = 1.0  # delay before a new page is told that all places are taken
 MAX_WAITING = 200  # new pages in that delay
@@ -70,7 +70,7 @@ class Application:
 
     what    the stage that is shown
     access  conditions of access
-    device  of the reference: "cpu", "cuda" or "auto"
+    device  device of the reference: "cpu", "cuda" or "auto"
     """
 
     def __init__(self, what: Stage, access: AccessControl, device: str = "cpu"):
@@ -78,7 +78,7 @@ class Application:
         self.renderer = Renderer(what, device)
         self.sessions: list[Session] = []
         self._waiting = 0
-        self.fault: GonioError | None = None  # of the user's files, since the current stage
+        self.fault: GonioError | None = None  # error in the user's files since the current stage
         self.watch = Watch(what.code, self.renew, self.complain) if what.code else None
         self._data = self._written(what, 0)
         self._html = page.html(self._data, policy=False)
@@ -99,7 +99,7 @@ class Application:
         self._html = page.html(data, policy=False)
 
     def complain(self, fault: GonioError) -> None:
-        """Show an error in the user's file on every page, over the last valid picture."""
+        """Show an error in the user's file on every page, on top of the last valid picture."""
         self.fault = fault
         self._tell(messages.failure(fault, "fault"))
 
@@ -148,7 +148,7 @@ class Application:
             self.renderer.forget(session)
 
     def _make_room(self) -> bool:
-        """Whether one more session fits; sessions that request or receive nothing are ended, the oldest first."""
+        """Whether one more session fits. Sessions that request or receive nothing are ended, the oldest first."""
         if len(self.sessions) < MAX_SESSIONS:
             return True
         idle = next((session for session in self.sessions if session.idle_for() > PATIENCE_SECONDS), None)
@@ -180,7 +180,7 @@ class Server(uvicorn.Server):
             ws_ping_interval=20.0,
             ws_ping_timeout=20.0,
             h11_max_incomplete_event_size=16 << 10,
-            limit_concurrency=guards.MAX_CONNECTIONS + 64,  # with a request; beyond, 503
+            limit_concurrency=guards.MAX_CONNECTIONS + 64,  # those with a request; more are answered with 503
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             lifespan="off",
@@ -296,11 +296,11 @@ def serve(
 ) -> None:
     """Show a stage until Ctrl-C.
 
-    host     where to listen; anything but a loopback address opens it to the network, and a line says so
-    port     0 takes any that is free
-    browser  open the page there
+    host     address to listen on; any but a loopback address opens the page to the network, and a line says so
+    port     port to listen on; 0 takes any free one
+    browser  open the page in a browser
     as_json  print the address as {"url": ...}
-    Raises MachineError where the port is taken or the device missing, InputError where a model cannot be shown.
+    Raises MachineError if the port is taken or the device missing, InputError if a model cannot be shown.
     """
     if not 0 <= port < 65536:
         raise InputError(f"port {port}", "--port", "give 0 to 65535")

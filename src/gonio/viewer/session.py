@@ -21,15 +21,15 @@ from . import messages, page
 from .reference import Pixels, Reference
 from .stage import Stage
 
-PICTURES = 2  # environments stored per session: the one that is shown, and the next one
-HIDDEN_SECONDS = 1.0  # after which a page that has not taken a frame is considered hidden: rendering waits for it
+PICTURES = 2  # environments stored per session: the one shown and the next one
+HIDDEN_SECONDS = 1.0  # delay after which a page that has not taken a frame counts as hidden, and rendering waits for it
 MAX_SPARE = 4  # references stored for later pages
 MAX_WISHES = 16  # pending shaders per session
 RATE = 250.0  # messages read per second and page: a page sends one per drawn picture and one per received frame
-SHARE = 0.1  # of the server's thread, for reading one page's messages
-NONSENSE_SECONDS = 0.005  # of the server's thread, charged for an invalid message, which pages never send
+SHARE = 0.1  # fraction of the server thread's time for reading one page's messages
+NONSENSE_SECONDS = 0.005  # time of the server's thread charged for an invalid message, which pages never send
 BURST_SECONDS = 0.5  # credit of a page that was silent: 125 messages at once
-GIVE_WAY_SECONDS = 5e-4  # pause after each pass, so that other threads get the lock, which is not fair by itself
+GIVE_WAY_SECONDS = 5e-4  # pause after each pass so that other threads get the lock, which is not fair
 MAX_WAITING = 64  # messages to a page that does not read them: answers to its messages, and one frame
 
 
@@ -53,7 +53,7 @@ class Session:
         self.reference: Reference | None = None
         self.shown_samples = 0
         self.spent = 0.0  # seconds of the renderer's thread
-        self.started = 0.0  # when this picture was begun
+        self.started = 0.0  # time at which this picture was started
 
     # ------------------------------------------------------------------ in the server's thread
 
@@ -166,7 +166,7 @@ class Session:
 
 
 class Renderer:
-    """The rendering thread: short passes for sessions, and shaders, with equal shares of time for all sessions.
+    """The rendering thread: short passes, and shaders, with equal time for all sessions.
 
     what    materials by key
     device  "cpu", "cuda" or "auto"
@@ -174,7 +174,7 @@ class Renderer:
 
     def __init__(self, what: Stage, device: str = "cpu"):
         self.stage, self.device = what, device
-        self.revision = 0  # of the stage
+        self.revision = 0  # revision of the stage
         self._sessions: list[Session] = []
         self._jobs: list[_Variant] = []
         self._spare: list[Reference] = []  # of ended sessions, for reuse by new pages
@@ -192,10 +192,10 @@ class Renderer:
             for session in self._sessions:
                 session.scene = None
 
-    # ------------------------------------------------------------------ asked by sessions
+    # ------------------------------------------------------------------ requests of sessions
 
     def show(self, session: Session, scene: messages.Scene) -> None:
-        """Render a scene for a session: the newest replaces others; one of an older stage is ignored."""
+        """Render a scene for a session, in place of its earlier one; a scene of an older stage is ignored."""
         with self._lock:
             if scene.revision != self.revision:
                 return
@@ -227,7 +227,7 @@ class Renderer:
             self._lock.notify()
 
     def wake(self) -> None:
-        """A frame was acknowledged: the next one may be made."""
+        """Let the thread continue, since a frame was acknowledged and the next one may be made."""
         with self._lock:
             self._lock.notify()
 
@@ -287,7 +287,7 @@ class Renderer:
             time.sleep(GIVE_WAY_SECONDS)
 
     def _next(self, ready: list[Session]) -> Session:
-        """The session that has had the least of the thread's time, so that a large picture does not delay small ones.
+        """The session that has used the least of the thread's time, so that large pictures do not delay small ones.
 
         Idle time gives no credit: a returning session starts at the level of the others (start-time fair queueing).
         """
@@ -344,7 +344,7 @@ class Renderer:
 def _give_way() -> None:
     """Lower the priority of this thread and Dr.Jit's workers in favor of the browser (Linux only)."""
     with contextlib.suppress(OSError):
-        lower = os.getpriority(os.PRIO_PROCESS, os.getpid()) + 10  # than the main thread's; 19 is the most
+        lower = os.getpriority(os.PRIO_PROCESS, os.getpid()) + 10  # lower than the main thread's; 19 is the limit
         for task in Path("/proc/self/task").iterdir():
             if (task / "comm").read_text().startswith("nt [") or int(task.name) == threading.get_native_id():
                 os.setpriority(os.PRIO_PROCESS, int(task.name), lower)

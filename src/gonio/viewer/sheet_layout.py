@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Pixels = NDArray[np.uint8]  # (H, W, 3)
 MAX_WIDTH = 3200  # pixels; the pictures of larger sheets are scaled down
-READABLE = 800  # pixels, the width at which a page shows a sheet: the type of wider ones grows with them
+READABLE = 800  # width in pixels at which a page shows a sheet; the type of wider sheets is scaled up with them
 GAP, MARGIN = 8, 20
 TITLE_HEIGHT, HEADING_HEIGHT, NAME_HEIGHT, LABEL_HEIGHT, BETWEEN = 62, 28, 20, 22, 14
 _DPI = 100
@@ -53,7 +53,7 @@ def draw(pictures: Sequence[Pixels], variations: Sequence[Variation], title: str
 
 def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list[_Block]:
     names = [variation.name for variation in variations]
-    if len(set(names)) < len(names):  # such as p of two shapes
+    if len(set(names)) < len(names):  # such as parameter p of two shapes
         names = [variation.path for variation in variations]
     if len(variations) == 1:
         (only,), (name,) = variations, names
@@ -92,14 +92,14 @@ def _columns_of_a_row(count: int, aspect: float) -> int:
 
 @dataclass(frozen=True)
 class _Layout:
-    """The measures of a sheet, pixels.
+    """The dimensions of a sheet in pixels.
 
-    zoom     of the type and of the space that it takes
-    left     of the first column of pictures
+    zoom     scale factor of the type and of the space that it takes
+    left     left edge of the first column of pictures
     cell     width and height of a picture
     pitch    distance between columns
     size     width and height of the sheet
-    heights  of the blocks
+    heights  heights of the blocks
     """
 
     blocks: Sequence[_Block]
@@ -171,13 +171,13 @@ def _draw(layout: _Layout, title: str, subtitle: str) -> Figure:
 
 
 def _text(figure: Figure, layout: _Layout, x: float, y: float, content: str, fontsize: float, **style: Any) -> None:
-    """Text at a place in pixels from the upper left corner of the sheet."""
+    """Draw text at a position in pixels from the upper left corner of the sheet."""
     width, height = layout.size
     figure.text(x / width, 1 - y / height, content, fontsize=layout.zoom * fontsize, **style)
 
 
 def _draw_block(figure: Figure, layout: _Layout, block: _Block, y: float, bottom: float) -> None:
-    """A block between two heights: its heading, names, labels and pictures."""
+    """Draw a block between two heights: its heading, names, labels and pictures."""
     left, pitch, (cell_width, cell_height), (width, height) = layout.left, layout.pitch, layout.cell, layout.size
 
     zoom = layout.zoom

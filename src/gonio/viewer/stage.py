@@ -1,4 +1,4 @@
-"""The content of a page: materials on balls, the lights on them, the camera.
+"""The content of a page: materials on balls, lights, and the camera.
 
 A `Stage` is built from models (`of_models`) or from a lab scene (`lab_scene.stage`), or it is the homework's two rows
 (`homework`). `page.py` converts it to the page's data, `reference.py` renders it.
@@ -39,12 +39,12 @@ class Camera(TypedDict):
     distance: NotRequired[float]
 
 
-ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # of the homework's balls; alpha is its square
+ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # roughness of the homework's balls; alpha is its square
 # the homework's masking and the exact one; the page toggles between them
 HOMEWORK_MASKINGS = ("smith-correlated", "schlick-direct")
 LARGEST_ROW = 5
 
-# From the upper left; pi, so that a white Lambert ball has value 1 where it faces the light.
+# From the upper left; an irradiance of pi gives a white Lambertian ball the value 1 where it faces the light.
 SUN: Light = {"type": "directional", "direction": [-0.4364358, 0.4364358, 0.7867958], "irradiance": [math.pi] * 3}
 # A picture that the page computes: web/src/studio.ts
 STUDIO: Light = {
@@ -200,7 +200,7 @@ def homework(metal: str = "Ag") -> Stage:
 
 
 def opening() -> Stage:
-    """What a page shows if nothing is named: the homework's two rows in gold, in a studio."""
+    """The stage shown by default: the homework's two rows in gold, in a studio."""
     return replace(homework("Au"), title="Gold, with and without Kulla-Conty", lights=(STUDIO,))
 
 
@@ -212,8 +212,8 @@ RIM = (
 
 
 def homework_text(metal: str = "Ag") -> Stage:
-    """The homework's two rows by the terms of its text: GGX, Schlick's F, k = (roughness + 1)^2 / 8, f_add as on its
-    sheet with F_avg by the fit of Kulla2017; roughness rises to the left, as there."""
+    """The homework's two rows with the terms of its text: GGX, Schlick's F, k = (roughness + 1)^2 / 8, and f_add as on
+    its sheet with F_avg from the fit of Kulla2017; roughness increases to the left, as in the homework."""
     terms = {"masking": "schlick-direct", "fresnel": "schlick", "alpha": ROUGHNESS[0] ** 2}
     base = model("conductor").preset(metal, **terms)
     compensated = model("kulla-conty")(base=base, color="sheet", average="imageworks")  # type: ignore[call-arg]
@@ -269,7 +269,7 @@ def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[Collection[str]] | None = None) -> Stage:
-    """One row per model: five balls from smooth to rough if no alpha is given, otherwise five over its first number.
+    """One row per model, of five balls: from smooth to rough if no alpha is given, otherwise over its first number.
 
     given  per model, the paths of parameters that the user has set
     """
@@ -319,7 +319,7 @@ def _accepts(bsdf: BSDF, values: Mapping[str, Value]) -> bool:
 
 
 def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
-    """For each row the parameter that varies over its balls, or None.
+    """For each row, the parameter that varies along its balls, or None.
 
     Rows with the same material, one of them nested in another, vary the same parameter: an alpha, otherwise the
     parameter of another row.

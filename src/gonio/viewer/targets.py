@@ -27,8 +27,8 @@ class Named(NamedTuple):
 def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
     """The materials, and notes on where an option was not applied.
 
-    options  "name=value" each, shared by all. A material's own parameter comes first, then nested ones of that name: a
-             choice, such as masking, is applied to all of them, a number or a preset only if there is exactly one
+    options  "name=value" each, shared by all. A material's own parameter has precedence over nested ones of that name;
+             a choice, such as masking, is applied to all nested ones, a number or a preset only if there is exactly one
     Raises InputError for an option that applies to no material.
     """
     shared = dict(map(notation.assignment, options))

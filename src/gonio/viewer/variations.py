@@ -13,7 +13,7 @@ from ..render.request import Request
 from ..scene.schema import SceneDescription
 from . import figures
 
-_RANGE = re.compile(r"[-+\d.eE]*\d\.\.[-+\d.eE]+")  # of numbers; a path of files may have two dots too
+_RANGE = re.compile(r"[-+\d.eE]*\d\.\.[-+\d.eE]+")  # a range of numbers; file paths may contain two dots too
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def _last_word(path: str) -> str:
 
 
 def parse_variation(text: str) -> Variation:
-    """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(0.2,0.8),(0.5,0.5)".
+    """A `Variation` from "shapes.0.material.p=4,16,64", or with several paths, from "kd,ks=(0.2,0.8),(0.5,0.5)".
 
     Values are JSON; commas in brackets do not separate. "0.1..1" is a range of five values.
     """
@@ -62,7 +62,7 @@ def parse_variation(text: str) -> Variation:
 
 def variation(paths: str | Sequence[str], values: Sequence[object]) -> Variation:
     """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value then has one
-    part per path, (0.2, 0.8) or "(0.2,0.8)". InputError if it has more or fewer."""
+    component per path, (0.2, 0.8) or "(0.2,0.8)". Raises InputError if it has more or fewer."""
     names = tuple(path.strip() for path in (paths.split(",") if isinstance(paths, str) else paths))
     if not all(names) or len(set(names)) < len(names):
         what, hint = f"'{','.join(names)}' varies no path, or one twice", "such as kd,ks=(0.2,0.8),(0.5,0.5)"

@@ -35,7 +35,7 @@ class Code(Generic[Made]):
     """Python files that the user named, those that they import from their own folders, and the object made from them.
 
     make   loads the files
-    texts  shaders that the user named: watched with what they include, but their folders are no place to import from
+    texts  shaders that the user named: watched with the files they include, but nothing is imported from their folders
     files  all of these files, as of the last run
     """
 
@@ -74,8 +74,8 @@ class Code(Generic[Made]):
 
     @contextlib.contextmanager
     def _importable(self) -> Iterator[None]:
-        """Add the folders to Python's path, and write no byte code: it would be used for a file of the same size that
-        was saved within the same second."""
+        """Add the folders to Python's path, and write no bytecode, which Python would also use for a file of the same
+        size saved within the same second."""
         path, keeps = list(sys.path), sys.dont_write_bytecode
         sys.path[:0] = sorted(map(str, self._folders))
         sys.dont_write_bytecode = True
@@ -85,7 +85,7 @@ class Code(Generic[Made]):
             sys.path[:], sys.dont_write_bytecode = path, keeps
 
     def _follow(self, others: set[str], more: set[Path]) -> None:
-        """Record the modules that came with the files: those of their folders that nothing else had loaded."""
+        """Record the modules that the files loaded: those in their folders that nothing else had loaded."""
         packages = {name.partition(".")[0] for name in others}
         new = {name: module for name, module in sys.modules.items() if name.partition(".")[0] not in packages}
         files = {name: getattr(module, "__file__", None) for name, module in new.items()}
@@ -97,7 +97,7 @@ class Code(Generic[Made]):
         self.stamps = {path: self.stamps[path] if path in self.stamps else _stamp(path) for path in self.files}
 
     def _is_own(self, place: Path) -> bool:
-        """Whether a file is in one of the user's folders, but not in an environment inside it."""
+        """Whether a file is in one of the user's folders, but not in a virtual environment inside it."""
         return not {"site-packages", "dist-packages"} & {*place.parts} and not self._folders.isdisjoint(place.parents)
 
     def located(self, error: BaseException) -> GonioError:
@@ -154,7 +154,7 @@ class Watch(Generic[Made]):
     """A thread that runs the code again whenever one of its files was saved.
 
     show      called with the result
-    complain  called with an error of either, with its location
+    complain  called with an error of the code or of `show`, with its location
     """
 
     def __init__(self, code: Code[Made], show: Callable[[Made], None], complain: Callable[[GonioError], None]):

@@ -44,8 +44,8 @@ MAX_SLOWDOWN = 3.0  # multiple of the median time that a part may take in additi
 SILENT_AFTER = 8.0  # seconds without a heartbeat after which a worker gets no more parts
 FROZEN_AFTER = 30.0  # seconds without a heartbeat after which a local worker is killed and replaced
 MAX_COPIES = 5
-MAX_FETCHED = 64  # results fetched at once, at most
-FETCH_TIMEOUT = 20.0  # seconds that this may take
+MAX_FETCHED = 64  # most results fetched at once
+FETCH_TIMEOUT = 20.0  # seconds that fetching them may take
 MAX_LOSSES = 3  # workers that may be lost while they compute the same part; with one more, the part counts as the cause
 CONNECT_TIMEOUT = 10.0  # seconds to wait for a scheduler to answer
 JOIN_TIMEOUT = 60.0  # seconds to wait for the first worker
@@ -55,7 +55,7 @@ START_INTERVAL = (
 
 
 class Cluster:
-    """Workers of this machine or of a Dask scheduler; a context manager, inside which they run the parts of jobs.
+    """Workers of this machine or of a Dask scheduler. A context manager: inside it, they run the parts of jobs.
 
     address   address of a scheduler, "tcp://host:8786" or "tls://..."
     workers   number of processes to start on this machine instead; as many as it has cores start at once, the others
@@ -79,7 +79,7 @@ class Cluster:
         if (address is None) == (workers is None):
             raise InputError("a cluster is an address or a number of workers", "cluster", "give one of the two")
         if workers is not None and workers < 1:
-            raise InputError(f"{workers} workers asked for", "--workers", "give 1 or more")
+            raise InputError(f"{workers} workers requested", "--workers", "give 1 or more")
         if not wait >= 0.0:
             raise InputError(f"{wait} seconds to wait for a worker", "wait", "give 0 or more")
         if address is not None:
@@ -92,7 +92,7 @@ class Cluster:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._begun = 0.0
         self._sent: set[str] = set()
-        self._warned = False  # whether the warning that it waits for a worker was issued
+        self._warned = False  # whether a warning was issued that it waits for a worker
         self._stack = contextlib.ExitStack()
         self.silent: dict[str, float] = {}  # seconds since each worker's last heartbeat, at the last check
         self.restarts = self.copies = 0
@@ -146,7 +146,7 @@ class Cluster:
         self._stack.close()
         for one in (self._client, self._local):
             if one is not None:
-                with contextlib.suppress(Exception):  # it may be gone already
+                with contextlib.suppress(Exception):  # it may already be gone
                     one.close(timeout=2)
         for process in self._processes:
             process.wait()
@@ -188,7 +188,7 @@ class Cluster:
     def _check(self) -> Iterator[None]:
         """Wait for the first worker, yielding while there is none.
 
-        Raise MachineError if none joins in time, and, before any part is submitted, for a worker with another version.
+        Raise MachineError if none joins in time, or, before any part is submitted, for a worker with another version.
         """
         if self._wanted is not None:
             return

@@ -1,10 +1,10 @@
-"""The executor of a job's parts: this process, which does them one after the other, or a cluster.
+"""The executor of a job's parts: this process, which runs them one after the other, or a cluster.
 
     for index, arrays in each(function, arguments, keys):
         ...                                  # in the order in which they finish
 
-A part consists of a function at the top level of a module and its arguments, both of which can be pickled; it returns
-arrays. It must depend on nothing else, so that its result is bit-identical on every worker and it may run twice.
+A part consists of a function at the top level of a module and its arguments, which can be pickled; it returns arrays.
+It must depend on nothing else, so that its result is bit-identical on every worker and it may run twice.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Executor(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of parts that run at a time."""
+        """Number of parts that run at the same time."""
         ...
 
     def run(

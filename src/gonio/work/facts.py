@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .._version import __version__
 
-PACKAGES = (  # whose code results depend on
+PACKAGES = (  # packages on whose code results depend
     "bridge", "catalog", "energy", "material", "materials", "measure", "ops", "optics", "pictures", "render", "scene",
     "transport", "work",
 )  # fmt: skip
@@ -30,7 +30,7 @@ def _version(name: str) -> str:
 
 @lru_cache
 def code() -> str:
-    """A hash of the code of Gonio that results depend on; a checkout also changes between two versions."""
+    """A hash of the code of Gonio that results depend on, since a checkout also changes between versions."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
     for path in sorted(p for name in PACKAGES for p in (package / name).rglob("*.py")):

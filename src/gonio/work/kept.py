@@ -6,7 +6,7 @@
     arrays             one after the other, little-endian, in C order
     4 bytes            CRC-32 of everything before
 
-A truncated file differs in length from what its header says, and the checksum detects damage. The preceding file
+The header gives the length, which reveals a truncated file, and the checksum detects damage. The preceding file
 remains beside it as NAME.previous, in case the newest one is damaged. Nothing that is read here is ever executed.
 """
 
@@ -34,7 +34,7 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 _MAGIC = b"gonio kept 1\n"
 _TYPES = ("float64", "float32", "int64", "uint32", "uint8", "bool")
-_CHUNK = 1 << 24  # bytes at a time, so that the checksum needs no second copy
+_CHUNK = 1 << 24  # bytes written at a time, so that the checksum needs no second copy
 
 
 class Kept(NamedTuple):
@@ -51,7 +51,7 @@ def write(
 
     previous  keep the existing file as NAME.previous
     durable   flush it to the disk
-    Raises MachineError if the disk is full, TypeError for an array of a type that a file cannot hold.
+    Raises MachineError if the disk is full, TypeError for an array whose type a file cannot hold.
     """
     parts = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for name, array in parts.items():
@@ -105,7 +105,7 @@ def exists(path: Path) -> bool:
 
 
 def remove_damaged(path: Path) -> None:
-    """Remove a damaged file if NAME.previous exists; the next `write` would replace that intact copy by it."""
+    """Remove a damaged file if NAME.previous exists, since the next `write` would replace that intact copy with it."""
     with contextlib.suppress(OSError):
         try:
             _read(path)

@@ -42,7 +42,7 @@ def key_of(*what: object) -> str:
 class Parts:
     """The parts of one job.
 
-    name  of the kind of job, such as "study"
+    name  name of the kind of job, such as "study"
     what  everything that distinguishes this job from others
     """
 
@@ -90,7 +90,7 @@ def current() -> Parts | None:
 
 @contextlib.contextmanager
 def job(name: str, *what: object) -> Iterator[Parts]:
-    """Store parts inside the `with` block; remove them at its end unless an error or a signal ends it."""
+    """Store parts inside the `with` block; remove them when it ends, unless by an error or a signal."""
     parts = Parts(name, *what)
     token = _current.set(parts)
     try:

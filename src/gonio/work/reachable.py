@@ -1,4 +1,4 @@
-"""Check within a few seconds whether a Dask scheduler can be reached; Dask itself tries for longer, and logs errors."""
+"""Check within a few seconds whether a Dask scheduler can be reached; Dask itself tries for longer and logs errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import InputError, MachineError
 
 CONNECT = 4.0  # seconds to resolve the name and to connect
 PROTOCOLS = ("tcp", "tls", "ws", "wss", "ucx", "ucxx", "inproc")
-MAX_GREETING = 1 << 20  # bytes of the first message, which has a few hundred
+MAX_GREETING = 1 << 20  # largest size in bytes of the first message, which has a few hundred
 CHECKED = ("tcp", "tls", "ws", "wss")  # protocols over a socket
 ADDRESS = re.compile(r"(?:(?P<protocol>\w+)://)?(?P<host>[^/\s]+):(?P<port>\d{1,5})/?")
 
@@ -28,7 +28,7 @@ def check(address: str) -> None:
     match = ADDRESS.fullmatch(address)
     if match is None or not 0 < int(match["port"]) < 1 << 16:
         raise InputError(f"'{address}' is no address of a scheduler", "--cluster", hint)
-    greets = protocol == "tcp" or not separator  # the others begin with a TLS or HTTP handshake
+    greets = protocol == "tcp" or not separator  # other protocols begin with a TLS or HTTP handshake
     reason = _unreachable(match["host"].strip("[]"), int(match["port"]), greets)
     if reason:
         raise MachineError(f"no scheduler answers: {reason}", address, "is it running, and is this its address?")

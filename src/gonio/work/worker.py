@@ -1,4 +1,4 @@
-"""Code that runs on the workers of a cluster: parts of jobs, the files that they read, and a check of versions."""
+"""Code that runs on the workers of a cluster: parts of jobs, the files that they read, and a version check."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def about_or_why() -> dict[str, str]:
     """As `about`; if that fails, the reason in place of the version."""
     try:
         return about()
-    except Exception as error:  # the Gonio there has another interface, or none is installed
+    except Exception as error:  # that Gonio has another interface, or none is installed
         return {"version": f"none that answers ({type(error).__name__}: {error})"}
 
 

@@ -1,9 +1,9 @@
-"""Every Gonio model as a Mitsuba plugin, by one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
+"""Every Gonio model as a Mitsuba plugin, through one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
 
 The properties of a plugin have the names of the model's parameters. Every plugin takes two more: `two_sided` (shades
 both sides, without the nested call of Mitsuba's own `twosided`) and, if the model has presets, `preset`.
 
-In polarized variants a plugin returns Mueller matrices of the light that single facets have reflected or refracted; the
+In polarized variants a plugin returns Mueller matrices for light that is reflected or refracted by single facets; the
 rest leaves unpolarized.
 """
 
@@ -21,11 +21,11 @@ from .plugin import plugin_class
 __all__ = ["plugin_name", "register", "register_model"]
 
 _classes: dict[str, OfVariant] = {}  # variant -> class of the plugins
-_models: dict[str, type[BSDF]] = {}  # plugin -> model, the newest of that name
+_models: dict[str, type[BSDF]] = {}  # plugin -> the newest model of that name
 
 
 def register(mi: ModuleType) -> None:
-    """Register every model with the current variant, now and each time another one joins the family."""
+    """Register every model with the current variant, including those that are declared later."""
     BSDF.family.watch(_joined)
     if mi.variant() is not None:
         for name, model in models().items():
@@ -33,7 +33,7 @@ def register(mi: ModuleType) -> None:
 
 
 def register_model(mi: ModuleType, model: type[BSDF]) -> str:
-    """Name of a model's plugin, which is registered here if the class is the user's own; call `register` first."""
+    """Name of a model's plugin, which is registered here if it is a user's class; call `register` first."""
     if models().get(model.name) is model:
         return plugin_name(model.name)
     name = f"gonio_own_{model.name.replace('-', '_')}"

@@ -23,8 +23,8 @@ def plugin_name(model_name: str) -> str:
 class PlacedMaterial:
     """A material and the sources of its values.
 
-    model    the material with plain values that describe its facts: a texture is represented by its range, a Mitsuba
-             plugin inside it by a stand-in
+    model    the material with plain values, from which its facts follow: a texture is represented by its range, a
+             Mitsuba plugin inside it by a `MitsubaBSDF`
     slots    the source of each numeric parameter's value
     inner    plugins of the nested materials: Mitsuba's, and Gonio's with their placed materials
     derived  quantities derived from the parameters, computed once if these are the same at every hit
@@ -59,7 +59,7 @@ class PlacedMaterial:
             warnings.simplefilter("ignore")  # the slots have warned
             self.model: BSDF = model(**values)
         if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
-            what = f"{self.model.name} knows red, green and blue only, this is {variant.mi.variant()}"
+            what = f"{self.model.name} supports only red, green and blue, but {variant.mi.variant()} is set"
             raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
         for name in ("absorption", "priority"):
             if name in self.slots and self.slots[name].varies:
@@ -75,12 +75,12 @@ class PlacedMaterial:
         return child, getattr(child, "placed", None) or MitsubaBSDF(child)
 
     def derive(self) -> None:
-        """Compute once what the model derives from values that are the same at every hit."""
+        """Compute the derived quantities once if the values are the same at every hit."""
         self.derived = None
         if self.varies and self.model.needs_uniform:
             what = "a texture given, but this base needs tables, which are computed for colors and numbers"
             raise InputError(what, f"{self.name}.base", "conductor and dielectric take textures")
-        guide_search.prepare(self.model)  # no guide can be built while an integrator records a loop
+        guide_search.prepare(self.model)  # here, since no guide can be built while an integrator records a loop
         if self.model.derives and not self.varies:
             self.derived = binding.evaluate_derived(
                 self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True)
@@ -88,7 +88,7 @@ class PlacedMaterial:
 
     @property
     def varies(self) -> bool:
-        """Whether a parameter of this material or of a nested one differs between hits: textures do, and so do spectra,
+        """Whether a parameter of this material or of a nested one differs between hits, as textures do, and spectra,
         which are evaluated at a ray's wavelengths."""
         return (
             self._by_wavelength
@@ -103,7 +103,7 @@ class PlacedMaterial:
 
     @property
     def disperses(self) -> bool:
-        """Whether an index of this material or of a nested one depends on the wavelength."""
+        """Whether an index of refraction of this material or of a nested one depends on the wavelength."""
         return any(slot.curves for slot in self.slots.values()) or any(
             isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
         )
@@ -119,8 +119,8 @@ class PlacedMaterial:
         """The model with its parameters bound to their values at a surface interaction.
 
         separates  whether a dispersive index is evaluated at the ray's first wavelength
-        outer      index outside the surface, by which those of the inside are divided
-        inner      whether it is part of another material, which then alone determines whether both sides are shaded
+        outer      index outside the surface, by which the indices inside are divided
+        inner      whether it is part of another material, which alone then determines whether both sides are shaded
         """
         values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
@@ -137,7 +137,7 @@ class PlacedMaterial:
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 
     def traverse(self, callback: TraversalCallback) -> None:
-        """Announce every value that may be changed to Mitsuba."""
+        """Report every value that may be changed to Mitsuba."""
         flag = self.variant.mi.ParamFlags.Differentiable
         for slot in self.slots.values():
             for name, value in {**slot.values, **slot.textures}.items():
@@ -146,7 +146,7 @@ class PlacedMaterial:
             callback.put(name, plugin, flag)
 
     def changed(self) -> None:
-        """Update what depends on the values after a change."""
+        """Update everything that depends on the values, after a change."""
         for slot in self.slots.values():
             dr.make_opaque(*slot.values.values())
         if self.follows:
@@ -156,8 +156,8 @@ class PlacedMaterial:
 
     @property
     def follows(self) -> bool:
-        """Whether the model must hold the current values, because tables are computed from them or because layers that
-        they switch off have no code."""
+        """Whether the model must have the current values, because tables are computed from them or because they can
+        switch off layers, which then have no code."""
         layers = any(leaf.parameter.off is not None for leaf in tree.leaves(self.model))
         return layers or bool(self.model.fixed)
 
@@ -168,7 +168,7 @@ class PlacedMaterial:
 
 
 def _preset(props: Properties, model: type[BSDF]) -> NamedPreset:
-    """The preset that the properties name; one without values if they name none."""
+    """The preset that the properties name; if they name none, a preset without values."""
     known = model.presets()
     if "preset" not in props or not known:
         return NamedPreset("", {})

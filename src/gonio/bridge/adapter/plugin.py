@@ -1,7 +1,7 @@
-"""The class of Gonio's plugins, which implements Mitsuba's BSDF interface by a placed material.
+"""The class of Gonio's plugins, which implements Mitsuba's BSDF interface with a placed material.
 
-Only here do the two conventions meet. Mitsuba names the viewer's direction `wi` and the sampled one `wo`; Gonio's `wo`
-is the viewer's.
+Only this module converts between the two conventions: Mitsuba names the direction toward the viewer `wi` and the
+sampled direction `wo`; in Gonio, `wo` points toward the viewer.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _mode(mi: ModuleType, ctx: BSDFContext) -> Mode:
 
 
 def _enabled(mi: ModuleType, ctx: BSDFContext, wo: Vector, wi: Vector, active: Mask) -> Mask:
-    """Lanes whose kind of lobe the context requests."""
+    """Lanes on which the context requests the lobe, reflection or transmission."""
     kinds = mi.BSDFFlags
     reflect, transmit = bool(ctx.type_mask & int(kinds.Reflection)), bool(ctx.type_mask & int(kinds.Transmission))
     if reflect and transmit:
@@ -52,8 +52,8 @@ def _enabled(mi: ModuleType, ctx: BSDFContext, wo: Vector, wi: Vector, active: M
 
 
 def _at(placed: PlacedMaterial, ctx: BSDFContext, si: SurfaceInteraction, active: Mask) -> BSDF:
-    """The material bound at a hit, by the index outside and the wavelength that the integrator's type mask
-    announces."""
+    """The material bound at a hit; the integrator's type mask determines whether the index outside and the first
+    wavelength are used."""
     mask = int(ctx.type_mask)
     outer = 1.0 + si.duv_dx.x if mask == NESTS else None
     return placed.at(si, active, mask in (SEPARATES, NESTS), outer)
@@ -98,7 +98,7 @@ class _Methods:
         self.placed.changed()
         if self.placed.follows:
             self._set_flags(self.placed.model.delta)
-        # An alpha that was 0 may have become positive: from now on both kinds of lobe are possible.
+        # An alpha that was 0 may have become positive: from now on the lobe may be delta or not.
         if self.placed.model.delta == "always" and any(key.startswith("alpha") for key in keys):
             self._set_flags("maybe")
 

@@ -1,7 +1,7 @@
 """The sources of a plugin's parameter values: numbers and colors held by Dr.Jit, or textures.
 
-Numbers and colors are opaque (a changed value compiles nothing); textures are evaluated at each hit. A roughness may be
-given as `alpha`, or as `alpha_x` and `alpha_y`.
+Numbers and colors are opaque (a changed value recompiles nothing); textures are evaluated at each hit. A roughness may
+be given as `alpha`, or as `alpha_x` and `alpha_y`.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Slot:
     """A numeric parameter of a plugin.
 
     values    opaque values by property ("alpha", or "alpha_x" and "alpha_y")
-    textures  properties that are textures
-    curves    dispersive indices: eta per nanometer
-    plain     plain numbers within the parameter's range; of a texture the lowest and the highest value
+    textures  textures by property
+    curves    dispersive indices by property: eta at each nanometer
+    plain     plain numbers within the parameter's range; for a texture, the lowest and the highest value
     """
 
     def __init__(self, variant: Variant, props: Properties, parameter: Parameter, location: str, preset: NamedPreset):
@@ -86,7 +86,7 @@ class Slot:
         return value
 
     def _through_rgb(self, name: str, value: Any) -> Plain:
-        """A spectrum through a color that may exceed 1, as an index does."""
+        """A spectrum through a color that may exceed 1, as indices of refraction do."""
         if np.min(value) < 0.0:
             what = f"{np.min(value):g} given, but a negative color has no spectrum"
             raise InputError(what, self.location, "render it in an RGB variant, such as llvm_ad_rgb")

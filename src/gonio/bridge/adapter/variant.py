@@ -21,21 +21,21 @@ Floats: TypeAlias = NDArray[np.float64]
 GRID = np.arange(360.0, 831.0)  # nm, the wavelengths of spectral variants
 
 
-# BSDF flag: the index depends on the wavelength. Mitsuba's own flags end at bit 15, and it passes others on.
+# BSDF flag: the index depends on the wavelength. Mitsuba's own flags end at bit 15, and it preserves others.
 DISPERSES = 1 << 24
 
-# Type mask of Gonio's integrators: all lobes, plus a last bit that stands for no type and tells the BSDF that a path
-# continues with its first wavelength alone where wavelengths refract differently. Other callers get the index of sodium
-# light at all wavelengths.
+# Type mask of Gonio's integrators: all lobes. Its value, which differs from that of other callers in bits that stand
+# for no type, tells the BSDF that a path continues with its first wavelength alone where wavelengths refract
+# differently. For other callers, all wavelengths have the index of sodium light.
 SEPARATES = (1 << 31) - 1
 
-# The same for an integrator that knows the medium outside a surface: it passes the index there, minus 1, in the hit's
+# The same for an integrator that tracks the medium outside a surface: it passes the index there, minus 1, in the hit's
 # `duv_dx.x`, which Gonio does not use otherwise.
 NESTS = SEPARATES - (1 << 30)
 
 
 class Variant:
-    """The variant that was set when this was made.
+    """Mitsuba's variant at the time of construction.
 
     spectrum  the type of an unpolarized spectrum: one channel, three, or one per wavelength
     """
@@ -53,13 +53,13 @@ class Variant:
     def mueller(
         self, value: Radiance, total: Radiance, parts: Sequence[Polarized], toward: Vector, away: Vector
     ) -> Radiance:
-        """A material's value as a Mueller matrix: polarized parts by their facets, plus an unpolarized rest.
+        """A material's value as a Mueller matrix: polarized parts due to facets, plus an unpolarized rest.
 
-        value   the value for unpolarized light
-        total   the sum of which `parts` are parts
+        value   the value for unpolarized light, or a sample's weight
+        total   the BSDF's value, of which `parts` are parts
         toward  direction to the light source, away from the surface
-        away    direction in which the light leaves. As in Mitsuba, the matrix maps the Stokes basis of the one ray to
-                that of the other (`mi.mueller.stokes_basis`)
+        away    direction in which the light leaves. As in Mitsuba, the matrix maps the Stokes basis of the incident ray
+                to that of the outgoing ray (`mi.mueller.stokes_basis`)
         """
         mi = self.mi
         matrix, rest = dr.zeros(mi.Spectrum), self.spectrum(value)
@@ -83,7 +83,7 @@ class Variant:
         return dr.select(length2 > 1e-12, across * dr.rsqrt(dr.maximum(length2, 1e-30)), any_)
 
     def constant(self, value: float | Sequence[float]) -> Radiance:
-        """A number (gray) or r, g, b, the latter not in spectral variants; in mono, r, g, b becomes its luminance."""
+        """A number (gray) or r, g, b as kernel values. In mono, r, g, b becomes its luminance; not for spectral."""
         if np.ndim(value) == 0:
             return self.spectrum(float(value))  # type: ignore[arg-type]
         color = self.mi.Color3f(*map(float, value))  # type: ignore[arg-type]
@@ -104,7 +104,7 @@ class Variant:
         return values
 
     def interpolated(self, values: Float, wavelength: Float, active: Mask) -> Float:
-        """A table of `dispersion` at a wavelength, interpolated linearly: within 1e-7 of the formulas."""
+        """The value of a `dispersion` table at a wavelength, interpolated linearly: within 1e-7 of the formulas."""
         mi = self.mi
         place = dr.clip(wavelength - GRID[0], 0.0, len(GRID) - 1.001)
         left = mi.UInt32(place)
@@ -113,10 +113,10 @@ class Variant:
         return dr.fma(part, high - low, low)
 
     def curve(self, wavelengths: Floats, values: Floats) -> Texture:
-        """A spectrum through points, constant beyond their ends; wavelengths in nm. Values may exceed 1, as an index
-        does."""
+        """A spectrum through points, constant beyond their ends; wavelengths in nm. Values may exceed 1, as indices of
+        refraction do."""
         text = ", ".join(f"{x:.9g}" for x in np.interp(GRID, wavelengths, values))
-        # on a grid: Mitsuba would search uneven points for each wavelength at every hit
+        # on a grid, since Mitsuba would search uneven points for each wavelength at every hit
         ends = {"wavelength_min": GRID[0], "wavelength_max": GRID[-1]}
         return self.mi.load_dict({"type": "regular", **ends, "values": text})
 
@@ -126,12 +126,12 @@ class Variant:
         return self.curve(np.array(RGB_WAVELENGTHS[::-1]), np.array(values[::-1], float))
 
     def measured(self, preset: str, parameter: str) -> Texture | None:
-        """The spectrum that Mitsuba ships for a metal's `eta` or `k`; None for those it lacks (Fe, Ti).
+        """The spectrum that Mitsuba ships for a metal's `eta` or `k`; None for metals that it lacks (Fe, Ti).
 
-        The preset's three numbers come from other measurements; for Ag, Au and Cu they are a fit [Rakic1998]. By
+        The preset's three numbers come from other measurements; for Ag, Au and Cu they are a fit [Rakic1998]. In
         luminance at normal incidence, Mitsuba's gold is 6.1 % brighter, its silver 1.0 %, its chromium 18.9 %, its
-        copper is 4.9 % darker, and the others are within 0.8 %. Sampling at three wavelengths alone costs 0.4 % in gold
-        and 1.2 % in copper.
+        copper is 4.9 % darker, and the others are within 0.8 %. Sampling at only three wavelengths accounts for 0.4 %
+        in gold and 1.2 % in copper.
         """
         folder = Path(str(self.mi.__file__)).parent / "data" / "ior"
         files = (folder / f"{preset}{source}.{parameter}.spd" for source in ("", "_palik"))

@@ -1,9 +1,9 @@
-"""Mitsuba 3.9: `normalmap` and `bumpmap` shade with a frame of their own that no method of a BSDF returns.
+"""Mitsuba 3.9: `normalmap` and `bumpmap` shade in a frame of their own, which no method of the BSDF returns.
 
     bumpy = mi.load_dict({"type": "bumpmap", "texture": {"type": "checkerboard"}, "bsdf": {"type": "diffuse"}})
     [name for name in dir(bumpy) if "frame" in name or "normal" in name]       # []
 
-Veach's correction of particles at shading normals (Veach1997, sec. 5.3) needs the cosines in the shading frame.
+Veach's correction for particles at shading normals (Veach1997, sec. 5.3) needs the cosines in the shading frame.
 
 Workaround: evaluate such BSDFs in the reverse direction, as radiance, and use a sampled half vector as the normal.
 """
@@ -18,5 +18,5 @@ _BENT = re.compile("NormalMap|BumpMap")
 
 
 def bends_normals(scene: Scene) -> bool:
-    """Whether a BSDF of the scene, nested ones included, is one of those two plugins."""
+    """Whether a BSDF of the scene, possibly a nested one, is one of these two plugins."""
     return any(_BENT.search(str(shape.bsdf())) for shape in scene.shapes())

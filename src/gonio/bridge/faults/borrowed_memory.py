@@ -1,8 +1,8 @@
 """Dr.Jit 1.5: an array made from a NumPy array borrows its memory, whose alignment becomes part of the kernel.
 
-    a = mi.Float(np.zeros(64, np.float32))                 # compiles one of two kernels, by NumPy's alignment
+    a = mi.Float(np.zeros(64, np.float32))                 # compiles one of two kernels, depending on the alignment
 
-The alignment is arbitrary, so kernels that are in the cache are compiled again.
+NumPy's alignment is arbitrary, so kernels that are already in the cache may be compiled again.
 
 Workaround: copy the values into memory that Dr.Jit allocates.
 """

@@ -1,14 +1,14 @@
 """Dr.Jit 1.5: kernels keep denormal numbers with one thread, and round them to 0 with two or more.
 
-    dr.set_thread_count(1)                                       # 2: 0
-    dr.opaque(mi.Float, 1e-30, 1 << 20) * dr.opaque(mi.Float, 1e-10)  # 1e-40
+    dr.set_thread_count(1)
+    dr.opaque(mi.Float, 1e-30, 1 << 20) * dr.opaque(mi.Float, 1e-10)  # 1e-40; with two threads 0
 
-The threads of its pool are told to round, the caller's, which computes alone if there is no other and where the arrays
-are short, is not. Products of
-small densities pass through such numbers, so a dark pixel had other bits with `--threads 1`.
+The threads of the pool are configured to round; the calling thread, which computes alone if there is no other or if the
+arrays are short, is not. Products of small densities pass through such numbers, so that a dark pixel had different bits
+with `--threads 1`.
 
-Workaround: let the calling thread round as well, by the C library on Linux, whose `fenv_t` is known. Elsewhere pictures
-of one thread may differ.
+Workaround: make the calling thread round as well, with the C library on Linux, whose `fenv_t` is known. Elsewhere,
+pictures rendered with one thread may differ.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def denormals_rounded() -> Iterator[None]:
 
 @functools.lru_cache
 def _access() -> tuple[ctypes.CDLL, int, int] | None:
-    """The C library with `fesetenv`, and where its argument holds the bits; None on an unknown system."""
+    """The C library with `fesetenv`, and the offset and value of the bits in its argument; None on unknown systems."""
     if platform.libc_ver()[0] != "glibc" or platform.machine() not in CONTROL:
         return None
     return ctypes.CDLL("libm.so.6"), *CONTROL[platform.machine()]

@@ -3,7 +3,7 @@
     dr.set_thread_count(1)
     mi.Bitmap("picture.exr")                               # never returns
 
-Mitsuba's OpenEXR submits blocks to Dr.Jit's threads and waits for them, but the waiting thread is the only one.
+Mitsuba's OpenEXR submits blocks to Dr.Jit's threads and waits for them, but the waiting thread may be the only one.
 
 Workaround: use a second thread while Mitsuba reads or writes a file.
 """
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def file_threads() -> Iterator[None]:
-    """Let Mitsuba read and write files inside the block with any number of threads."""
+    """Make it safe for Mitsuba to read and write files inside the block, whatever the number of threads."""
     import drjit as dr  # imported here, so that reading pictures does not load Dr.Jit
 
     count = dr.thread_count()

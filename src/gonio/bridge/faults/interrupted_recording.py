@@ -4,7 +4,7 @@
         raise KeyboardInterrupt
     dr.while_loop((mi.UInt32(0),), lambda i: i < 3, body, mode="symbolic")       # RuntimeError
 
-Workaround: look for the KeyboardInterrupt among the causes of the error.
+Workaround: search for the KeyboardInterrupt among the causes of the error.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Re-raise a KeyboardInterrupt inside the block as such."""
+    """Re-raise a KeyboardInterrupt inside the block as a KeyboardInterrupt."""
     try:
         yield
     except RuntimeError as error:

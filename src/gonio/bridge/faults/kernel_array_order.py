@@ -3,7 +3,7 @@
 Observed with the maps of `caustics`: the kernel was compiled again if a map was created before the sums instead of
 after them; tests/render/test_transport.py counts the kernels. No short reproduction is known, hence no canary.
 
-Workaround: copy all arrays of an object, one after the other, right before a kernel reads them.
+Workaround: copy all arrays of an object, one after another, immediately before a kernel reads them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .borrowed_memory import own
 
 
 def copy_arrays(thing: object) -> None:
-    """Replace every attribute of `thing` that is an array by a copy."""
+    """Replace every attribute of `thing` that is an array with a copy."""
     for name, value in vars(thing).items():
         if dr.is_array_v(value):
             setattr(thing, name, own(type(value), value))

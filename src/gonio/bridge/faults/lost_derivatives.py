@@ -16,5 +16,5 @@ from ..types import Mask, Radiance
 
 
 def own_variable(value: Radiance, active: Mask) -> Radiance:
-    """The value on active lanes, else 0, as a separate variable in Dr.Jit's AD graph."""
+    """The value on active lanes and 0 on others, as a separate variable in Dr.Jit's AD graph."""
     return dr.select(active, value, 0)

@@ -1,14 +1,14 @@
-"""Mitsuba 3.9: merging meshes of equal material makes a mesh that has no bounding box.
+"""Mitsuba 3.9: merging meshes of equal material creates a mesh without a bounding box.
 
     wall = {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}
     aside = mi.ScalarTransform4f().translate([3, 0, 0])
     mi.load_dict({"type": "merge", "a": wall, "b": {**wall, "to_world": aside}}).bbox().valid()      # False
 
-The scene's box does not include it, and nothing outside the scene's box blocks a sky or a beam: under a distant roof a
-sky contributes 0.84 instead of 0.81.
+The scene's box does not include the mesh, and nothing outside the scene's box blocks a sky or a beam: under a distant
+roof, a sky contributes 0.84 instead of 0.81.
 
-Workaround: compute the box before Gonio assembles a scene, and reload a scene of Mitsuba's that was assembled without
-it, since a scene keeps its own box.
+Workaround: compute the box before Gonio assembles a scene, and rebuild a Mitsuba scene that was assembled without it,
+since a scene does not update its own box.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..types import Scene, Shape
 
 
 def compute_boxes(shapes: Iterable[Shape]) -> None:
-    """Compute missing bounding boxes of the meshes among shapes."""
+    """Compute the bounding boxes of the meshes among the shapes."""
     for shape in shapes:
         if shape.is_mesh():
             shape.recompute_bbox()

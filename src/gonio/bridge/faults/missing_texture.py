@@ -12,7 +12,7 @@ from ..types import Properties, Texture
 
 
 def emissive_texture(properties: Properties, name: str, location: str) -> Texture:
-    """The texture of a property; InputError at `location` if it is missing."""
+    """The texture of a property. Raises InputError at `location` if it is missing."""
     if name not in properties:
         raise InputError("missing", location, f"give the {name}: a number, a color or a texture")
     return properties.get_emissive_texture(name)

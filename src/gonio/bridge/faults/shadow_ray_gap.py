@@ -5,7 +5,7 @@
 
 An occluder in that gap before a lamp does not cast a shadow.
 
-Workaround: end the ray at the point, up to float32 rounding; the point must lie on no surface.
+Workaround: end the ray at the point, up to float32 rounding; the point must not lie on a surface.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import drjit as dr
 from ..types import Point, Ray, SurfaceInteraction
 from .ray_offset import Offsets
 
-RELATIVE_GAP = 1e-6  # of the distance: float32 resolves it
+RELATIVE_GAP = 1e-6  # fraction of the distance, which float32 resolves
 
 
 def shadow_ray_to(offsets: Offsets, si: SurfaceInteraction, point: Point) -> Ray:

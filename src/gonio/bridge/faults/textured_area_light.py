@@ -1,7 +1,7 @@
 """Mitsuba 3.9: `area` lights with a texture are sampled incorrectly on most shapes.
 
-The emitter samples positions by uv, which triangles of a mesh may share: a cube is 18 % too dark. On rotated round
-shapes the normal is wrong (a cylinder is up to 21 % too dark), and on shapes with flipped normals the side.
+The emitter samples positions by uv, and triangles of a mesh may have the same uv: a cube is 18 % too dark. On rotated
+round shapes the normal is wrong (a cylinder is up to 21 % too dark), and on shapes with flipped normals the side is.
 
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), np.float32)), "raw": True}
     cube = mi.load_dict({"type": "cube", "emitter": {"type": "area", "radiance": texture}})

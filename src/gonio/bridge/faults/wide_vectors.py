@@ -1,11 +1,11 @@
-"""Dr.Jit 1.5: on processors with AVX-512 all kernels work on 16 lanes, which for 64-bit values are two registers each.
+"""Dr.Jit 1.5: on processors with AVX-512 all kernels have 16 lanes, which take two registers per 64-bit value.
 
     x = dr.arange(mi.Float64, 16)
     dr.eval(x * x)                                         # a register has 8
 
-The derivatives of OpenPBR in 64 bits, 76,000 operations, take 122 s to compile, and 19 s for 8 lanes: LLVM needs
-several times as long to assign registers, and the kernel runs no faster. No public function of Python sets the number;
-libdrjit-core exports one.
+The derivatives of OpenPBR in 64 bits, 76,000 operations, take 122 s to compile, but 19 s with 8 lanes: LLVM needs
+several times as long to allocate registers, and the kernel runs no faster. No public Python function sets the number of
+lanes; libdrjit-core exports one.
 
 Workaround: `narrow` compiles with 8 lanes inside a `with` block, for large kernels of 64-bit values that run once.
 """
@@ -23,14 +23,14 @@ LANES = 8
 
 
 def lanes() -> int:
-    """The number of values per vector; 0 if it is unknown."""
+    """The number of values per vector; 0 if unknown."""
     core = _core()
     return int(core._Z21jit_llvm_vector_widthv()) if core is not None else 0
 
 
 @contextlib.contextmanager
 def narrow() -> Iterator[None]:
-    """Compile the kernels of the block for 8 lanes, if they would have more. Their last bits may differ."""
+    """Compile the kernels of the block for 8 lanes if they would have more. The last bits of results may differ."""
     core = _core()
     before = lanes()
     if core is None or before <= LANES:
@@ -46,7 +46,7 @@ def narrow() -> Iterator[None]:
 
 
 def _core() -> ctypes.CDLL | None:
-    """The library, if it exports these functions by their names on Linux."""
+    """libdrjit-core, if it exports these functions under their Linux names; else None."""
     dr = backend.drjit()
     path = Path(str(dr.__file__)).parent / "libdrjit-core.so"
     if not path.is_file() or not dr.has_backend(dr.JitBackend.LLVM):

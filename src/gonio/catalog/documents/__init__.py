@@ -1,4 +1,4 @@
-"""Files that describe materials, such as glTF: the interface of a format, and how a text names one.
+"""Files that describe materials, such as glTF: the interface of a format, and the texts that name a file's material.
 
     chest.gltf                  the file's only material
     chest.gltf:Wood             one of several, by its name, or by its number if it has no unique name
@@ -23,14 +23,14 @@ from ...errors import GonioWarning, InputError, did_you_mean
 from ...material import is_model
 from ...members import Family, instances_of
 
-# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material, or a picture: {"type": "imageTex", ...}
+# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material, or an image: {"type": "imageTex", ...}
 Notation: TypeAlias = "dict[str, object]"
 
 
 class Described(NamedTuple):
     """A material as described by a file.
 
-    notation  in Gonio's notation, pictures included, as in a scene
+    notation  the material in Gonio's notation, including images, as in a scene
     notices   features that the notation cannot express, one sentence each
     """
 
@@ -41,9 +41,9 @@ class Described(NamedTuple):
 class Document:
     """A file format.
 
-    name      its type in scenes: {"type": "gltf", "file": ...}
-    suffixes  by which its files are recognized
-    writes    the type of material that `write` accepts, by name; "" if the format cannot be written
+    name      the format's type in scenes: {"type": "gltf", "file": ...}
+    suffixes  suffixes by which its files are recognized
+    writes    name of the material type that `write` accepts; "" if the format cannot be written
     """
 
     family: ClassVar[Family[Document]]
@@ -52,7 +52,7 @@ class Document:
     writes: ClassVar[str] = ""
 
     def holds(self, path: Path) -> bool:
-        """Whether a file with a suffix of the format describes materials, if other files have that suffix too."""
+        """Whether a file with a suffix of the format describes materials; other files may have the suffix too."""
         return True
 
     def materials(self, path: Path) -> list[str]:
@@ -68,8 +68,8 @@ class Document:
         raise NotImplementedError
 
     def image(self, path: Path, index: str) -> bytes:
-        """The bytes of a picture inside a file, which textures name FILE#INDEX."""
-        raise InputError(f"no picture '{index}' in it", str(path))
+        """The bytes of an image inside a file, which textures name FILE#INDEX."""
+        raise InputError(f"no picture '{index}' in this file", str(path))
 
     def write(self, notation: Notation, name: str) -> bytes:
         """The bytes of a file with one material of the type `writes`, under that name."""
@@ -82,7 +82,7 @@ Document.family = Family(
 
 
 def types() -> list[str]:
-    """The types of such files in scenes: {"type": "gltf", "file": ...}."""
+    """The types of document files in scenes: {"type": "gltf", "file": ...}."""
     return list(Document.family.all())
 
 
@@ -102,7 +102,7 @@ def names_document(text: str) -> bool:
 
 
 def inside(text: str) -> tuple[str, str]:
-    """File and number of FILE#NUMBER, a picture inside a document; the text itself and "" for any other file."""
+    """File and number of FILE#NUMBER, an image inside a document; the text itself and "" for any other file."""
     file, mark, index = text.rpartition("#")
     return (file, index) if mark and names_document(file) else (text, "")
 
@@ -119,7 +119,7 @@ def read(document: Document, path: Path, name: str = "") -> Described:
         shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
         raise InputError(what, str(path), f"name one, such as {path.name}:{known[0]}; there are {shown}")
     if name and name not in known:
-        raise InputError(f"no material '{name}' in it", str(path), did_you_mean(name, known[:1000]))
+        raise InputError(f"no material '{name}' in this file", str(path), did_you_mean(name, known[:1000]))
     return document.read(path, name or known[0])
 
 
@@ -133,15 +133,15 @@ def described(text: str) -> dict[str, Notation]:
 
 
 def without_pictures(text: str) -> Notation:
-    """The notation of FILE or FILE:MATERIAL with numbers only; a GonioWarning names omitted pictures."""
+    """The notation of FILE or FILE:MATERIAL with numbers only; a GonioWarning names omitted images."""
     parts = parted(text)
     assert parts is not None, "asked before"
     described = read(*parts)
     lost: list[str] = []
     notation = _plain(described.notation, lost)
     if lost:
-        what = "a picture stands" if len(lost) == 1 else f"{len(lost)} pictures stand"
-        lost = [f"{what} on the surface only, in scenes: here {', '.join(dict.fromkeys(lost))} are the factors alone"]
+        what = "a picture is" if len(lost) == 1 else f"{len(lost)} pictures are"
+        lost = [f"{what} used only in scenes: here only the factors of {', '.join(dict.fromkeys(lost))} apply"]
     for notice in (*described.notices, *lost):
         warnings.warn(f"{text}: {notice}", GonioWarning, stacklevel=3)
     return notation
@@ -155,7 +155,7 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     """
     operand = parted(source)
     if operand is None:
-        raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
+        raise InputError(f"'{source}' contains no material", source, 'such as {"type": "openpbr", ...} in a .json')
     described = read(*operand)
     write(described.notation, output)
     return described.notices
@@ -174,10 +174,10 @@ def write(notation: Notation, output: Path) -> None:
     target = known.get(output.suffix.lower())
     if target is None:
         hint = f"{', '.join(sorted(known))} or .json"
-        raise InputError(f"'{output.suffix}' is not a format of materials", str(output), hint)
+        raise InputError(f"'{output.suffix}' is not a material format", str(output), hint)
     kind = notation["type"]
     if kind != target.writes:
-        raise InputError(f"a {kind} given, but {target.name} holds {target.writes}", str(output))
+        raise InputError(f"a {kind} given, but {target.name} files hold {target.writes}", str(output))
     files.write_whole(output, target.write(notation, output.stem))
 
 
@@ -185,7 +185,7 @@ PREFIX = "gonio-"  # of types in scenes, where some names without it are the lab
 
 
 def for_scenes(notation: Mapping[str, object]) -> Notation:
-    """The notation with its types as scenes have them: "gonio-conductor"."""
+    """The notation with the types of scenes: "gonio-conductor"."""
     return _with_types(notation, lambda name: PREFIX + name if is_model(name) else name)
 
 

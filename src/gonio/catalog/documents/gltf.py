@@ -14,9 +14,9 @@ from . import Described, Document, Notation
 from .gltf_file import LARGEST, GltfFile, Json
 
 WHITE = (1.0, 1.0, 1.0)
-NARROWEST = 2e-3  # width under a sheen, since a sum has no mirrors
+NARROWEST = 2e-3  # smallest width under a sheen, since a sum cannot contain mirrors
 HIGHEST_INDEX = 3.0  # of a coat
-D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um, by which Abbe's number is defined
+D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um; the lines by which the Abbe number is defined
 
 # Extensions that files may require, which do not concern materials or are read here
 KNOWN = {
@@ -49,7 +49,7 @@ class Gltf(Document):
         file = GltfFile(path)
         at = f"/images/{index}"
         if not index.isdecimal() or int(index) >= len(file.items("images")):
-            raise InputError(f"no picture '{index}' in it", f"{path}#{at}")
+            raise InputError(f"no picture '{index}' in this file", f"{path}#{at}")
         image = file.items("images")[int(index)]
         uri = image.get("uri")
         if isinstance(uri, str):
@@ -60,8 +60,8 @@ class Gltf(Document):
 class _Material:
     """The translation of one material of a file.
 
-    It is a layered material, as in the specification, from the bottom: a dielectric, which is a clear layer over a
-    diffuse one or transmits; mixed with a metal; under sheen; under a clear coat; with holes.
+    It is layered as in the specification, from the bottom: a dielectric, which is a clear layer over a diffuse one or
+    transmits; mixed with a metal; under sheen; under a clear coat; with holes.
     """
 
     def __init__(self, file: GltfFile, index: int) -> None:
@@ -78,7 +78,7 @@ class _Material:
                 file.fail(f"it requires the extension {str(name)[:60]}, which is not read", "/extensionsRequired", hint)
         for name in self.extensions:
             if name not in KNOWN | {TELLS}:
-                self.notices.append(f"the extension {name[:60]} is not read: the material is without it")
+                self.notices.append(f"the extension {name[:60]} is not supported and is ignored")
         self._read()
 
     # ------------------------------------------------------------------ reading
@@ -140,7 +140,7 @@ class _Material:
         self._rest()
 
     def _rest(self) -> None:
-        """Properties that are not part of a scattering function, or cannot be expressed."""
+        """Read properties that are not part of a scattering function or cannot be expressed."""
         file, at = self.file, self.at
         normal = self.texture(self.own, "normalTexture", at)
         scale = file.number(file.member(self.own, "normalTexture", at), "scale", 1.0, at, -LARGEST, LARGEST)
@@ -154,7 +154,7 @@ class _Material:
         strength = file.number(values, "emissiveStrength", 1.0, place, 0.0, LARGEST)
         if any(emission) and strength:
             light = ", ".join(f"{strength * part:.4g}" for part in emission)
-            self.notices.append(f"it emits [{light}]: a material of Gonio's only scatters, give the shape an areaLight")
+            self.notices.append(f"it emits [{light}]: Gonio's materials only scatter; give the shape an areaLight")
         self.leave(self.own, at, "occlusionTexture")
         values, place = self.extension("diffuse_transmission")
         if file.number(values, "diffuseTransmissionFactor", 0.0, place, 0.0, 1.0) > 0.0:
@@ -168,7 +168,7 @@ class _Material:
                 self.notices.append(f"{key} is omitted: only its factor is used")
 
     def texture(self, of: Mapping[str, object], key: str, at: str, srgb: bool = False) -> Notation | None:
-        """A picture in the notation of scenes; None if there is none."""
+        """An image in the notation of scenes; None if there is none."""
         if key not in of:
             return None
         file, at = self.file, f"{at}/{key}"
@@ -181,7 +181,7 @@ class _Material:
         if transform:
             self.notices.append(f"{key} is used without its transform")
         if "source" not in texture:
-            self.notices.append(f"{key} has a picture that only an extension names, and is omitted")
+            self.notices.append(f"{key} is omitted: only an extension names its picture")
             return None
         number = file.index(texture, "source", "images", at)
         image = file.items("images")[number]
@@ -200,13 +200,13 @@ class _Material:
         return image_notation
 
     def _picture(self, image: Json, number: int) -> str:
-        """A picture's file, relative to the glTF; FILE#NUMBER if it is embedded."""
+        """An image's file, relative to the glTF file; FILE#NUMBER if it is embedded."""
         at, uri = f"/images/{number}", image.get("uri")
         if uri is None:
             self.file.index(image, "bufferView", "bufferViews", at)
             return f"{self.file.path.name}#{number}"
         if not isinstance(uri, str):
-            self.file.fail("a text expected", f"{at}/uri")
+            self.file.fail("a string expected", f"{at}/uri")
         if uri.startswith("data:"):
             self.file.data(uri, f"{at}/uri")
             return f"{self.file.path.name}#{number}"
@@ -221,7 +221,7 @@ class _Material:
         return factor if texture is None or not factor else {**texture, "channel": channel, "factor": factor}
 
     def widths(self, anisotropic: bool = True) -> Notation:
-        """`alpha` from the roughness, or the parameter that a picture drives."""
+        """`alpha` from the roughness, or the parameter that an image drives."""
         if isinstance(self.roughness, dict):
             if self.anisotropy:
                 self.say("the anisotropy is omitted, since the roughness is a picture")
@@ -268,7 +268,7 @@ class _Material:
         if isinstance(self.base, dict):
             self.say("the film is omitted, since its metal's color is a picture")
             return plain
-        # a metal is given by its reflectance only; as in the specification it gets an index without absorption
+        # only the reflectance of a metal is given; as in the specification, its index has no absorption
         roots = [math.sqrt(min(r, 0.9999)) for r in self.base]  # type: ignore[attr-defined]
         filmed: Notation = {"type": "film-conductor", "eta": [(1.0 + r) / (1.0 - r) for r in roots], "k": 0.0}
         filmed |= {**self.widths(), **self._film()}
@@ -306,7 +306,7 @@ class _Material:
             r0 = 1.0
         elif self.index < 1.0:
             self.file.fail(
-                f"ior {self.index:g} given, 0 or 1 and more expected", f"{self.at}/extensions/KHR_materials_ior"
+                f"ior {self.index:g} given, 0, or 1 or more expected", f"{self.at}/extensions/KHR_materials_ior"
             )
         else:
             r0 = ((self.index - 1.0) / (self.index + 1.0)) ** 2
@@ -347,7 +347,7 @@ class _Material:
         return f"cauchy({index - b / D_LINE**2:.9g}, {b:.9g})"
 
     def _sheened(self, body: Notation) -> Notation:
-        """Fibers on top; the layers below receive the light that they do not reflect on average."""
+        """Fibers on top; the layers below receive the light that the fibers do not reflect on average."""
         if not any(self.sheen):
             return body
         alpha = self.sheen_roughness**2
@@ -388,7 +388,7 @@ def _mixed(a: Notation, b: Notation, weight: object) -> Notation:
     return {"type": "mix", "a": a, "b": b, "weight": weight}
 
 
-# Of white `sheen-charlie`: (alpha, albedo for uniform illumination), measured by go.albedo
+# For white `sheen-charlie`: (alpha, albedo for uniform illumination), measured by go.albedo
 ALBEDOS = (
     (0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
     (0.0624, 0.0777, 0.1010, 0.1226, 0.1615, 0.1954, 0.2244, 0.2486, 0.2681, 0.2830, 0.2934, 0.2996),

@@ -1,7 +1,7 @@
 """A validated glTF 2.0 file: .gltf with its external files, or .glb (Khronos2021, sec. 4).
 
-All content is untrusted: sizes are compared with the actual sizes, indices with the lists they point into, and external
-files must be in the file's own folder.
+All content is untrusted: sizes are compared with the actual sizes and indices with the lists they point into, and
+external files must be in the file's own folder.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class GltfFile:
         count = len(self.items(into))
         number = self.integer(of, key, at)
         if number >= count:
-            self.fail(f"there is no {into} {number}, of {count}", f"{at}/{key}")
+            self.fail(f"there is no {into} {number}: the file has {count}", f"{at}/{key}")
         return number
 
     # ------------------------------------------------------------------ bytes
@@ -124,7 +124,7 @@ class GltfFile:
         return data[start : start + self.integer(view, "byteLength", at)]
 
     def local_file(self, uri: str, at: str) -> Path:
-        """The file at a relative address. Raises InputError if it is outside the folder or does not exist."""
+        """The file at a relative URI. Raises InputError if it is outside the folder or does not exist."""
         hint = "put the file into the same folder, or embed the data"
         if ":" in uri.split("/")[0] or uri.startswith(("//", "\\")):
             self.fail(f"'{uri[:60]}' is not a file in its folder", at, hint)
@@ -141,14 +141,14 @@ class GltfFile:
         return path
 
     def data(self, uri: str, at: str) -> bytes:
-        """The content of a data: address."""
+        """The content of a data: URI."""
         head, comma, text = uri.partition(",")
         if not comma or not head.endswith(";base64"):
-            self.fail("a data address without ';base64,'", at)
+            self.fail("a data URI without ';base64,'", at)
         try:
             return base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
-            self.fail("no base64", at)
+            self.fail("its data is not valid base64", at)
 
     def _buffer(self, index: int) -> bytes:
         buffer, at = self.items("buffers")[index], f"/buffers/{index}"
@@ -158,7 +158,7 @@ class GltfFile:
                 self.fail("a buffer without data", at)
             return self._chunk
         if not isinstance(uri, str):
-            self.fail("a text expected", f"{at}/uri")
+            self.fail("a string expected", f"{at}/uri")
         if uri.startswith("data:"):
             return self.data(uri, f"{at}/uri")
         return self._bytes_of(self.local_file(uri, f"{at}/uri"))
@@ -199,7 +199,7 @@ class GltfFile:
             chunks.setdefault(kind, data[at + 8 : at + 8 + size])
             at += 8 + size
         if _JSON not in chunks:
-            self.fail("a .glb without JSON")
+            self.fail("the .glb contains no JSON")
         return chunks[_JSON], chunks.get(_BIN)
 
     # ------------------------------------------------------------------ checks
@@ -209,12 +209,12 @@ class GltfFile:
             self.fail(f"{len(text)} bytes of JSON, at most {MOST_JSON} expected")
 
         def no_number(name: str) -> NoReturn:
-            raise ValueError(f"{name} is no number")
+            raise ValueError(f"{name} is not a JSON number")
 
         try:
             root = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
         except RecursionError:
-            self.fail("JSON that is nested too deep")
+            self.fail("its JSON is nested too deeply")
         except ValueError as error:  # also invalid UTF-8, and integers with more digits than Python converts
             self.fail(f"not valid JSON: {str(error)[:200]}", hint="it is truncated or damaged")
         if not isinstance(root, dict):
@@ -235,7 +235,7 @@ class GltfFile:
             end = self.integer(view, "byteOffset", at, 0) + self.integer(view, "byteLength", at)
             size = sizes[self.index(view, "buffer", "buffers", at)]
             if end > size:
-                self.fail(f"it ends at byte {end} of a buffer of {size}", at, "it is truncated or damaged")
+                self.fail(f"it ends at byte {end} of a buffer of {size} bytes", at, "it is truncated or damaged")
         for index, accessor in enumerate(self.items("accessors")):
             self._accessor(accessor, f"/accessors/{index}")
         self._nodes()

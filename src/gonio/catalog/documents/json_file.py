@@ -47,7 +47,7 @@ class JsonFile(Document):
         entry = (_entries(path) or {})[name]
         if isinstance(entry, str):  # from an earlier version, or a class without a file
             hint = f"name the material itself: '{entry}'"
-            raise InputError("it has the material as a text only, which is not read from files", str(path), hint)
+            raise InputError("it holds the material only as a string, which is not read from files", str(path), hint)
         if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
             raise InputError('a material is an object with a "type"', str(path), 'such as {"type": "openpbr", ...}')
         return Described(from_scenes(_located(entry, path.parent, str(path))), ())
@@ -110,7 +110,7 @@ def _located(notation: Mapping[str, object], folder: Path, where: str, depth: in
         if isinstance(value, dict):
             located[key] = _located(value, folder, where, depth + 1)
         elif key == "type" and from_scenes({key: value})[key] in Document.family.all():
-            raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
+            raise InputError(f"it has a material of type '{value}', which is in another file", where, "name that file")
         elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
             located[key] = str(folder / Path(os.path.expanduser(value)))
         else:

@@ -1,4 +1,4 @@
-"""MaterialX: open_pbr_surface and standard_surface, by the wheel MaterialX (gonio[materialx])."""
+"""MaterialX: open_pbr_surface and standard_surface, read with the wheel MaterialX (gonio[materialx])."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _wheel() -> ModuleType:
     try:
         return importlib.import_module("MaterialX")
     except ImportError:
-        what = "a MaterialX document needs the wheel MaterialX"
+        what = "a MaterialX document needs the package MaterialX"
         raise MachineError(what, "FILE.mtlx", "pip install 'gonio[materialx]'") from None
 
 
@@ -214,7 +214,7 @@ def _inputs(surface: Node, where: str) -> Inputs:
     """The inputs that are set on a surface, each a value of the type in its definition."""
     category = surface.getCategory()
     if category not in (OPEN_PBR, STANDARD):
-        raise InputError(f"unknown node '{category[:60]}'", where, f"{OPEN_PBR} and {STANDARD} are read")
+        raise InputError(f"unknown node '{category[:60]}'", where, f"supported: {OPEN_PBR} and {STANDARD}")
     known, inputs = _types(category), {}
     for one in surface.getInputs():
         name = one.getName()
@@ -236,7 +236,7 @@ def _value(one: Node, where: str) -> Number:
     try:
         value = _plain(one.getValue())
     except Exception:  # no value, or a text that is not a number
-        raise InputError(f"{name} = '{text[:60]}' is no {one.getType()}", where) from None
+        raise InputError(f"{name} = '{text[:60]}' is not of type {one.getType()}", where) from None
     numbers = value if isinstance(value, tuple) else (value,)
     if not all(math.isfinite(number) for number in numbers):
         raise InputError(f"{name} = '{text[:60]}' is not finite", where)

@@ -1,10 +1,10 @@
-"""What a shader's functions and uniforms mean: a short TOML beside the shader, FILE.toml, or a guess from names.
+"""The meaning of a shader's functions and uniforms: a short TOML file beside the shader, FILE.toml, or guesses.
 
 function = "BRDF"                       # f, a color or a number
 arguments = ["light", "view", "normal"] # the meaning of each argument
 cosine = false                          # whether the function includes |cos theta_i|
 albedo = "sheenAlbedo"                  # a function of the view that states the integral of the BRDF
-lossless_tolerance = 0.02               # the largest loss that is meant in a white furnace
+lossless_tolerance = 0.02               # the largest intended loss in a white furnace
 
 [parameters.roughness]                  # a uniform, or an argument
 default = 0.5
@@ -52,7 +52,7 @@ MEANINGS = {
     "ignored": "written by the function besides its value, and not read",
     "parameter": "a parameter of the material; of a struct every member is one",
 }
-# names of arguments, in lower case and without prefixes, to their meaning
+# names of arguments, in lower case and without prefixes, by their meaning
 _GUESSES = {
     "light": ("l", "wi", "light", "lightdir", "lightdirection", "ldir", "tolight", "omegai", "dirl"),
     "view": ("v", "wo", "view", "viewdir", "viewdirection", "eye", "eyedir", "vdir", "toeye", "toview", "omegao"),
@@ -72,9 +72,9 @@ MAX_TOML = 1 << 18
 
 @dataclass(frozen=True)
 class Uniform:
-    """A parameter as the adapter describes it; absent entries leave what the shader says.
+    """A parameter as the adapter describes it; entries that are missing are taken from the shader.
 
-    kind  of a vector of two: "alpha", widths along x and y; "angle", cosine and sine. "fixed" keeps the default
+    kind  for a vector of two: "alpha", widths along x and y, or "angle", cosine and sine; "fixed" keeps the default
     """
 
     default: Any = None
@@ -87,17 +87,19 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Adapter:
-    """The meaning of a shader, see the head of this file.
+    """The meaning of a shader; see the docstring of this module.
 
-    pdf, sample  names of functions, "" for none; pdf_arguments, sample_arguments: their meanings
-    derive       the name of a function of the parameters alone, whose result is the argument "derived" of others
-    struct       the type of the first argument, by which overloads are told apart; only in what `gonio emit` wrote
-    albedo       the name of a function that states the albedo for the view, "" for none, and its error that is meant
-    lossless_tolerance  the loss that is meant in a white furnace, None makes no claim
-    includes     folders, relative to the shader, from which it may include
-    defines      macros
-    where        the file that says so, for errors
-    unset_is_zero  whether variables and inputs that nothing sets are 0; else a shader that reads one is refused
+    pdf, sample         names of functions, "" for none
+    pdf_arguments, sample_arguments  the meanings of their arguments
+    derive              name of a function of the parameters alone, whose result is the argument "derived" of others
+    struct              type of the first argument, which distinguishes overloads; only for shaders from `gonio emit`
+    albedo              name of a function that states the albedo for the view, "" for none
+    albedo_tolerance    its intended error
+    lossless_tolerance  the intended loss in a white furnace; None for no claim
+    includes            folders, relative to the shader, from which it may include
+    defines             macros
+    where               file of the adapter, for errors
+    unset_is_zero       whether variables and inputs that are never set are 0; else a shader that reads one is refused
     """
 
     function: str = ""
@@ -135,10 +137,10 @@ def read(path: Path) -> Adapter:
     """The adapter in a TOML file. Raises InputError, with what is accepted, for unknown keys and wrong types."""
     try:
         if path.stat().st_size > MAX_TOML:
-            raise InputError(f"over {MAX_TOML} bytes", str(path), "an adapter is a short file")
+            raise InputError(f"larger than {MAX_TOML} bytes", str(path), "an adapter is a short file")
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"no adapter: {error}", str(path), "TOML as `gonio adopt` writes it") from None
+        raise InputError(f"not an adapter: {error}", str(path), "write TOML as `gonio adopt` does") from None
     return parsed(content, str(path))
 
 
@@ -155,7 +157,7 @@ def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) 
     """The adapter of the keys and values of a TOML file.
 
     where  the file, for errors
-    over   an adapter whose entries hold where the content has none
+    over   an adapter that supplies the entries missing from the content
     Raises InputError, with what is accepted, for unknown keys and wrong types.
     """
     over = Adapter() if over is None else over
@@ -168,13 +170,13 @@ def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) 
             what = f"{key} = {value!r:.40}, a {KINDS[key].__name__} expected"
             raise InputError(what, where, "see `gonio adopt FILE`")
         if isinstance(value, int | float) and number and not 0.0 <= value < 1.0:
-            raise InputError(f"{key} = {value!r:.40}", where, "a share of the light, 0 to 1")
+            raise InputError(f"{key} = {value!r:.40}", where, "give a share of the light, 0 to 1")
         fields[key] = _READERS.get(key, _as_is)(key, value, where, over)
     return replace(over, **fields)
 
 
 def with_options(adapter: Adapter, options: Sequence[tuple[str, str]]) -> Adapter:
-    """An adapter with entries in place of its own, as the command line has them: ("parameters.alpha.low", "0.1").
+    """An adapter with some entries replaced by options of the command line: ("parameters.alpha.low", "0.1").
 
     Raises InputError as `parsed` does.
     """
@@ -186,7 +188,7 @@ def with_options(adapter: Adapter, options: Sequence[tuple[str, str]]) -> Adapte
         for name in path[:-1]:
             place = place.setdefault(name, {})
             if not isinstance(place, dict):
-                raise InputError(f"{key} = {text:.40}, and '{name}' has a value already", OPTION, "give one of them")
+                raise InputError(f"{key} = {text:.40}, but '{name}' already has a value", OPTION, "give one of them")
         place[path[-1]] = _value(path, text)
     return replace(parsed(content, OPTION, adapter), where=adapter.where or OPTION) if content else adapter
 
@@ -195,7 +197,7 @@ OPTION = "--adapter"
 
 
 def _value(path: Sequence[str], text: str) -> object:
-    """The value of an option's text: a list by commas, a number, true, false, or the text."""
+    """The value of an option's text: a list with commas, a number, true, false, or the text."""
     if KINDS.get(path[0]) is str or path[0] == "defines" or path[-1] in ("unit", "doc", "file"):
         return text
     if KINDS.get(path[0]) is list or "," in text:
@@ -234,14 +236,14 @@ def _meanings(key: str, values: list[object], where: str, over: Adapter) -> tupl
 
 def _folders(key: str, values: list[object], where: str, over: Adapter) -> tuple[str, ...]:
     if not all(isinstance(value, str) for value in values):
-        raise InputError(f"{key} = {values!r:.40}, names of folders expected", where, 'includes = ["chunks"]')
+        raise InputError(f"{key} = {values!r:.40}, names of folders expected", where, 'such as includes = ["chunks"]')
     return tuple(map(str, values))
 
 
 def _defines(key: str, values: Mapping[str, object], where: str, over: Adapter) -> dict[str, str]:
     for name, value in values.items():
         if isinstance(value, dict | list):
-            raise InputError(f"{key}.{name} = {value!r:.40}, a text or a number expected", where, '{ NAME = "1" }')
+            raise InputError(f"{key}.{name} = {value!r:.40}, a string or a number expected", where, '{ NAME = "1" }')
     return {**over.defines, **{name: _macro(value) for name, value in values.items()}}
 
 
@@ -251,7 +253,7 @@ def _macro(value: object) -> str:
 
 def _language(key: str, value: str, where: str, over: Adapter) -> str:
     if value not in ("glsl", "hlsl", "slang", "wgsl"):
-        raise InputError(f"unknown language '{value}'", where, "glsl, hlsl, slang or wgsl")
+        raise InputError(f"unknown language '{value}'", where, "use glsl, hlsl, slang or wgsl")
     return value
 
 
@@ -268,11 +270,11 @@ def _uniform(name: str, value: object, where: str, over: Uniform) -> Uniform:
     default = value.get("default")
     numbers = default if isinstance(default, list) else [] if default is None else [default]
     if not all(isinstance(one, int | float) for one in numbers) or (isinstance(default, list) and not default):
-        raise InputError(f"parameters.{name}: default = {default!r:.40}", where, "a number, or a list of numbers")
+        raise InputError(f"parameters.{name}: default = {default!r:.40}", where, "give a number or a list of numbers")
     ends = [(key, value[key]) for key in ("low", "high") if key in value]
     for key, one in [*(("default", one) for one in numbers), *ends]:
         if not (-LARGEST <= one <= LARGEST) and not (key != "default" and one in (math.inf, -math.inf)):
-            raise InputError(f"parameters.{name}: {key} = {str(one)[:40]}", where, "a number that 64 bits can hold")
+            raise InputError(f"parameters.{name}: {key} = {str(one)[:40]}", where, "give a number that fits in 64 bits")
     if value.get("kind", "") not in UNIFORMS:
         raise InputError(f"parameters.{name}: unknown kind '{value['kind']}'", where, ", ".join(UNIFORMS[1:]))
     made = replace(over, **{**value, "default": over.default if default is None else _plain(default)})
@@ -288,7 +290,7 @@ def check_range(name: str, uniform: Uniform, where: str) -> None:
     numbers = default if isinstance(default, tuple) else () if default is None else (default,)
     if low > high or not all(low <= one <= high for one in numbers):
         what = f"parameters.{name}: default = {default!r:.40}, low = {uniform.low}, high = {uniform.high}"
-        raise InputError(what, where, "the default lies between low and high")
+        raise InputError(what, where, "the default must lie between low and high")
 
 
 LARGEST = sys.float_info.max
@@ -313,11 +315,11 @@ def _texture(name: str, value: object, where: str, over: Mapping[str, Any]) -> d
         if made.get(key, accepted[0]) not in accepted:
             raise InputError(f"textures.{name}: unknown {key} '{made[key]}'", where, " or ".join(accepted))
     if "file" not in made:
-        raise InputError(f"textures.{name} names no file", where, "file = 'table.npy'")
+        raise InputError(f"textures.{name} names no file", where, "add file = 'table.npy'")
     sizes = made.get("shape", [1, 1])
     if not all(isinstance(one, int) and 0 < one < 1 << 24 for one in sizes) or not 2 <= len(sizes) <= 4:
         what = f"textures.{name}: shape = {sizes!r:.40}"
-        raise InputError(what, where, "[rows, columns, channels], of a file without a header")
+        raise InputError(what, where, "give [rows, columns, channels] for a file without a header")
     return made
 
 

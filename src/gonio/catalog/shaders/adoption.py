@@ -1,4 +1,4 @@
-"""The first adapter of a shader, by looking at its names, and a list of the guesses in it."""
+"""A first adapter for a shader, guessed from its names, and the list of these guesses."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from .program import Program
 
 
 class Adopted(NamedTuple):
-    """An adapter as TOML, and what was guessed, one sentence each."""
+    """An adapter as TOML, and the guesses in it, one sentence each."""
 
     text: str
     guesses: tuple[str, ...]
 
 
 def adopt(file: str | Path) -> Adopted:
-    """The adapter of a shader's name, whose options are written into it. Raises InputError for what cannot be read."""
+    """The adapter for a shader's name, including the options in it. Raises InputError if the shader cannot be read."""
     name, query = parted(str(file))
     path = Path(os.path.expanduser(name))
     if not names_shader(str(path)):
-        hint = "a .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf"
-        raise InputError(f"'{name}' {'is no shader by its name' if path.exists() else 'does not exist'}", "FILE", hint)
+        hint = "give a .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf"
+        raise InputError(f"'{name}' {'is not a shader file' if path.exists() else 'does not exist'}", "FILE", hint)
     if not path.is_file():
-        raise InputError(f"'{name}' {'is no file' if path.exists() else 'does not exist'}", "FILE")
+        raise InputError(f"'{name}' {'is not a file' if path.exists() else 'does not exist'}", "FILE")
     if (manifest := manifest_of(path)) is not None:
-        raise InputError(f"'{path.name}' was written by gonio emit, and {manifest} is its adapter", "FILE", "use it")
+        raise InputError(f"'{path.name}' was written by gonio emit, and {manifest} is its adapter", "FILE", "use that")
     program = read(path, None, options=options_in(query))
     adapter = program.adapter
     lines = [
@@ -79,7 +79,7 @@ def _toml(value: object, shape: str) -> str:
 
 
 def _number(value: object) -> str:
-    """A number in the digits that 32 bits have: 0.8, not 0.800000011920929."""
+    """A number with the digits of 32 bits: 0.8, not 0.800000011920929."""
     number = float(str(value))
     short = float(str(np.float32(number)))
     return f"{short if np.float32(number) == np.float64(number) else number}"

@@ -1,4 +1,4 @@
-"""The parameters of a shader: its uniforms and arguments, taken apart into numbers, colors, flags and integers.
+"""The parameters of a shader: its uniforms and arguments, split into numbers, colors, flags and integers.
 
 uniform mat3 M;        M_0, M_1, M_2      a color per column
 uniform vec4 c[2];     c_0, c_1           four numbers each, c_0_x and so on
@@ -18,11 +18,11 @@ from .adapter import Uniform
 
 PLAIN = ("float", "bool", "int", "uint", "vec2", "vec3", "vec4")
 INTEGERS = ("int", "uint")
-MAX_NUMBERS = 64  # of a uniform that is taken apart
+MAX_NUMBERS = 64  # of a uniform that is split
 
 
 class Declared(NamedTuple):
-    """A parameter of a shader: where it is, its shape ("float", "vec3", ...), and what the adapter says."""
+    """A parameter of a shader: its name, its shape ("float", "vec3", ...), and its entry in the adapter."""
 
     name: str
     shape: str
@@ -30,7 +30,7 @@ class Declared(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A part of a uniform or argument that is a parameter, and its value in the text, None without one."""
+    """A part of a uniform or argument that is a parameter, and its value in the text, None if it has none."""
 
     name: str
     shape: str
@@ -38,7 +38,7 @@ class Piece(NamedTuple):
 
 
 def pieces(module: Module, name: str, type: int, default: Value = None) -> Iterator[Piece]:
-    """The parameters in a uniform or argument of a type; none for textures and for more than 64 numbers."""
+    """The parameters in a uniform or argument of a type; none for textures, and none for more than 64 numbers."""
     kind, shape = module.type(type), module.shape(type)
     if shape in PLAIN:
         yield Piece(name, shape, default)
@@ -51,7 +51,7 @@ def pieces(module: Module, name: str, type: int, default: Value = None) -> Itera
 
 
 def assembled(module: Module, name: str, type: int, values: Mapping[str, Value], zero: bool) -> Value:
-    """The value of a uniform or argument from those of its parameters; what is none of them is undefined, or 0."""
+    """The value of a uniform or argument from those of its parameters; other parts are undefined, or 0."""
     kind, shape = module.type(type), module.shape(type)
     if shape in PLAIN and name in values:
         return values[name]
@@ -59,12 +59,12 @@ def assembled(module: Module, name: str, type: int, values: Mapping[str, Value],
         return tuple(assembled(module, part, inside, values, zero) for part, inside in parts)
     if zero:
         return module.zero(type)
-    hint = f"uniforms and arguments of at most {MAX_NUMBERS} numbers are parameters"
-    return module.undefined(type, Undefined(f"'{name}' ({kind.size} numbers, {shape}) is no parameter", hint, True))
+    hint = f"only uniforms and arguments of at most {MAX_NUMBERS} numbers are parameters"
+    return module.undefined(type, Undefined(f"'{name}' ({kind.size} numbers, {shape}) is not a parameter", hint, True))
 
 
 def _parts(module: Module, name: str, type: int) -> list[tuple[str, int]]:
-    """Names and types of what a composite holds."""
+    """Names and types of the parts of a composite."""
     kind = module.type(type)
     if kind.kind == "struct":
         return [(f"{name}_{module.members.get((type, at), at)}", part) for at, part in enumerate(kind.parts)]

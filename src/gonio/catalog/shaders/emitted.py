@@ -1,4 +1,4 @@
-"""Shaders that `gonio emit` wrote: the manifest.json beside one states what an adapter would."""
+"""Shaders written by `gonio emit`: the manifest.json beside one replaces an adapter."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 from ...errors import InputError
 
-MAX_MANIFEST = 16 << 20  # bytes; of a module with all materials it has 1 MB
+MAX_MANIFEST = 16 << 20  # bytes; that of a module with all materials has 1 MB
 _KINDS = {"alpha": "alpha", "angle": "angle"}  # kinds of parameters whose fields are vectors of another meaning
 
 
 def manifest_of(shader: Path) -> Path | None:
-    """The manifest that names a shader as its own, None if there is none."""
+    """The manifest that names a shader as its own; None if there is none."""
     file = shader.parent / "manifest.json"
     try:
         if not file.is_file() or file.stat().st_size > MAX_MANIFEST:
@@ -22,13 +22,13 @@ def manifest_of(shader: Path) -> Path | None:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return None
-    if f'"{shader.name}"' not in text:  # other programs have files of that name
+    if f'"{shader.name}"' not in text:  # other programs also write files of that name
         return None
     return file if _loaded(file).get("shader") == shader.name else None
 
 
 def content(file: Path, function: str = "") -> dict[str, Any]:
-    """What an adapter of a shader would say, by its manifest; empty for a function that is no material's `eval`.
+    """The content of an adapter for a shader, from its manifest; empty if the function is not a material's `eval`.
 
     Raises InputError for a module of several materials if no function is named, and for a damaged manifest.
     """
@@ -41,10 +41,10 @@ def content(file: Path, function: str = "") -> dict[str, Any]:
             return {} if chosen is None else dict(_entries(chosen))
         if len(named) != 1:
             hint = f"name its function: --adapter function={next(iter(named), 'NAME')}"
-            raise InputError(f"{len(named)} materials: {', '.join(named) or 'no eval'}", str(file), hint)
+            raise InputError(f"{len(named)} materials, one expected: {', '.join(named) or 'no eval'}", str(file), hint)
         return dict(_entries(next(iter(named.values()))))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        what = f"no manifest of `gonio emit`: {type(error).__name__} {error}"
+        what = f"not a manifest of `gonio emit`: {type(error).__name__} {error}"
         raise InputError(what[:200], str(file), "emit the shader again, or remove the manifest") from None
 
 
@@ -53,7 +53,7 @@ def _loaded(file: Path) -> dict[str, Any]:
         loaded = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         hint = "emit the shader again, or remove the manifest"
-        raise InputError(f"no manifest: {error}"[:200], str(file), hint) from None
+        raise InputError(f"not a manifest: {error}"[:200], str(file), hint) from None
     return loaded if isinstance(loaded, dict) else {}
 
 
@@ -75,7 +75,7 @@ def _entries(manifest: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _parameter(field: Mapping[str, Any], described: Mapping[str, Any]) -> dict[str, Any]:
-    """A field of the struct; one on which tables depend keeps its value."""
+    """The entry of a field of the struct; a field on which tables depend keeps its value."""
     kind = "fixed" if described["fixed"] else _KINDS.get(described["kind"], "")
     result = {"default": field["value"] if kind == "fixed" else described["value"], "doc": described["doc"]}
     result |= {key: described[key] for key in ("low", "high") if described[key] is not None and kind != "fixed"}
@@ -84,6 +84,6 @@ def _parameter(field: Mapping[str, Any], described: Mapping[str, Any]) -> dict[s
 
 def _texture(texture: Mapping[str, Any]) -> dict[str, Any]:
     if texture["file_format"] != "raw":
-        what = f"tables in the form '{texture['file_format']}'"
-        raise InputError(what, f"{texture['file']}", "raw ones are read: gonio emit --tables raw")
+        what = f"tables in the form '{texture['file_format']}' cannot be read"
+        raise InputError(what, f"{texture['file']}", "write raw ones: gonio emit --tables raw")
     return {"file": texture["file"], "shape": [*reversed(texture["size"]), texture["channels"]]}

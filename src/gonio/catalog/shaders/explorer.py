@@ -29,7 +29,7 @@ def is_explorer(text: str) -> bool:
 
 
 def read(text: str, where: str) -> tuple[str, Adapter]:
-    """The GLSL, on the lines where the file has it, and the adapter. Raises InputError, with file and line."""
+    """The GLSL, at the same lines as in the file, and the adapter. Raises InputError, with file and line."""
     section, lines, parameters = "", [], {}
     declared: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -42,11 +42,11 @@ def read(text: str, where: str) -> tuple[str, Adapter]:
         if section == "parameters" and not mark and words:
             name, kind, uniform = _parameter(words, f"{where}:{number}")
             if name in parameters:
-                raise InputError(f"two parameters '{name}'", f"{where}:{number}", "remove one")
+                raise InputError(f"two parameters named '{name}'", f"{where}:{number}", "remove one")
             parameters[name] = uniform
             declared.append(f"uniform {kind} {name};")
     if not any(line.strip() for line in lines):
-        raise InputError("no shader in it", where, "::begin shader ... ::end shader")
+        raise InputError("no shader in this file", where, "add ::begin shader ... ::end shader")
     lines[0] = " ".join(declared)
     arguments = ("light", "view", "normal", "tangent", "bitangent")
     adapter = Adapter("BRDF", arguments, cosine=False, language="glsl", parameters=parameters)
@@ -60,12 +60,12 @@ def _parameter(words: list[str], where: str) -> tuple[str, str, Uniform]:
         raise InputError(
             f"'{' '.join(words)[:60]}' declares no parameter",
             where,
-            "float NAME MIN MAX DEFAULT, color NAME R G B, or bool NAME 0|1",
+            "write float NAME MIN MAX DEFAULT, color NAME R G B, or bool NAME 0|1",
         )
     try:
         numbers = [float(word) for word in words[2 : counts[words[0]]]]
     except ValueError:
-        raise InputError(f"'{' '.join(words[2:])[:60]}' are no numbers", where) from None
+        raise InputError(f"'{' '.join(words[2:])[:60]}' are not numbers", where) from None
     if not all(map(math.isfinite, numbers)):
         raise InputError(f"'{' '.join(words[2:])[:60]}' is not finite", where)
     if words[0] == "float":

@@ -1,4 +1,4 @@
-"""Shader files as material classes, made once per saved version of the shader and of all that it includes.
+"""Shader files as material classes, created once per saved version of the shader and of all files that it includes.
 
 cls = class_of("my.glsl")      # a class with the shader's parameters
 Shader("my.glsl", roughness=0.3)
@@ -32,7 +32,7 @@ from .program import Program
 _LANGUAGES = {".hlsl": "hlsl", ".slang": "slang", ".wgsl": "wgsl"}  # others are GLSL
 MAX_FILE = 4 << 20  # bytes of a shader
 MAX_CLASSES = 64  # in memory
-# parameters whose names say that they lie in [0, 1]
+# names of parameters that are taken to lie in [0, 1]
 _UNIT = re.compile(r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.I)
 
 
@@ -49,10 +49,10 @@ def Shader(
         go.Shader("my.glsl", defines={"USE_SHEEN": 1}, adapter={"function": "evalSheen", "textures": {"lut": "e.npy"}})
 
     file        the shader; FILE.toml beside it is its adapter, see docs/shaders.md
-    defines     macros of GLSL, HLSL and Slang, overrides of WGSL, by name; those of the adapter hold beside them
-    adapter     entries as in FILE.toml, in place of those there
-    parameters  values of its parameters
-    Raises InputError, with file and line, for what cannot be read; MachineError without a compiler.
+    defines     macros of GLSL, HLSL and Slang, overrides of WGSL, by name; added to those of the adapter
+    adapter     entries as in FILE.toml, which override those there
+    parameters  values of the shader's parameters
+    Raises InputError, with file and line, for a shader that cannot be read; MachineError without a compiler.
     """
     macros = [(f"defines.{key}", value) for key, value in (defines or {}).items()]
     options = [(key, adapters.as_option(value)) for key, value in (*_flat(adapter or {}), *macros)]
@@ -80,15 +80,15 @@ _classes: dict[tuple[str, str, str], tuple[_Stamp, type[BSDF]]] = {}
 
 
 def files_read(shader: Path) -> frozenset[Path]:
-    """What a shader was last made from: it, its adapter, includes and textures. Empty if it was never made."""
+    """The files of a shader's last use: the shader, its adapter, includes and textures. Empty if it was never used."""
     stamps = [stamp for (path, _, _), (stamp, _) in _classes.items() if Path(path) == shader.absolute()]
     return frozenset(Path(name) for stamp in stamps for name, _, _ in stamp)
 
 
 def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
-    """The class of a shader's name, which may have options: "my.glsl", "my.glsl?function=f".
+    """The class for a shader's name, which may contain options: "my.glsl", "my.glsl?function=f".
 
-    inside  the folder in which the files that the adapter names must lie, None for any folder
+    inside  the folder that must contain the files named by the adapter; None for any folder
     """
     file, query = parted(text)
     path = Path(os.path.expanduser(file)).absolute()
@@ -115,7 +115,7 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
 
 
 def adapter_of(path: Path) -> Path | None:
-    """The file that says how a shader is read: the adapter beside it, or the manifest of `gonio emit`."""
+    """The file that states how a shader is read: the adapter beside it, or the manifest from `gonio emit`."""
     named = Path(f"{path}.toml"), path.with_suffix(".toml")
     return next((one for one in named if one.is_file()), None) or emitted.manifest_of(path)
 
@@ -137,14 +137,14 @@ def read(
 ) -> Program:
     """The program of a file.
 
-    adapter_file  as `adapter_of` finds it; without one names are interpreted
-    options       entries in place of the adapter's, by key
+    adapter_file  from `adapter_of`; if None, meanings are guessed from names
+    options       entries that override the adapter's, by key
     """
     where = path.name
     if not path.is_file():
-        raise InputError(f"'{path}' is no file", where)
+        raise InputError(f"'{path}' is not a file", where)
     if path.stat().st_size > MAX_FILE:
-        raise InputError(f"over {MAX_FILE >> 20} MB", where, "a shader is shorter")
+        raise InputError(f"larger than {MAX_FILE >> 20} MB", where, "shaders are shorter")
     if adapter_file is not None:
         _confined(adapter_file, inside)
     data, files = path.read_bytes(), list[Path]()
@@ -167,13 +167,13 @@ def read(
 
 
 def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str, str]]) -> Adapter:
-    """What the shader's own file says, or the adapter in place of that, with options in place of its entries."""
+    """The adapter in a file, else that from the shader's own text, with entries overridden by options."""
     function = dict(options).get("function", "")
     if file is not None and file.suffix == ".json":
         described = adapters.parsed(emitted.content(file, function), str(file))
     elif file is not None:
         described = adapters.read(file)
-    if function and function != described.function:  # what the adapter says of another function does not hold
+    if function and function != described.function:  # the adapter's entries on another function do not apply
         described = replace(described, arguments=(), cosine=None, pdf="", sample="", derive="", struct="")
     return adapters.with_options(described, options)
 
@@ -181,9 +181,10 @@ def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str,
 def _compiled(
     text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path], files: list[Path]
 ) -> Module:
-    """The module of a text; `folders` begin with the shader's own, in which #include <FILE> does not look.
+    """The module of a text.
 
-    files  gets the files that it includes
+    folders  the shader's own folder, in which #include <FILE> does not look, and then the named ones
+    files    receives the files that the text includes
     """
     if language == "wgsl":
         return translated(text, where, defines, folders, files)
@@ -193,7 +194,7 @@ def _compiled(
 
 
 def _confined(path: Path, inside: Path | None) -> Path:
-    """A file or folder that an adapter names."""
+    """The resolved path of a file or folder that an adapter names. Raises InputError if it is outside `inside`."""
     resolved = path.resolve()
     if inside is not None and not resolved.is_relative_to(inside.resolve()):
         raise InputError(f"'{path.name}' lies outside the scene's folder {inside}", str(path), "copy it there")
@@ -204,7 +205,7 @@ def _confined(path: Path, inside: Path | None) -> Path:
 
 
 class _ShaderType(type):
-    """The type of classes made from files, by which they are pickled as the file's name."""
+    """The metaclass of classes created from files, which are pickled as the file's name."""
 
 
 def _pickled(cls: _ShaderType) -> object:
@@ -216,11 +217,11 @@ copyreg.pickle(_ShaderType, _pickled)  # type: ignore[arg-type]
 
 
 class _Shader(_ShaderFile, metaclass=_ShaderType):
-    """Base of classes without a density of their own."""
+    """Base of classes without their own density."""
 
 
 class _SampledShader(_SampledShaderFile, metaclass=_ShaderType):
-    """Base of classes with one."""
+    """Base of classes with their own density."""
 
 
 def _made(path: Path, spelling: str, program: Program, inside: Path | None) -> type[BSDF]:
@@ -251,7 +252,7 @@ def _made(path: Path, spelling: str, program: Program, inside: Path | None) -> t
 
 
 def _probe(material: BSDF) -> None:
-    """Raise InputError, with file and line, for constructs that are not read, before a law or a render meets them."""
+    """Raise InputError, with file and line, for unsupported constructs, before a law or a render fails on them."""
     for formula in ("eval", "pdf", "sample") if not type(material).guided else ("eval",):
         material.record(formula)
     material.stated_albedo(np.array([[0.0, 0.0, 1.0]]))
@@ -262,7 +263,7 @@ _RESERVED = {*dir(_SampledShaderFile), *keyword.kwlist, *_SCENES, "program"}
 
 
 def bounds(declared: Declared) -> tuple[float, float, Any]:
-    """Range and default of a parameter; by its name where the adapter does not say."""
+    """Range and default of a parameter; guessed from its name if the adapter does not state them."""
     uniform = declared.uniform
     named = declared.shape not in INTEGERS and _UNIT.search(declared.name)
     any_number = 0.0 if declared.shape == "uint" else -np.inf, np.inf
@@ -274,7 +275,7 @@ def bounds(declared: Declared) -> tuple[float, float, Any]:
 
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
-    """The fields of a parameter: one, or one per component of vectors that are no colors."""
+    """The fields of a parameter: one, or one per component for a vector that is not a color."""
     name = declared.name.lstrip("_")
     name = f"{name}_" if name in _RESERVED else name
     uniform = declared.uniform
@@ -295,13 +296,13 @@ def _fields(declared: Declared) -> list[tuple[str, Any]]:
         letters = "xyzw"[: int(declared.shape[-1])]
         parts = default if isinstance(default, tuple) else (default,) * len(letters)
         if len(parts) != len(letters):
-            raise InputError(f"{len(parts)} defaults of {declared.shape} {declared.name}", "adapter")
+            raise InputError(f"{len(parts)} default values for {declared.shape} {declared.name}", "adapter")
         return [
             (f"{name}_{letter}", kinds.number(float(part), f"{doc}, {letter}", low=low, high=high))
             for letter, part in zip(letters, parts, strict=True)
         ]
     if isinstance(default, tuple):
-        raise InputError(f"{len(default)} defaults of {declared.shape} {declared.name}", "adapter", "one number")
+        raise InputError(f"{len(default)} default values for {declared.shape} {declared.name}", "adapter", "give one")
     if declared.shape in INTEGERS:
         return [(name, integer(default, doc, low, high))]
     return [(name, kinds.number(float(default), doc, low=low, high=high, unit=uniform.unit))]

@@ -1,4 +1,4 @@
-"""What a shader does not say: which function is its BRDF, and what the arguments mean, by their names and types."""
+"""Guesses, from names and types, of what a shader does not state: its BRDF, and the meaning of its arguments."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def one_of(module: Module, adapter: Adapter, key: str, where: str) -> Function:
     if len(functions) > 1 and adapter.struct:
         functions = of_struct(module, name, adapter.struct)
     if len(functions) != 1:
-        raise InputError(f"{len(functions)} functions '{name}'", where, "rename one: an adapter names functions")
+        raise InputError(f"{len(functions)} functions named '{name}'", where, "rename one: an adapter names functions")
     return functions[0]
 
 
 def of_struct(module: Module, name: str, struct: str) -> list[Function]:
-    """Of the functions of a name those whose first parameter is a struct of that name, as of a mix of mixes."""
+    """The functions of a name whose first parameter is a struct of name `struct`; a mix of mixes has overloads."""
     return [one for one in module.function(name) if _first(module, one) == struct]
 
 
 def _first(module: Module, function: Function) -> str:
-    """The name of the type of a function's first parameter, as far as it is a struct."""
+    """The name of the type of a function's first parameter if it is a struct, else ""."""
     type_ = function.parameters[0][1] if function.parameters else 0
     if type_ and module.type(type_).kind == "pointer":
         type_ = module.type(type_).parts[0]
@@ -46,9 +46,9 @@ def _first(module: Module, function: Function) -> str:
 
 
 def _meanings(module: Module, function: Function, derived: bool = False) -> tuple[str, ...]:
-    """The meaning of each argument by its name, and by its type where the name says nothing.
+    """The meaning of each argument from its name, or from its type if the name is unknown.
 
-    derived  whether an argument of that name is what the adapter's function `derive` returns
+    derived  whether an argument of this name is the result of the adapter's function `derive`
     """
     result = []
     written = _written(module, function)
@@ -67,7 +67,7 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
 
 
 def _written(module: Module, function: Function) -> list[int]:
-    """The parameters that a function writes before it reads them, as `out` ones: colors, then numbers."""
+    """The parameters that a function writes before it reads them, such as `out` ones: colors, then numbers."""
     first: dict[int, bool] = {id: False for id, type in function.parameters if module.type(type).kind == "pointer"}
     pending, owner = set(first), {id: id for id in first}
     for block in function.blocks.values():
@@ -84,7 +84,7 @@ def _written(module: Module, function: Function) -> list[int]:
 
 
 def _rank(module: Module, function: Function) -> tuple[int, int]:
-    """How much a function looks like a BRDF: by its name, and by the directions among its arguments."""
+    """How much a function looks like a BRDF, from its name and from the directions among its arguments."""
     name = title(module, function).lower()
     exact = {"brdf": 6, "bsdf": 6, "evalbrdf": 5, "evaluatebrdf": 5, "brdf_eval": 5, "evalbsdf": 5, "eval": 4}
     near = 4 if name.endswith("_eval") else 3 if "brdf" in name or "bsdf" in name else 0
@@ -96,7 +96,7 @@ def _rank(module: Module, function: Function) -> tuple[int, int]:
 
 
 def candidates(module: Module) -> list[str]:
-    """The names of the functions that look most like a BRDF, equally so; those that no other of them calls first."""
+    """The names of the equally best candidates for the BRDF; those that are not called by the others come first."""
     own = [one for one in module.functions.values() if not title(module, one).startswith(("main", "gonio_"))]
     best = max((_rank(module, one) for one in own), default=(0, 0))
     equal = [one for one in own if best[0] > 0 and _rank(module, one) == best]
@@ -111,7 +111,7 @@ def _calls(function: Function) -> Iterator[int]:
 
 
 def completed(module: Module, adapter: Adapter, where: str) -> Adapter:
-    """The adapter with guesses for what it leaves open."""
+    """The adapter with guesses for its missing entries."""
     guessed = not adapter.function
     name = adapter.function or next(iter(candidates(module)), "")
     adapter = replace(adapter, function=name)

@@ -22,23 +22,23 @@ if TYPE_CHECKING:
     from .program import Program
 
 ROTATIONS = 64  # directions at which isotropy is tested
-_SIZES = {"spectrum": (3,), "alpha": (2,)}  # of parameters that are vectors
+_SIZES = {"spectrum": (3,), "alpha": (2,)}  # shapes of parameters that are vectors
 ISOTROPIC = 1e-9  # relative change by a rotation, in 64 bits
 
 
 class _ShaderFile(BSDF):
-    """A shader's BRDF; a guide samples it.
+    """A shader's BRDF, sampled by a guide.
 
     program  the shader, with the meaning of its functions
-    inside   the folder that its files may not leave, None for any
-    fields   parameter of the shader -> the fields that hold it, one per component of vectors that are no colors
+    inside   the folder that must contain its files; None for any
+    fields   parameter of the shader -> the fields that hold it, one per component of vectors that are not colors
     """
 
     program: ClassVar[Program]
     inside: ClassVar[Path | None] = None
     fields: ClassVar[dict[str, tuple[str, ...]]] = {}
     only_rgb: ClassVar[bool] = True
-    fits_factors: ClassVar[bool] = True  # a uniform may be anything: clearcoatGloss is 1 by default, and no factor
+    fits_factors: ClassVar[bool] = True  # a uniform may mean anything: clearcoatGloss is 1 by default, but not a factor
 
     @property
     def transmits(self) -> bool:
@@ -46,7 +46,7 @@ class _ShaderFile(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        """Whether rotations about the normal change no value: tested at some directions."""
+        """Whether rotations about the normal change no values, as tested at some directions."""
         plain = self.plain
         cached = vars(plain).get("_isotropic")
         if cached is None:
@@ -77,7 +77,7 @@ class _ShaderFile(BSDF):
         return self.program.run(formula, self._values(), directions)
 
     def _above(self, wo: Direction, wi: Direction) -> Value:
-        if self.program.adapter.struct:  # what Gonio wrote states itself where it is 0
+        if self.program.adapter.struct:  # a shader written by Gonio states itself where it is 0
             return True
         if self.program.adapter.transmits:
             return (wo.z != 0.0) & (wi.z != 0.0)
@@ -96,7 +96,7 @@ class _ShaderFile(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The shader's function, times |cos theta_i| unless it includes that."""
+        """The value of the shader's function, times |cos theta_i| unless it includes that."""
         factor = 1.0 if self.program.adapter.cosine else ops.abs(wi.z)
         above = self._above(wo, wi)
         color = self.program.color(self._run("eval", wo, light=wi))

@@ -1,7 +1,7 @@
-"""Which texts name a shader, and with which options. This is asked of every material, so it must not load the readers.
+"""Texts that name shaders, and the options in them. Every material's text is tested, so the readers must not be loaded.
 
-A text may add to the shader's adapter, after a question mark as in an address: "my.glsl?function=f&defines.N=1". It is
-a part of the shader's name: such texts reach worker processes, scenes and results as others do.
+A text may add entries to the shader's adapter after a question mark, as in a URL: "my.glsl?function=f&defines.N=1".
+They are part of the shader's name, so that they reach worker processes, scenes and results.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from urllib.parse import parse_qsl, quote
 from ...errors import InputError
 
 SUFFIXES = (".glsl", ".frag", ".hlsl", ".slang", ".wgsl", ".spv", ".brdf")
-_PLAIN = "/,[]:"  # are themselves in options
+_PLAIN = "/,[]:"  # characters that are not escaped in options
 _WITH_OPTIONS = re.compile(
     rf"(.*(?:{'|'.join(map(re.escape, SUFFIXES))}))\?([^?()]*=[^?()]*)", re.DOTALL | re.IGNORECASE
 )
 
 
 def parted(text: str) -> tuple[str, str]:
-    """The file and the options of a shader's name: ("my.glsl", "function=f"); no options are ""."""
+    """The file and the options of a shader's name: ("my.glsl", "function=f"); "" for no options."""
     match = _WITH_OPTIONS.fullmatch(text.strip())
     return (match[1], match[2]) if match else (text.strip(), "")
 
@@ -33,7 +33,7 @@ def options_in(query: str) -> list[tuple[str, str]]:
 
 
 def with_options(text: str, options: Iterable[tuple[str, str]]) -> str:
-    """A shader's name, with options added to its own; a later one replaces an earlier one of the same key."""
+    """A shader's name with options added to its own, each replacing an earlier one of the same key."""
     file, query = parted(text)
     every = {**dict(options_in(query)), **dict(options)}
     query = "&".join(f"{quote(key, _PLAIN)}={quote(value, _PLAIN)}" for key, value in every.items())
@@ -41,11 +41,11 @@ def with_options(text: str, options: Iterable[tuple[str, str]]) -> str:
 
 
 def option(text: str, name: str, prefix: str = "") -> tuple[str, str]:
-    """(key, value) of "KEY=VALUE", as an option `name` of the command line has it; a macro may have no value."""
+    """(key, value) of "KEY=VALUE", given for the command-line option `name`; a macro may have no value."""
     key, equals, value = text.partition("=")
     if not key.strip() or not (equals or prefix):
         example = "-D USE_SHEEN=1" if prefix else "--adapter function=BRDF"
-        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", name, f"such as {example}")
+        raise InputError(f"'{text}' given, NAME=VALUE expected", name, f"such as {example}")
     return prefix + key.strip(), value.strip() if equals else "1"
 
 

@@ -1,4 +1,4 @@
-"""A shader with its adapter: which parameters it has, and its functions on the values of a material."""
+"""A shader with its adapter: its parameters, and its functions on the values of a material."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .guesses import completed, one_of, title
 
 
 class Program:
-    """A module with the meaning of its functions. Raises InputError if the meaning does not fit the functions."""
+    """A module with the meanings of its functions. Raises InputError if the meanings do not fit the functions."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Program:
         files: tuple[Path, ...] = (),
     ) -> None:
         self.module, self.textures, self.where = module, textures, where
-        self.files = files  # that the shader includes or reads as textures
+        self.files = files  # files that the shader includes or reads as textures
         self._replayed: dict[str, Replayed] = {}
         self.adapter = completed(module, adapter, where)
         stated = adapter.where or where
@@ -50,13 +50,13 @@ class Program:
             key = "arguments" if name == "eval" else f"{name}_arguments"
             if len(arguments) != len(function.parameters):
                 what = f"{len(arguments)} meanings for the {len(function.parameters)} arguments of "
-                raise InputError(f"{what}'{title(module, function)}'", f"{stated}: {key}", "one meaning per argument")
+                raise InputError(f"{what}'{title(module, function)}'", f"{stated}: {key}", "give one per argument")
             if "derived" in arguments and (not self.adapter.derive or name == "derive"):
-                raise InputError("'derived' without a function", f"{stated}: {key}", "derive = 'NAME'")
+                raise InputError("'derived' given without a function", f"{stated}: {key}", "add derive = 'NAME'")
             places = [type for (_, type), one in zip(function.parameters, arguments, strict=True) if one == "result"]
             if len(places) > 1 or any(module.type(one).kind != "pointer" for one in places):
                 raise InputError(
-                    "'result' for what the function does not write", f"{stated}: {key}", "an `out` argument"
+                    "'result' given for an argument that is not written", f"{stated}: {key}", "use an `out` argument"
                 )
         declared = {one.name: one for one in self._declared()}
         self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
@@ -69,9 +69,9 @@ class Program:
             if name in names:
                 continue
             names.add(name)
-            if not name.lstrip("_").isidentifier():  # it becomes a name in Python; SPIR-V's may be any text
-                hint = "letters, digits and _ that begin with a letter; of SPIR-V: compile it with names"
-                raise InputError(f"{name[:40]!r} as the name of a parameter", self.where, hint)
+            if not name.lstrip("_").isidentifier():  # it becomes a Python name; a name in SPIR-V may be any text
+                hint = "use letters, digits and _, a letter first; compile SPIR-V with names"
+                raise InputError(f"{name[:40]!r} cannot be the name of a parameter", self.where, hint)
             uniform = self._stated(name) or Uniform()
             if uniform.default is None and default is not None:
                 uniform = replace(uniform, default=default)
@@ -84,7 +84,7 @@ class Program:
             raise InputError(f"no uniform '{unknown[0]}' in {self.where}", stated, f"it has: {known}")
 
     def _stated(self, name: str) -> Uniform | None:
-        """What the adapter says of a parameter, by the shader's name or by that of the material, `isotropic_`."""
+        """The adapter's entry for a parameter, under its name in the shader or in the material, `isotropic_`."""
         stated = self.adapter.parameters
         return stated.get(name, stated.get(f"{name}_"))
 
@@ -116,10 +116,10 @@ class Program:
 
     @functools.cached_property
     def _entries(self) -> list[Function]:
-        """The functions that assign globals before a formula is called: those that the compiler needs, which hold the
-        initial values, and the text's own `main` if a formula reads what it assigns."""
+        """The functions that assign globals before a formula is called: those that the compiler requires, which contain
+        the initial values, and the text's own `main` if a formula reads what it assigns."""
         module, formulas = self.module, [function.id for function, _ in self.formulas.values()]
-        ours = module.function("gonio_entry")  # of HLSL
+        ours = module.function("gonio_entry")  # in HLSL
         mains = module.function("main" if ours else "gonio_main")
         reached = {id for id, _ in read(module, blocks_of(module, formulas))}
         calls = {*formulas, *called(blocks_of(module, formulas))}
@@ -132,14 +132,14 @@ class Program:
 
     @functools.cached_property
     def _examples(self) -> list[int]:
-        """The functions at which the compiler's entry point begins to call every function, so that none is dropped: of
-        HLSL one that does so, of Slang all."""
+        """The functions at which the compiler's entry point ends, since from there it only calls every function to
+        prevent their removal: in HLSL one function that does so, in Slang all."""
         module = self.module
         of_slang = any(module.names.get(id, "").startswith("gonio_") for id in module.variables)
         return list(module.functions) if of_slang else [one.id for one in module.function("@gonio_entry")]
 
     def _arguments(self) -> Iterator[Piece]:
-        """Arguments of the functions that are parameters; the members of structs."""
+        """The functions' arguments that are parameters, and the members of structs among them."""
         for function, meanings in self.formulas.values():
             for (id, type), meaning in zip(function.parameters, meanings, strict=True):
                 if meaning == "parameter":
@@ -208,8 +208,8 @@ class Program:
             try:
                 value = _GIVEN[meaning](directions)
             except KeyError as error:
-                what = f"'{meaning}' as an argument of a function that is not given {error.args[0]!r}"
-                hint = "eval and pdf have light and view, sample view and u, albedo the view"
+                what = f"'{meaning}' given for an argument of a function without {error.args[0]!r}"
+                hint = "eval and pdf have light and view, sample has view and u, albedo has view"
                 raise InputError(what, self.where, hint) from None
             kind = self.module.type(type)
             kind = self.module.type(kind.parts[0]) if kind.kind == "pointer" else kind
@@ -226,11 +226,11 @@ class Program:
         return assembled(self.module, name, type, values, self.adapter.unset_is_zero)
 
     def color(self, value: Value) -> Value:
-        """A result as a color: a number is gray."""
+        """A result as a color; a number becomes gray."""
         parts = leaves(value)
         if len(parts) not in (1, 3, 4):
             raise InputError(
-                f"'{self.adapter.function}' returns {len(parts)} numbers", self.where, "a color or a number"
+                f"'{self.adapter.function}' returns {len(parts)} numbers", self.where, "return a color or a number"
             )
         red, green, blue = parts[:3] if len(parts) > 1 else parts * 3
         return numeric(red), numeric(green), numeric(blue)
@@ -249,7 +249,7 @@ class Program:
         return [self.module.names.get(id, f"argument {id}") for id, _ in self.formulas[formula][0].parameters]
 
     def members(self, formula: str) -> list[str]:
-        """The names of the members of a formula's result, empty if it is no struct."""
+        """The names of the members of a formula's result; empty if it is not a struct."""
         type = self.formulas[formula][0].type
         count = len(self.module.type(type).parts) if self.module.type(type).kind == "struct" else 0
         return [self.module.members.get((type, place), "") for place in range(count)]

@@ -24,19 +24,19 @@ def texture(name: str, about: Mapping[str, Any], path: Path, stated: str = "") -
     """The texture of a file, with the edge rule and filter of its entry.
 
     stated  the adapter, for errors
-    Raises InputError for what is no table of finite numbers, before memory is taken for more than `MAX_NUMBERS`.
+    Raises InputError if it is not a table of finite numbers, and before more than `MAX_NUMBERS` are allocated.
     """
     where = f"{stated}: textures.{name}" if stated else f"textures.{name}"
     try:
         if path.stat().st_size > MAX_TABLE:
-            raise InputError(f"'{path.name}' has over {MAX_TABLE >> 20} MB", where)
+            raise InputError(f"'{path.name}' is larger than {MAX_TABLE >> 20} MB", where)
         values = _raw(path, about) if path.suffix.lower() in _RAW else _npy(path)
     except (OSError, ValueError, EOFError, MemoryError) as error:
-        what = f"'{about['file']}' is no table: {error}"
-        raise InputError(what[:200], where, "an .npy of numbers, (rows, columns, channels)") from None
+        what = f"'{about['file']}' is not a table: {error}"
+        raise InputError(what[:200], where, "give an .npy of numbers, (rows, columns, channels)") from None
     if values.ndim not in (2, 3, 4) or values.shape[-1] > 4 or values.size == 0 or not np.all(np.isfinite(values)):
         what = f"'{about['file']}' of shape {values.shape}, finite numbers of 1 to 4 channels last expected"
-        raise InputError(what, where, "numpy.save(FILE, array) with shape (rows, columns, channels)")
+        raise InputError(what, where, "write it by numpy.save(FILE, array), shape (rows, columns, channels)")
     return Texture(name, Table(name, values), about.get("wrap", "clamp"), about.get("filter", "linear"))
 
 
@@ -46,10 +46,10 @@ def _npy(path: Path) -> NDArray[np.float64]:
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = header(file)
         if dtype.kind not in "fiu":
-            raise ValueError(f"it holds {dtype}, no real numbers")
+            raise ValueError(f"it holds {dtype}, real numbers expected")
         claimed = math.prod(shape) * dtype.itemsize
         if claimed > os.fstat(file.fileno()).st_size - file.tell() or math.prod(shape) > MAX_NUMBERS:
-            raise ValueError(f"its header claims {math.prod(shape)} numbers, which are not there or too many")
+            raise ValueError(f"its header claims {math.prod(shape)} numbers, more than it has or than are allowed")
     return np.asarray(np.load(path, allow_pickle=False), np.float64)
 
 
@@ -58,5 +58,5 @@ def _raw(path: Path, about: Mapping[str, Any]) -> NDArray[np.float64]:
         raise ValueError("it has no header; give shape = [rows, columns, channels]")
     values: NDArray[np.floating] = np.frombuffer(path.read_bytes(), _RAW[path.suffix.lower()])
     if values.size != math.prod(about["shape"]):
-        raise ValueError(f"it holds {values.size} numbers, and {about['shape']} are {math.prod(about['shape'])}")
+        raise ValueError(f"it holds {values.size} numbers, {math.prod(about['shape'])} expected for {about['shape']}")
     return values.astype(np.float64).reshape(about["shape"])

@@ -1,4 +1,4 @@
-"""What all families of mistakes share."""
+"""Types and functions for all families of mistakes."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def f_of(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Values:
 
 
 def above(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    """Whether both directions are above the surface, (N, 1)."""
+    """Whether wo and wi are both above the surface, (N, 1)."""
     return (wo[:, 2:] > 0.0) & (wi[:, 2:] > 0.0)
 
 
 def color(value: object) -> Values:
-    """A parameter's value as a row of three channels."""
+    """The value of a parameter as a row of three channels, (1, 3)."""
     return np.broadcast_to(np.asarray(value, float), (3,))[None]

@@ -1,4 +1,4 @@
-"""Mistakes in Oren-Nayar's formula (course sheet, eq. 2 and 3)."""
+"""Mistakes in the Oren-Nayar model (course sheet, eq. 2 and 3)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .base import Values, Variant, above, color
 
 @dataclass(frozen=True)
 class _Form:
-    """albedo / pi (A + B g(cos) sin(a) tan(b)) with interchangeable parts."""
+    """albedo / pi (A + B g(cos) sin(a) tan(b)) with replaceable terms and constants."""
 
     albedo: Values
     sigma2: float
@@ -72,7 +72,7 @@ _SIGMA = "sigma"
 
 
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Wrong forms of Oren-Nayar; nothing for other materials."""
+    """Wrong forms of the Oren-Nayar model; nothing for other materials."""
     if type(material).name != "oren-nayar":
         return
     sigma = float(np.max(np.asarray(material.sigma)))  # type: ignore[attr-defined]

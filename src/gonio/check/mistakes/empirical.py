@@ -1,4 +1,4 @@
-"""Mistakes in Phong's and Blinn's models (course sheet, eq. 1)."""
+"""Mistakes in the Phong and Blinn-Phong models (course sheet, eq. 1)."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
 
 
 def with_cosine(material: BSDF) -> bool:
-    """Whether the course writes the model with its cosine, as L, so that either form is right."""
+    """Whether the course includes the cosine in the model, so that values with and without it are right."""
     return type(material).name in NAMES
 
 
@@ -72,7 +72,7 @@ def _variant(words: str, topic: str, values: Values) -> Variant:
 
 
 def _bases(wo: np.ndarray, wi: np.ndarray) -> dict[str, Values]:
-    """Cosines that the power may be taken of."""
+    """Candidate cosines for the base of the power, by name."""
     mirrored = wi * np.array([-1.0, -1.0, 1.0])
     short = np.array([0.0, 0.0, 1.0]) * wi[:, 2:] - wi
     v_r = np.sum(wo * mirrored, axis=1)

@@ -1,4 +1,4 @@
-"""Mistakes that any material may contain: another member of a family, units, channels, directions."""
+"""Mistakes that any material may contain, in choices of terms, units, channels and directions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DIRECTIONS = "the directions of the rows"
 
 
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """The material with one value changed, and with its directions or channels exchanged."""
+    """The material with one value changed, or with its directions or channels swapped."""
     yield from _widths(material, wo, wi)
     yield from _choices(material, wo, wi)
     yield from _units(material, wo, wi)
@@ -30,13 +30,13 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
 
 
 def _widths(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """The referee's table: alpha^2 or sqrt(alpha) in place of alpha."""
+    """alpha^2 or sqrt(alpha) in place of alpha, as in `verify.forensics.factors.widths`."""
     for text, guess, other in widths(Subject(material, type(material).name)):
         yield Variant(Mistake(f"{text}: {guess}", "the roughness: alpha, or roughness"), f_of(other.model, wo, wi))
 
 
 def _choices(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Another distribution, masking term, Fresnel kind or form, of the material itself or of one inside."""
+    """Another distribution, masking term, Fresnel term or form, in the material itself or in one inside it."""
     for path, inner in tree.walk(material):
         for name, parameter in type(inner).parameters().items():
             if not isinstance(parameter, ChoiceParameter) or name == "sampling":
@@ -54,7 +54,7 @@ def _choices(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
 
 
 def _units(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Angles in degrees; a color that was decoded from sRGB, or was not."""
+    """Angles in degrees instead of radians; albedos decoded from sRGB, encoded as sRGB or squared."""
     for name, parameter in type(material).parameters().items():
         value = getattr(material, name, None)
         if not isinstance(value, int | float | tuple) or isinstance(value, bool):
@@ -91,7 +91,7 @@ def _directions(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Vari
 
 
 def _changed(material: BSDF, path: str, value: object, wo: np.ndarray, wi: np.ndarray) -> np.ndarray | None:
-    """f with a value replaced; None where the material does not allow it."""
+    """f with one value replaced; None if the material does not allow it."""
     try:
         return f_of(tree.replace(material, {path: value}), wo, wi)
     except (GonioError, ArithmeticError):

@@ -1,7 +1,7 @@
 """Mistakes in the terms D, G and F of a microfacet reflection (course sheet, eq. 4 to 12; homework, part C).
 
-The terms are those of the material itself: F is the quotient by its copy with F = 1, D is closed, and G is the rest.
-Each mistake is one term replaced.
+The terms are taken from the material itself: F is f divided by f of a copy with F = 1, D has a closed form, and G is
+the remaining factor. Each mistake replaces one term.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
 
 
 class _Terms:
-    """f and its terms over pairs of directions."""
+    """f and its terms for pairs of directions."""
 
     def __init__(self, material: BSDF, alpha: float, ndf: str, wo: np.ndarray, wi: np.ndarray) -> None:
         self.material, self.alpha, self.ndf, self.wo, self.wi = material, alpha, ndf, wo, wi
@@ -61,7 +61,7 @@ class _Terms:
 
 
 def schlick(r0: Values, cosine: Values, power: float = 5.0) -> Values:
-    """R0 + (1 - R0) (1 - cos)^5, (N, 3)."""
+    """R0 + (1 - R0) (1 - cos)^power, (N, 3)."""
     return r0 + (1.0 - r0) * (1.0 - np.clip(cosine, 0.0, 1.0))[:, None] ** power
 
 
@@ -138,13 +138,13 @@ def _half_vectors(t: _Terms) -> Factors:
     ):
         D = density(t.ndf, np.clip(cosine, 1e-6, None), t.alpha) / t.D
         yield words, _H, D
-        if "normalized" in words:  # F is at the same vector
+        if "normalized" in words:  # F may be evaluated with the same vector
             o_h = np.sum(t.wo * both, axis=1) * (0.5 if "/ 2" in words else 1.0)
             yield words, _H, D[:, None] * schlick(t.r0, o_h) / t.F
 
 
 def g1(name: str, cosine: Values, alpha: float) -> Values:
-    """Masking of one direction, by the sheet's and the homework's forms and wrong ones."""
+    """The masking G1 of one direction, in the forms of the sheet and the homework and in wrong ones."""
     tangent = np.sqrt(np.maximum(1.0 / cosine**2 - 1.0, 0.0))
     if name == "ggx":
         return 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tangent**2))

@@ -26,13 +26,13 @@ def adopt(
     how: Reading,
     output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
     tsl: Annotated[bool, Option("--tsl", help="three.js: its TSL build too, by running its JavaScript.")] = False,
-    force: Annotated[bool, Option("--force", help="Replace an adapter that is there already.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace an existing adapter.")] = False,
     as_json: Json = False,
 ) -> None:
     """Write the adapter of a shader, FILE.toml: which function is the BRDF, and what its arguments mean.
 
-    It is a first one by names of functions, arguments and uniforms; the guesses are printed. The folder of an engine's
-    npm package, or of a checkout of one, gives shaders that include its text, with their adapters.
+    The adapter is a first guess from the names of functions, arguments and uniforms; the guesses are printed. For the
+    folder of an engine's npm package, or of a checkout, write shaders that include its code, with their adapters.
 
     \b
     Examples:
@@ -58,7 +58,7 @@ def adopt(
     adopted = shaders.adopt(how.shaders([str(file)])[0])
     target = Path(f"{shaders.parted(str(file))[0]}.toml")
     if target.exists() and not force:
-        raise InputError(f"'{target}' is there already", "FILE", "edit it, or replace it with --force")
+        raise InputError(f"'{target}' already exists", "FILE", "edit it, or replace it with --force")
     files.write_whole(target, adopted.text.encode())
     if as_json:
         print(json.dumps({"written": str(target), "guesses": adopted.guesses}))
@@ -73,6 +73,6 @@ def _adopt_package(folder: Path, output: Path | None, *, tsl: bool, force: bool,
 
     target = output or Path(shaders.package_in(folder).name.rpartition("/")[2])
     if target.exists() and not force:
-        raise InputError(f"'{target}' is there already", "--output", "name another folder, or replace it with --force")
+        raise InputError(f"'{target}' already exists", "--output", "name another folder, or replace it with --force")
     written = shaders.adopt_package(folder, target, tsl=tsl)
     print(json.dumps({"written": [str(one) for one in written]}) if as_json else "\n".join(map(str, written)))

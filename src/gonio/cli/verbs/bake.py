@@ -15,31 +15,31 @@ from .base import MATERIALS, verb
 
 
 class Baking(Options):
-    """What is baked, and how."""
+    """Which tables are baked, and how."""
 
     lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""
-    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, of ltc 64, or 16.")] = None
+    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, for ltc 64 or 16.")] = None
     method: Annotated[str, Option(metavar="NAME", help="Integrate by quadrature, cosine, ggx, visible, ...")] = (
         "quadrature"
     )
     masking: Annotated[
         str | None, Option(metavar="NAME", help="Masking term of a distribution: smith-correlated, ..., FILE.py:CLASS.")
     ] = None
-    samples: Annotated[int, samples_option("Random samples per texel, of the methods that sample.")] = 1024
+    samples: Annotated[int, samples_option("Random samples per texel, for methods that sample.")] = 1024
     sampler: Annotated[
-        str, Option(metavar="NAME", help="Random points of these: hammersley, stratified, independent.")
+        str, Option(metavar="NAME", help="Points of these methods: hammersley, stratified, independent.")
     ] = "hammersley"
     seed: Seed = None
     layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear"
     aspect: Annotated[
         float | None, Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
     ] = None
-    azimuths: Annotated[int, Option(metavar="N", help="Values along phi, of anisotropic tables.")] = 24
-    store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E"
+    azimuths: Annotated[int, Option(metavar="N", help="Values along phi, for anisotropic tables.")] = 24
+    store: Annotated[str, Option(metavar="E|1-E", help="Homework: what the pictures hold.")] = "E"
     flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True
-    floor: Annotated[float, Option(metavar="X", help="Lower bound of D's denominator, of --method cosine.")] = 0.0
+    floor: Annotated[float, Option(metavar="X", help="Lower bound of D's denominator, for --method cosine.")] = 0.0
     wrap: Annotated[
-        bool, Option("--wrap", help="Homework: bytes as its program has them, rounded down and wrapped at 256.")
+        bool, Option("--wrap", help="Homework: bytes as its program writes them, rounded down and wrapped at 256.")
     ] = False
     ndf: Annotated[
         str | None, Option(metavar="NAME", help="Distribution that blurs an environment: ggx, ..., FILE.py:CLASS.")
@@ -50,7 +50,7 @@ class Baking(Options):
 
 
 def _refuse(made: Material, options: dict[str, object]) -> None:
-    """Raise InputError for options that a preset of the homework sets by itself."""
+    """Raise InputError for options that a preset of the homework sets itself."""
     given = [name for name, value in options.items() if value != getattr(Baking(), name) and value is not None]
     given += ["param"] if made.param else []
     if given:
@@ -78,14 +78,15 @@ def bake(
 ) -> None:
     """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
 
-    The homework's text has k = (roughness + 1)^2 / 8, its figures k = alpha / 2: --preset homework-text bakes the
-    first, --preset homework-figure the second, sampled as its picture is.
+    The homework's text uses k = (roughness + 1)^2 / 8, its figures use k = alpha / 2: --preset homework-text bakes the
+    first, --preset homework-figure the second, sampled as in the homework's picture.
 
-    Tables of an anisotropic distribution have a third axis, the azimuth. Of a material without roughness: E over the
-    cosine. Of an environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
+    Tables of an anisotropic distribution have a third axis, the azimuth. A material without roughness gives E as a
+    function of the cosine. An environment gives its light blurred for each roughness, which the split sum multiplies by
+    the albedo.
 
     `--lut ltc` fits linearly transformed cosines to a material, and writes their error and the shader code of area
-    lights. Of an anisotropic material the tables have an axis for the azimuth, and 16 texels along the others.
+    lights. For an anisotropic material, the tables have an axis for the azimuth and 16 texels along the others.
 
     \b
     Examples:
@@ -103,7 +104,7 @@ def bake(
     options = {**vars(how), "lut": how.lut.split(",") if how.lut else None}
     preset = made.preset if target is None or made.preset in tables.PRESETS else ""
     if target is None and not preset:
-        raise InputError("no target", "TARGET", "such as: gonio bake ggx -o tables")
+        raise InputError("no target given", "TARGET", "such as: gonio bake ggx -o tables")
     with executor.running():
         if preset:
             made.shaders(())

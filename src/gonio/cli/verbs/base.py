@@ -1,12 +1,11 @@
-"""A verb of the command line: a function with Typer's annotations, and its place in the help.
+"""Verbs of the command line: a verb is a function with Typer annotations, and its place in the help.
 
     @verb(MATERIALS)
     def sheen(model: Model, made: Material, as_json: Json = False) -> None:
         \"\"\"Print the sheen of a material.\"\"\"
 
-The file stands in `cli/verbs`; a package of its own names the verb as an entry point of the group `gonio.verbs`.
-A parameter whose type is a group of options, such as `Material` or a dataclass of your own, becomes one option for each
-of its fields.
+Gonio's verbs are files in `cli/verbs`; other packages declare theirs as entry points in the group `gonio.verbs`. A
+parameter whose type is a group of options, such as `Material` or your own dataclass, becomes one option per field.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
 
 
 class Verb:
-    """A verb: `name` and `doc` as the help shows them, under the heading `panel`, in the order of `place` and name."""
+    """A verb. The help shows `name` and `doc` under the heading `panel`, sorted by `place` and name."""
 
     family: ClassVar[Family[Verb]]
 
     def __init__(self, function: Callable[..., None], panel: str, place: int) -> None:
         self.function, self.panel, self.place = function, panel, place
         self.name = function.__name__.replace("_", "-")
-        functools.update_wrapper(self, function)  # the file that it stands in is that of its function
+        functools.update_wrapper(self, function)  # so that its source file is that of the function
 
     def __call__(self, *args: object, **options: object) -> None:
         self.function(*args, **options)
@@ -42,7 +41,7 @@ class Verb:
         return inspect.cleandoc(self.function.__doc__ or "").partition("\n")[0]
 
     def with_single_options(self) -> Callable[..., None]:
-        """The function with an option for each field of each group that it takes, as Typer reads it."""
+        """The function with its groups of options expanded to one option per field, as Typer expects."""
         hints = get_type_hints(self.function, include_extras=True)
         groups: dict[str, tuple[type, list[str]]] = {}
         single: list[inspect.Parameter] = []
@@ -71,7 +70,7 @@ class Verb:
 
 
 def verb(panel: str, place: int = 100) -> Callable[[Callable[..., None]], Verb]:
-    """Make a function a verb; `place` orders the verbs under one heading, and those of packages come last."""
+    """Decorate a function as a verb; `place` orders the verbs under a heading, by default after Gonio's own."""
     return lambda function: Verb(function, panel, place)
 
 

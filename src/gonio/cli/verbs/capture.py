@@ -82,7 +82,7 @@ def capture(
 
 
 def _write(result: Capture, target: Path) -> list[Path]:
-    """The table or the fit, and a figure of it; the files."""
+    """Write the table or the fit, and a figure of it; returns the files written."""
     from ...viewer import capture_figure
 
     written = [result.save(target), target.with_suffix(".png")]
@@ -91,7 +91,7 @@ def _write(result: Capture, target: Path) -> list[Path]:
 
 
 def _print_plan(plan: Sequence[Proposal], as_json: bool) -> None:
-    """The first photographs to take."""
+    """Print the first photographs to take."""
     if as_json:
         print(json.dumps([one.as_dict() for one in plan]))
     else:

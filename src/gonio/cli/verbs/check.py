@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """By what the work is judged, and how it is reported."""
+    """What the work is judged by, and how the result is reported."""
 
     scene: Annotated[
         Path | None, Option(metavar="FILE", help="The scene of a picture; with --sheet, a folder of scenes.")
     ] = None
     sheet: Annotated[
-        str | None, Option(metavar="hw4|lab2", help="The sheet of a folder of submissions: its tasks and points.")
+        str | None, Option(metavar="hw4|lab2", help="The assignment sheet for a folder of submissions.")
     ] = None
-    up: Annotated[str, Option(metavar="z|y|x", help="The axis along the normal, in rows of directions.")] = "z"
+    up: Annotated[str, Option(metavar="z|y|x", help="The axis along the normal in rows of directions.")] = "z"
     tolerance: Annotated[
         float | None, Option(metavar="X", help="Relative difference of f that counts as equal; 0.002 for rows.")
     ] = None
     hide_solution: Annotated[
         bool, Option("--hide-solution", help="Print where a mistake is, without formulas and values of the solution.")
     ] = False
-    function: Annotated[str, Option(metavar="NAME", help="The function of a shader that is judged.")] = ""
+    function: Annotated[str, Option(metavar="NAME", help="The function to judge in a shader.")] = ""
     junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
 
 
@@ -62,7 +62,7 @@ def check(
         Path | None,
         Option(
             metavar="DIR",
-            help="Write right values there: of f at 200 pairs for WORK, a material, or all of the courses.",
+            help="Write reference values there: f at 200 pairs for WORK, a material, or all of the courses.",
         ),
     ] = None,
     trust: Trust,
@@ -70,10 +70,10 @@ def check(
 ) -> None:
     """Judge a student's own work: right or wrong, how far off, and the probable mistake.
 
-    A table of E or E_avg is compared with all forms that the homework's text, its figures and the usual mistakes
-    give. Rows of wo, wi and f, from any program, are compared with MODEL pointwise; so is a class. A picture may be
-    moved by a row, have another exposure, and gamma or none. The exit code is 0 if all is right, 1 if something is
-    wrong or missing, 2 if something cannot be read.
+    A table of E or E_avg is compared with all forms that follow from the homework's text, its figures and the usual
+    mistakes. Rows of wo, wi and f from any program, and classes, are compared with MODEL pair by pair. A picture may be
+    shifted by up to two pixels, have another exposure, and be stored with or without gamma. The exit code is 0 if
+    everything is right, 1 if something is wrong or missing, 2 if something cannot be read.
 
     \b
     Examples:
@@ -111,11 +111,11 @@ def _print(result: Report | Finding, as_json: bool) -> None:
 
 
 def _write_reference(folder: Path, material: str | None, made: Material, as_json: bool) -> None:
-    """Write the right values, and print the names of the files."""
+    """Write reference values and print the names of the files."""
     from ...check import reference
 
     if material is None:
-        made.refuse("--reference without a material")
+        made.refuse("--reference given without a material")
     written = [str(path) for path in reference.write(folder, None if material is None else made.text(material))]
     print(json.dumps({"files": written}) if as_json else "\n".join(written))
 
@@ -123,15 +123,15 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
 def _with_parameters(
     target: str | None, model: str | None, against: str | None, made: Material
 ) -> tuple[str, str | None]:
-    """The work, and the material to judge it by, both with the parameters that they have; or the name of a masking
-    term."""
+    """The work, and the material or masking term to judge it by; materials with those of the given parameters that they
+    have."""
     from ...catalog import outside, shaders
     from ...optics.masking import Masking
 
     if target is None:
         raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
     if model is not None and against is not None:
-        raise InputError(f"'{model}' and --against given", "--against", "name the model once")
+        raise InputError(f"both '{model}' and --against given", "--against", "name the model once")
     model = against if model is None else model
     if model is None or model in Masking.family.all():
         made.refuse(target if model is None else model)
@@ -143,7 +143,7 @@ def _with_parameters(
 
 
 def _print_table(report: Report) -> None:
-    """One row per file, and the suggested points of each submission."""
+    """Print one row per file, and the suggested points of each submission."""
     table = listing("submission", "task", "file", "judgment", "points", "probable mistake")
     for row in report.rows():
         table.add_row(*row)

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """By which metric, and up to which difference, A passes."""
+    """The metric, and the largest difference with which A passes."""
 
     tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 if the metric exceeds X.")] = None
     metric: Annotated[
         str | None,
-        Option(metavar="NAME", help="Metric of --tolerance: relmse, rmse, flip; of materials mean, largest, albedo."),
+        Option(metavar="NAME", help="Metric of --tolerance: relmse, rmse, flip; for materials mean, largest, albedo."),
     ] = None
     encoding: Annotated[
         str, Option(metavar="srgb|linear", help="Encoding of .png files; linear is for data, such as tables.")
@@ -53,11 +53,11 @@ def compare(
 ) -> None:
     """Measure the difference between picture A and picture B, or between material A and material B.
 
-    Of pictures: RMSE, relMSE, ratio of the means, FLIP. A .png is decoded from sRGB; with --encoding linear it is read
-    as data. FLIP of .exr, .hdr and .npz is HDR-FLIP: the worst over the exposures at which B can be shown.
+    For pictures: RMSE, relMSE, ratio of the means, FLIP. A .png is decoded from sRGB; with --encoding linear it is read
+    as data. For .exr, .hdr and .npz, FLIP is HDR-FLIP: the maximum over the exposures at which B can be shown.
 
-    Of materials: the largest and the mean difference of f, and the albedos. --param and --preset apply to each of the
-    two that has them.
+    For materials: the largest and the mean difference of f, and the albedos. --param and --preset apply to each
+    material that has them.
 
     \b
     Examples:
@@ -91,7 +91,7 @@ def compare(
 
 
 def _are_pictures(test: str, reference: str) -> bool:
-    """Whether both are pictures, or both materials. Raises InputError for one of each."""
+    """True for two pictures, False for two materials. Raises InputError for one of each."""
     from ...catalog import operands
     from ...catalog.operands import Kind
     from ...errors import InputError
@@ -99,12 +99,12 @@ def _are_pictures(test: str, reference: str) -> bool:
     accepted = {Kind.PICTURE, *operands.MATERIALS}
     kinds = {operands.kind_of(one, accepted, name) is Kind.PICTURE for one, name in ((test, "A"), (reference, "B"))}
     if len(kinds) > 1:
-        raise InputError("a picture and a material", f"{test}, {reference}", "compare two of a kind")
+        raise InputError("a picture and a material given", f"{test}, {reference}", "compare two of a kind")
     return True in kinds
 
 
 def _heading(a: str, b: str, result: Difference) -> list[str]:
-    """The figures of both materials, one per line."""
+    """The results of comparing two materials, one per line."""
     at = result.largest_at
     f_a, f_b = at.f
     lines = [
@@ -118,7 +118,7 @@ def _heading(a: str, b: str, result: Difference) -> list[str]:
     if not result.known.everything:
         lines.insert(2, f"compared    {result.known}, which both are known at")
     if result.has_specular:
-        lines.append("specular    perfectly specular parts have no f, and count in the albedo alone")
+        lines.append("specular    perfectly specular parts have no f, and count only in the albedo")
     if result.tolerance is not None:
         relation, word = ("<=", "passes") if result.passed else (">", "fails")
         lines.append(f"{word:10}  {result.metric} {result.value(result.metric):.6g} {relation} {result.tolerance:g}")
@@ -135,5 +135,5 @@ def _print_views(result: Difference) -> None:
 
 
 def _angles(view: View) -> str:
-    """theta and phi from wo, degrees, as `gonio verify --at` has them."""
+    """theta of wi, and phi relative to wo, in degrees, as `gonio verify --at` takes them."""
     return f"{view.wi[0]:.3g},{view.wi[1]:.3g}"

@@ -20,7 +20,7 @@ def compensation(
         list[str] | None,
         Argument(
             metavar="[MODEL]...",
-            help="Materials to compare too: one with a base as a method, any other as a base.",
+            help="More materials to compare: one with a base as a method, any other as a base.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -28,7 +28,7 @@ def compensation(
     samples: Annotated[int, samples_option("Random walks per point of the reference.")] = 200_000,
     as_json: Json = False,
 ) -> None:
-    """Compare the ways to restore light lost by single scattering: furnace, error, reciprocity, cost.
+    """Compare methods that restore light lost by single scattering: furnace, error, reciprocity, cost.
 
     \b
     Examples:
@@ -45,7 +45,7 @@ def compensation(
 
 
 def _print(result: dict[str, Any]) -> None:
-    """A row for each method, and the albedos that no random walk judges."""
+    """Print a row for each method, and the albedos of bases without a reference random walk."""
     import numpy as np
 
     names = list(result["rms"])

@@ -29,7 +29,7 @@ def convert(
 
     A picture is tone-mapped without rendering it again. Measured values are copied if both formats have the same kind
     of table; otherwise they are resampled, and the measured error is reported. A material of a glTF or MaterialX file
-    becomes JSON as scenes hold it, and an openpbr a MaterialX file.
+    becomes JSON for use in scenes, and an openpbr material becomes a MaterialX file.
 
     \b
     Examples:

@@ -14,14 +14,14 @@ from .base import SUPPORT, verb
 
 @verb(SUPPORT, place=2)
 def doctor(
-    bench: Annotated[bool, Option("--bench", help="Measure its speed, compared with Mitsuba's own plugins.")] = False,
+    bench: Annotated[bool, Option("--bench", help="Measure the speed, compared with Mitsuba's own plugins.")] = False,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
     """Report what this machine can render with, what is missing, and how to install it.
 
-    The exit code is 3 if it cannot render at all. With --bench a short table of speeds for bug reports: rays, eval and
-    sample of a material, direct light and paths, in millions per second.
+    The exit code is 3 if it cannot render at all. With --bench, print a short table of speeds for bug reports: rays,
+    eval and sample of a material, direct light and paths, in millions per second.
 
     \b
     Examples:
@@ -50,7 +50,7 @@ def doctor(
 
 
 def _bench(device: str, as_json: bool) -> None:
-    """The table of speeds."""
+    """Print the table of speeds."""
     from ... import __version__
     from ...render import bench
 

@@ -27,15 +27,15 @@ class Place(Options):
     group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, not in GLSL ES.")] = 0
     first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
     tables: Annotated[
-        str, Option(metavar="raw|exr|ktx2", help="Form of the tables' files in a folder; by default raw float32.")
+        str, Option(metavar="raw|exr|ktx2", help="Format of the table files in a folder; by default raw float32.")
     ] = ""
     half: Annotated[
-        bool, Option("--half", help="Tables of 16 bits; the text states the error, also of parameters in 16 bits.")
+        bool, Option("--half", help="16-bit tables; the text states the error, also for parameters in 16 bits.")
     ] = False
 
 
 class Content(Options):
-    """What of the material is written, or what instead of its whole functions."""
+    """Which parts of the material are written, or what replaces its functions."""
 
     functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample"
     lean: Annotated[
@@ -50,7 +50,7 @@ class Content(Options):
     ] = ""
     ibl: Annotated[bool, Option("--ibl", help="Instead write the split sum of image-based lighting.")] = False
     budget: Annotated[
-        int, Option(metavar="N", help="Choose the most exact terms, table or fit within N operations.")
+        int, Option(metavar="N", help="Choose the most accurate terms, table or fit within N operations.")
     ] = 0
 
 
@@ -91,9 +91,9 @@ def emit(
     ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Write a material, traced from its own source, as code in GLSL, WGSL, HLSL, Python or a language of yours.
+    """Write a material, traced from its own source, as code in GLSL, WGSL, HLSL, Python or your own language.
 
-    -o may be given twice. A name that ends in / is a folder; its tables are raw float32, or as --tables names them.
+    -o may be given twice. A name that ends in / is a folder; its tables are raw float32 unless --tables says otherwise.
 
     \b
     Examples:

@@ -29,8 +29,8 @@ def explain(
 ) -> None:
     """Print the manual page of a material, or of any member of a family: formula, parameters, limits, source.
 
-    The families are materials, distributions of normals, masking terms, Fresnel kinds, integrators, laws and more. The
-    name of a family lists its members; without a name the families are listed.
+    The families are materials, distributions of normals, masking terms, Fresnel terms, integrators, laws and more. The
+    name of a family lists its members; without a name, the families are listed.
 
     \b
     Examples:

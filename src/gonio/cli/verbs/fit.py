@@ -21,18 +21,18 @@ PICTURES = (".exr", ".hdr", ".png")
 
 
 class Model(Options):
-    """What is fitted to measured values."""
+    """The model that is fitted to measured values."""
 
     model: Annotated[
         list[str] | None,
         Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; several are ranked.'),
     ] = None
-    lobes: Annotated[int, Option(metavar="N", help="Copies of the model's last part in the sum.")] = 1
+    lobes: Annotated[int, Option(metavar="N", help="Copies of the last lobe in the model's sum.")] = 1
     loss: Annotated[str, Option(metavar="NAME", help="relative, log, log1p, cuberoot or linear.")] = "relative"
 
 
 class Scene(Options):
-    """What a picture shows, to which a scene's materials are fitted."""
+    """The scene whose materials are fitted to a picture of it."""
 
     scene: Annotated[
         Path | None, Option(metavar="FILE", help="The scene that DATA, a picture, shows; its materials are fitted.")
@@ -44,7 +44,7 @@ class Scene(Options):
 def fit(
     data: Annotated[
         list[str] | None,
-        Argument(metavar="[DATA...]", help="Files of measurements, or one folder of them; or a picture of --scene."),
+        Argument(metavar="[DATA...]", help="Measurement files, or a folder of them; or a picture of --scene."),
     ] = None,
     *,
     what: Model,
@@ -55,12 +55,13 @@ def fit(
 ) -> None:
     """Fit materials to measured values: parameters with their 95 % intervals.
 
-    -p NAME=VALUE holds a parameter. Of several models the one with the lowest criterion (BIC) is best: an extra
-    parameter must improve it. Each of several files is stored once it is fitted: after Ctrl-C, run the same command.
+    -p NAME=VALUE fixes a parameter. Among several models, the one with the lowest criterion (BIC) is best: an extra
+    parameter must improve it. With several files, each result is stored at once: to continue after Ctrl-C, run the same
+    command again.
 
     With --scene, parameters of the scene's materials are fitted to a picture of it: those that --free names, such as
-    shapes.0.material.alpha, or all of a material; shapes.0.material by default. --model puts another material there,
-    and -p sets values of the scene.
+    shapes.0.material.alpha, or all of a material; shapes.0.material by default. --model replaces that material, and -p
+    sets values in the scene.
 
     \b
     Examples:
@@ -97,7 +98,7 @@ def fit(
 
 
 def _write(target: Path, files: Sequence[str], rows: Sequence[Row]) -> list[Path]:
-    """The rows, and of a single file a figure; the files written."""
+    """Write the rows and, for a single file, a figure; returns the files written."""
     from ...fitting import batch
     from ...viewer import fit_figure
 
@@ -116,10 +117,10 @@ def _nothing(scene: Path | None) -> InputError:
 
 
 def _measurements(data: list[str]) -> list[str]:
-    """The files, unless the one is a picture."""
+    """The files. Raises InputError if the only one is a picture."""
     if len(data) == 1 and Path(data[0]).suffix.lower() in PICTURES:
         hint = f"gonio fit {data[0]} --scene scene.json"
-        raise InputError(f"'{data[0]}' is a picture, and --scene is not given", "--scene", hint)
+        raise InputError(f"'{data[0]}' is a picture, but --scene is not given", "--scene", hint)
     return data
 
 

@@ -20,7 +20,7 @@ def info(
 ) -> None:
     """Describe a file: a measured material, materials in a .json of a fit, .gltf or .mtlx, or baked tables.
 
-    Of measurements: dimensions, ranges, invalid and negative values, albedo over the angle, energy and reciprocity.
+    For measurements: dimensions, ranges, invalid and negative values, albedo by angle, energy and reciprocity.
 
     \b
     Examples:

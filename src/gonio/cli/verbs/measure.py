@@ -16,20 +16,20 @@ from .base import MATERIALS, verb
 if TYPE_CHECKING:
     from ...instruments.goniometer.run import Readout
 
-MAX_ROWS = 12  # angles of incidence that are listed
+MAX_ROWS = 12  # most angles of incidence that are listed
 
 
 class Detector(Options):
-    """Where the detector stands, and its imperfections."""
+    """The positions of the detector, and its imperfections."""
 
     theta_i: Annotated[
         str | None,
-        Option(metavar="DEG", help="Angles of light, such as 0,30,60 or 0:85:5; for .gonio, .astm and .brdf."),
+        Option(metavar="DEG", help="Angles of incidence, such as 0,30,60 or 0:85:5; for .gonio, .astm and .brdf."),
     ] = None
     theta_r: Annotated[str | None, Option(metavar="DEG", help="Viewing angles.")] = None
     phi: Annotated[str | None, Option(metavar="DEG", help="Azimuths between light and view, 0 to 180.")] = None
     solid_angle: Annotated[
-        float | None, Option(metavar="SR", help="Its aperture: 0.006 for surfaces, a point for materials by default.")
+        float | None, Option(metavar="SR", help="Its aperture; by default 0.006 for surfaces, a point for materials.")
     ] = None
     noise: Annotated[float, Option(metavar="FRACTION", help="Relative standard deviation of a reading.")] = 0.0
     blocked: Annotated[float, Option(metavar="DEG", help="Angle around the lamp that it cannot reach.")] = 0.0
@@ -39,7 +39,7 @@ class Detector(Options):
 
 
 class Specimen(Options):
-    """A surface of facets, and the rays that are sent to it."""
+    """A surface of facets, and the rays sent to it."""
 
     surface: Annotated[
         str | None,

@@ -39,14 +39,14 @@ def new(
     from ... import files
 
     if kind not in _kinds():
-        raise InputError(f"nothing to begin '{kind}' with", "KIND", did_you_mean(kind, _kinds()))
+        raise InputError(f"no template for '{kind}'", "KIND", did_you_mean(kind, _kinds()))
     file, title = _names(name)
     folder = files.check_folder(output)
     contents = {}
     for template in sorted((TEMPLATES / kind).glob("*.py.txt")):
         target = folder / template.name.removesuffix(".txt").replace(kind, file)
         if target.exists():
-            raise InputError(f"'{target}' is there already", "NAME", "choose another name, or another folder with -o")
+            raise InputError(f"'{target}' already exists", "NAME", "choose another name, or another folder with -o")
         filled = Template(template.read_text(encoding="utf-8")).substitute(file=file, title=title)
         contents[target.name] = filled.encode()
     files.write_all(folder, contents)
@@ -55,14 +55,14 @@ def new(
 
 
 def _names(name: str) -> tuple[str, str]:
-    """Of "crushed-velvet" the file's name, crushed_velvet, and the class's, CrushedVelvet."""
+    """The names of the file and the class: for "crushed-velvet", crushed_velvet and CrushedVelvet."""
     from ...material import models
 
     fine = re.fullmatch(r"[A-Za-z][\w-]*", name, re.ASCII)
     words = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name) if fine else []
     file, title = "_".join(words).lower(), "".join(word[0].upper() + word[1:] for word in words)
     if not words or keyword.iskeyword(file):
-        raise InputError(f"'{name}' is no name for a Python file and a class", "NAME", "such as velvet, crushed-velvet")
+        raise InputError(f"'{name}' cannot name a Python file and a class", "NAME", "such as velvet, crushed-velvet")
     if file.replace("_", "-") in models():
         raise InputError(f"Gonio has a material '{name}'", "NAME", f"choose another, such as my-{name}")
     return file, title

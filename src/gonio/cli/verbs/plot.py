@@ -16,9 +16,9 @@ from .base import MATERIALS, verb
 class Interface(Options):
     """The interface of `gonio plot fresnel`."""
 
-    eta: Annotated[float | None, Option(metavar="ETA", help="Relative index of fresnel: inside over outside.")] = None
-    k: Annotated[float, Option("--k", metavar="K", help="Imaginary part of the index of fresnel.")] = 0.0
-    metal: Annotated[str | None, Option(metavar="NAME", help="Metal of fresnel, such as Au.")] = None
+    eta: Annotated[float | None, Option(metavar="ETA", help="For fresnel: relative index, inside / outside.")] = None
+    k: Annotated[float, Option("--k", metavar="K", help="For fresnel: imaginary part of the index.")] = 0.0
+    metal: Annotated[str | None, Option(metavar="NAME", help="For fresnel: a metal, such as Au.")] = None
 
 
 @verb(MATERIALS, place=1)
@@ -27,7 +27,7 @@ def plot(
         list[str],
         Argument(
             metavar="MODEL...",
-            help="Materials; `gonio models` lists them. Or a baked folder, or fresnel.",
+            help="Materials, as `gonio models` lists them; or a baked folder, or fresnel.",
             autocompletion=completion.materials,
         ),
     ],
@@ -39,10 +39,10 @@ def plot(
     output: Annotated[Path | None, output_option("FILE", "The figure: .png, .pdf, .svg.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Draw materials: their lobes (polar), slices over angle, albedo, or image slices; or the tables in a baked folder;
-    or, as `fresnel`, the reflectance of an interface.
+    """Draw materials (lobes, slices, albedo or image slices), a folder of baked tables, or a Fresnel reflectance.
 
-    The sampling density of a material is drawn dashed over its values. Several materials share their axes.
+    Lobes are polar plots; slices show f as a function of angle. The sampling density of a material is drawn dashed over
+    its values. Several materials share their axes. `fresnel` stands for the reflectance of an interface.
 
     \b
     Examples:
@@ -60,7 +60,7 @@ def plot(
 
     if len(model) == 1 and plots.is_tables(model[0]):
         made.refuse(model[0])
-        interface = Interface()  # of no meaning here
+        interface = Interface()  # tables have no interface
         texts, name = model, f"{Path(model[0]).resolve().stem}-tables"
     elif model == ["fresnel"]:
         texts, name = model, "fresnel"
@@ -75,8 +75,8 @@ def plot(
 
 
 def _file_name(head: str) -> str:
-    """A material's name in that of a file: of FILE.py:CLASS the class, behind the file where that differs; of JSON,
-    "material"."""
+    """The name of a material in a file name: for FILE.py:CLASS the class, after the file's name if that differs; for
+    JSON, "material"."""
     if head.startswith("{"):
         return "material"
     file, _, name = head.lower().rpartition(".py:")

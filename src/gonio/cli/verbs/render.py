@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Until(Options):
-    """When a render stops, and where it is stored meanwhile."""
+    """When a render stops, and where its state is stored."""
 
     timeout: Timeout = None
     until_error: Annotated[
@@ -47,10 +47,10 @@ def render(
 ) -> None:
     """Render a scene, or a material on a ball, to a picture.
 
-    Without -o the picture is written to the current folder under the name that the scene gives it.
-    Ctrl-C ends after the current pass (about half a second) and writes the picture so far; a second one ends at once.
-    SIGTERM and SIGHUP do the same. A render of over a minute has a checkpoint next to the picture, from which `gonio
-    resume`, or the same command again, continues.
+    Without -o, the picture is written to the current folder under the name that the scene gives it.
+    Ctrl-C ends the render after the current pass (about half a second) and writes the picture so far; a second Ctrl-C
+    ends it at once. SIGTERM and SIGHUP do the same. A render of over a minute stores a checkpoint next to the picture,
+    from which `gonio resume`, or the same command again, continues.
 
     \b
     Examples:
@@ -84,7 +84,7 @@ def carry_out(request: Request, title: str, as_json: bool, executor: Executor) -
             _print(result, request.exposure)
         sys.stdout.flush()
     except OSError:
-        if not result.signal:  # else it is the terminal, which has closed; the picture is written
+        if not result.signal:  # after a signal, the terminal has closed; the picture is written
             raise
         os._exit(exit_code(result.signal))
     if result.stopped == "interrupt":
@@ -101,7 +101,7 @@ def _print(result: Result, exposure: Exposure) -> None:
     print_warnings(result.warnings)
     if result.stopped:
         why = f"stopped by {words(result.signal)}" if result.stopped == "interrupt" else "stopped at the time limit"
-        text += f"; {why}, {result.wanted_spp} spp were asked for"
+        text += f"; {why}, {result.wanted_spp} spp were requested"
     print(text)
     if result.stopped and result.checkpoint is not None:
         print(f"go on with: gonio resume {shlex.quote(str(result.checkpoint))}")

@@ -15,22 +15,22 @@ from .base import PICTURES, verb
 
 
 class Figures(Options):
-    """Figures that are listed on the command line, besides the scene's own picture."""
+    """Figures listed on the command line, in addition to the picture of the scene."""
 
     study: Annotated[
         list[str] | None,
-        Option("--study", metavar="NAME=V1,V2", help="A sheet of the scene; ';' before a second NAME; repeatable."),
+        Option("--study", metavar="NAME=V1,V2", help="A sheet of the scene; ';' separates a second NAME; repeatable."),
     ] = None
     plot: Annotated[
         list[str] | None,
         Option("--plot", metavar="[KIND=]MODEL", help="A plot of materials, separated by ';'; repeatable."),
     ] = None
     bake: Annotated[
-        list[str] | None, Option("--bake", metavar="TARGET", help="Tables of albedo of a distribution; repeatable.")
+        list[str] | None, Option("--bake", metavar="TARGET", help="Albedo tables of a distribution; repeatable.")
     ] = None
     work: Annotated[
         list[str] | None,
-        Option("--work", metavar="WORK[;MODEL]", help="Own work to be judged, such as f.csv; repeatable."),
+        Option("--work", metavar="WORK[;MODEL]", help="Your own work to judge, such as f.csv; repeatable."),
     ] = None
 
 
@@ -48,10 +48,10 @@ def report(
     pdf: Annotated[bool, Option("--pdf", help="Also print the page to report.pdf, by Chromium or Chrome.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write a lab report: pictures, sheets, plots, tables and verdicts as one document, with words that you edit.
+    """Write a lab report: pictures, sheets, plots, tables and verdicts as one document, with text that you edit.
 
-    The folder has report.md with the words, report.html (one file, without network), and the figures. report.md is
-    written only if it is missing: edit its words and run the same command again. Figures that have not changed are not
+    The folder contains report.md with the text, report.html (a single file that needs no network), and the figures.
+    report.md is written only if it is missing: edit its text and run the same command again. Unchanged figures are not
     made again.
 
     \b

@@ -17,7 +17,7 @@ from .render import carry_out
 def resume(
     checkpoint: Annotated[Path, Argument(metavar="FILE", help="A checkpoint of `gonio render`.")],
     *,
-    output: Annotated[Path | None, output_option("FILE", "The picture; the render's own by default.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "The picture; by default that of the render.")] = None,
     spp: Spp = None,
     timeout: Timeout = None,
     threads: Threads = None,
@@ -27,9 +27,9 @@ def resume(
 ) -> None:
     """Continue a render from its checkpoint, after it was stopped or to add samples.
 
-    The picture is bit-identical to that of an uninterrupted render. --spp counts the samples in total. A checkpoint is
-    rejected if its scene, files, settings, device or version have changed. Without -o the picture is written where the
-    checkpoint says if that is in the checkpoint's folder, else next to the checkpoint.
+    The picture is bit-identical to that of an uninterrupted render. --spp gives the total number of samples. A
+    checkpoint is rejected if its scene, files, settings, device or version have changed. Without -o, the picture is
+    written where the checkpoint says if that is in the checkpoint's folder, else next to the checkpoint.
 
     \b
     Examples:

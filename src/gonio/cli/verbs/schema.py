@@ -20,7 +20,7 @@ KINDS = ("scene", "report", "manifest")
 def schema(
     kind: Annotated[
         str,
-        Argument(metavar="scene|report|manifest", help="Of scene files, reports, or shaders' manifests."),
+        Argument(metavar="scene|report|manifest", help="For scene files, reports, or the manifests of shaders."),
     ] = "scene",
     output: Annotated[Path | None, output_option("FILE", "File to write; printed by default.")] = None,
 ) -> None:
@@ -33,7 +33,7 @@ def schema(
       gonio schema manifest
     """
     if kind not in KINDS:
-        raise InputError(f"no schema of '{kind}'", "", did_you_mean(kind, KINDS))
+        raise InputError(f"no schema for '{kind}'", "", did_you_mean(kind, KINDS))
     if output is not None:
         from ... import files
 

@@ -31,8 +31,8 @@ def study(
 ) -> None:
     """Compare parameters: render a scene with each value and arrange the pictures on one labeled sheet.
 
-    One --vary gives a row, two a grid (the first goes down, the second across), more give a grid each. A path leads
-    into the scene; of a material it names a parameter, such as p or base.alpha. Several paths of one --vary change
+    One --vary gives a row, two give a grid (the first down, the second across), more give several grids. A path names a
+    value in the scene, or a parameter of a material, such as p or base.alpha. Several paths in one --vary change
     together, for instance with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
 
     \b

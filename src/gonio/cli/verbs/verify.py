@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Files(Options):
-    """Reports for people, and for continuous integration."""
+    """Reports for people and for continuous integration."""
 
     output: Annotated[Path | None, output_option("DIR", "Write report.html and report.json there.")] = None
     junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
@@ -34,7 +34,7 @@ class Files(Options):
         Path | None, Option("--baseline", metavar="FILE", help="Fail only on failures not listed there.")
     ] = None
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="List the failures there, as known from then on.")
+        Path | None, Option("--write-baseline", metavar="FILE", help="List the failures there, for later runs.")
     ] = None
     tolerate: Annotated[
         str, Option(metavar="GRADE", help="Pass failures up to a grade: invisible, small or visible.")
@@ -44,7 +44,7 @@ class Files(Options):
 class Effort(Options):
     """What is judged, and how thoroughly."""
 
-    vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card for each value; a range has five.")] = ""
+    vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card per value; a range gives five.")] = ""
     quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False
     deep: Annotated[bool, Option("--deep", help="More samples, directions and roughnesses.")] = False
     seed: Seed = None
@@ -54,14 +54,14 @@ class Effort(Options):
     ] = None
     timeout: Annotated[float | None, Option(metavar="S", help="Stop a law after S seconds; 300 by default.")] = None
     memory: Annotated[
-        float | None, Option(metavar="GB", help="Memory limit of a BSDF; half of the machine's by default.")
+        float | None, Option(metavar="GB", help="Memory limit per BSDF; half of the machine's by default.")
     ] = None
 
     def name(self) -> str:
         from ...errors import InputError
 
         if self.quick and self.deep:
-            raise InputError("quick and deep together", "--quick", "give one of them")
+            raise InputError("both quick and deep given", "--quick", "give one of them")
         return "quick" if self.quick else "deep" if self.deep else "default"
 
 
@@ -81,15 +81,15 @@ def verify(
     made: Material,
     how: Effort,
     at: Annotated[
-        str, Option(metavar="O/I", help="Only print both orders of one pair, theta,phi/theta,phi in degrees.")
+        str, Option(metavar="O/I", help="Only print one pair in both orders, theta,phi/theta,phi in degrees.")
     ] = "",
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Prove BSDFs: energy, reciprocity, sampling, gradients, precision.
+    """Verify BSDFs: energy, reciprocity, sampling, gradients, precision.
 
-    Each target is judged in a process of its own, which it may crash or block. The exit code is 1 if a target breaks a
-    law and does not declare that violation, or 4 if no picture shows any of these violations.
+    Each target is judged in its own process, which it may crash or block. The exit code is 1 if a target violates a law
+    without declaring it, or 4 if no picture shows any of these violations.
 
     \b
     Examples:
@@ -105,7 +105,7 @@ def verify(
     if at:
         _show_pairs(target, made.settings(), how.vary, at, as_json)
         return
-    # Nothing heavy before the first process has started: it takes as long as all else together.
+    # Import nothing heavy before the first process has started, which takes as long as everything else together.
     from ...verify.ci.outputs import Outputs
     from ...verify.isolation import child
 
@@ -128,11 +128,11 @@ def verify(
 
 
 def _judge(task: Task, title: str, how: Effort, executor: Executor, *, quiet: bool) -> Report:
-    """The report of a task, by the processes of `executor`, with a progress bar and, unless `quiet`, early results."""
+    """The report of a task, computed by `executor`, with a progress bar and, unless `quiet`, early results."""
     from ...verify.isolation import child
 
     with _progress(title) as (progress, tell):
-        # one target has nothing to resume, nor has a quick look: its cards are shared by processes without a cluster
+        # A single target or a quick check has nothing to resume, so processes divide its cards without a cluster.
         if executor.cluster is None and (len(task.items) == 1 or task.effort == "quick"):
             workers = 1 if executor.workers is None else executor.workers
             shown = None if quiet else tell
@@ -145,7 +145,8 @@ def _judge(task: Task, title: str, how: Effort, executor: Executor, *, quiet: bo
 
 @contextlib.contextmanager
 def _progress(title: str) -> Iterator[tuple[Callable[[int, int, str], None], Callable[[str], None]]]:
-    """A bar that is made when the first step is done, since it loads Rich; and lines above it, on standard error."""
+    """Two functions: one updates a progress bar, created at the first step since it loads Rich; one prints lines above
+    it. Both write to standard error."""
     with contextlib.ExitStack() as stack:
         bars: list[Bar] = []
 
@@ -165,7 +166,7 @@ def _progress(title: str) -> Iterator[tuple[Callable[[int, int, str], None], Cal
 
 
 def _annotate(report: Report, wanted: bool, as_json: bool) -> None:
-    """Print annotations if asked to, or if a runner reads them: standard output and error alike."""
+    """Print annotations if requested, or on a GitHub runner, which reads both standard output and standard error."""
     from ...verify.ci import github
 
     if wanted or github.wanted():

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class Address(Options):
     """Where the page is served."""
 
-    host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1"
-    port: Annotated[int, Option(metavar="N", help="Port to listen at; 0 takes any free one.")] = 0
+    host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1"
+    port: Annotated[int, Option(metavar="N", help="Port to listen on; 0 takes any free one.")] = 0
     browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True
 
 
@@ -45,7 +45,7 @@ def view(
     ] = None,
     address: Address,
     homework: Annotated[
-        bool, Option("--homework", help="The two rows of homework 4 by the terms of its text, under one light.")
+        bool, Option("--homework", help="The two rows of homework 4 with the terms of its text, under one light.")
     ] = False,
     device: Device = "cpu",
     trust: Trust,
@@ -81,18 +81,18 @@ def view(
 
 
 def _homework(target: Sequence[str] | None, made: Material) -> Stage:
-    """The homework's rows. Raises InputError for anything named besides."""
+    """The rows of the homework. Raises InputError if anything else is named."""
     from ...viewer import stage
 
     made.shaders(())
     if target or made.settings():
-        what = f"--homework and {target[0]} together" if target else "--homework with parameters"
+        what = f"--homework given with {target[0] if target else 'parameters'}"
         raise InputError(what, "--homework", "leave one of them out; the page's sliders change all values")
     return stage.homework_text()
 
 
 def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
-    """The balls of a scene, of materials, or of the homework if nothing is named."""
+    """The stage of a scene or of materials, or the default one if nothing is named."""
     from ...catalog import operands
     from ...viewer import stage
 
@@ -109,5 +109,5 @@ def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
     if target:
         return stage.of_targets(target, settings)
     if settings:
-        raise InputError("parameters for no model", "--param", "name one: gonio view conductor --param alpha=0.3")
+        raise InputError("no model given", "--param", "name one: gonio view conductor --param alpha=0.3")
     return stage.opening()

@@ -1,4 +1,4 @@
-"""Directional albedo: by quadrature for microfacets, by sampling for any material, and by random walks on the
+"""Directional albedo: by quadrature for microfacet models, by sampling for any material, and by random walks on the
 facets."""
 
 from .directional import Albedo, albedo, direction

@@ -9,12 +9,12 @@ import numpy as np
 from ...optics.special import gauss
 
 UNSEEN = 0.25  # below this fraction of a sample's density, the values at a cell's nodes have missed its lobe
-FAINT = 0.01  # of what is missed: a cell's nodes show less by chance only, and show nothing in the next cell
-OUTSIDE = 0.07  # fraction of a cell's width outside the first of four nodes
+FAINT = 0.01  # fraction of the missed light: nodes that show less do so by chance, and show nothing in the next cell
+OUTSIDE = 0.07  # distance of the first of four nodes from the rim, as a fraction of a cell's width
 
 
 class Nodes(NamedTuple):
-    """Positions in [0, 1]^2 of a cell, and their weights, (K,) each."""
+    """Positions in the unit square of a cell, and their weights, (K,) each."""
 
     s: np.ndarray
     t: np.ndarray
@@ -30,12 +30,12 @@ class Seen(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Samples inside cells, which show lobes that are narrower than a cell.
+    """Samples inside cells, which reveal lobes that are narrower than a cell.
 
-    cell     the number of the cell, (N,)
+    cell     index of the cell, (N,)
     at       the two coordinates, (N, 2)
     density  the integrand per unit of area in these coordinates, (N,)
-    light    what the sample contributes to an estimate of the integral, (N,)
+    light    contribution of the sample to an estimate of the integral, (N,)
     """
 
     cell: np.ndarray
@@ -52,9 +52,10 @@ class Points(NamedTuple):
         return np.bincount(self.cell, self.light, count)
 
     def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """What the samples in a cell make likely, (cells,), where one of them is bright and every node dark, else 0.
+        """Estimate of the light that a cell's nodes miss, (cells,), if a sample in it is bright and all nodes are dark;
+        else 0.
 
-        area  of each cell
+        area  area of each cell
         most  the largest density at a cell's nodes, times its area
         """
         bright = np.zeros(len(area))
@@ -64,24 +65,23 @@ class Points(NamedTuple):
 
 
 def product(order: int) -> Nodes:
-    """Gauss-Legendre in both directions, `order` nodes each."""
+    """Gauss-Legendre in the two directions, `order` nodes each."""
     x, w = gauss(order)
     s, t = np.meshgrid(x, x, indexing="ij")
     return Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
 
 
 def rim(inset: float) -> Nodes:
-    """The corners and the midpoints of the sides, moved inward by a fraction of the width; not an integration rule, so
-    they have equal weights, for comparison with the nodes."""
+    """The corners and the midpoints of the sides, moved inward by a fraction of the width. They are compared with the
+    nodes; they are not an integration rule, so their weights are equal."""
     ends = (inset, 0.5, 1.0 - inset)
     near = np.array([(a, b) for a in ends for b in ends if (a, b) != (0.5, 0.5)])
     return Nodes(near[:, 0], near[:, 1], np.full(len(near), 1.0 / len(near)))
 
 
 def rimmed(inset: float) -> Nodes:
-    """A rule of four nodes per direction that is exact to degree 5, as Lobatto's, with the outer ones at a fraction of
-    the width from the rim: a step between the rim and the first node of Gauss's rules, which these miss, changes it.
-    """
+    """A rule of four nodes per direction that is exact to degree 5, like Lobatto's, with the outer nodes at a fraction
+    of the width from the rim. It detects a step between the rim and the first node of Gauss's rules, which miss it."""
     outer = (1.0 - 2.0 * inset) ** 2
     inner = (0.2 - outer / 3.0) / (1.0 / 3.0 - outer)
     share = 0.5 * (1.0 / 3.0 - inner) / (outer - inner)
@@ -93,9 +93,7 @@ def rimmed(inset: float) -> Nodes:
 
 def step_aside(inside: Seen, rim: Seen, times: float = 4.0) -> np.ndarray:
     """Bound on the integral missed between the nodes and the rim if the values at the rim differ strongly, (cells,): no
-    rule resolves a step there, such as the horizon or the critical angle.
-
-    In the units of `least` and `most`.
+    rule resolves a step there, such as the horizon or the critical angle. It has the unit of `least` and `most`.
 
     times  the ratio above which a difference is not explained by the cell's own slope
     """

@@ -2,9 +2,9 @@
 
 A cell is a rectangle in (theta, phi), theta measured from the nearer pole, so no cell crosses the horizon. Cells are
 first divided where the model's samples are dense and around the mirror direction, so that a lobe of a thousandth of a
-radian is resolved, then wherever a cell's Gauss-Legendre value differs from the sum over its quarters, until the error
-of the integral, which follows from these differences, is below the tolerance. They are those of the coarser values, so
-that the reported error is conservative.
+radian is resolved. Then they are divided wherever a cell's Gauss-Legendre value differs from the sum over its quarters,
+until the error of the integral, which follows from these differences, is below the tolerance. The differences are
+errors of the coarser values, so the reported error is conservative.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compar
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
-DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees a lobe of width 2e-4 is that narrow
+DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees, a lobe of width 2e-4 is that narrow
 SEEDED = 17  # halvings around samples
-SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more, where light is unseen by the fewer
-CROWD = 1 / 32  # share of the samples in a cell for which it is divided before the integrand is evaluated
-BUDGET = 0.5  # share of the tolerance, below whose error an integral is done
-OFF = 1e-3  # of 1, the length of a sampled direction that is not used
+SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more if the smaller number leaves light unseen
+CROWD = 1 / 32  # fraction of the samples in a cell above which it is divided before the integrand is evaluated
+BUDGET = 0.5  # fraction of the tolerance: an integral with a smaller error is done
+OFF = 1e-3  # difference from unit length above which a sampled direction is not used
 UP = np.array([0.0, 0.0, 1.0])
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 
 _GAUSS, _RIMMED = product(ORDER), rimmed(1e-3)
 
-Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
-# (wo, u) of rows (N, 3) -> a Sample of arrays: determines where cells are divided first
+Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of 64-bit Dr.Jit vectors
+# (wo, u), (N, 3) each, -> a Sample of arrays; determines where cells are divided first
 Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
 
@@ -50,11 +50,11 @@ def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integra
     return integrand
 
 
-# ways to divide a cell into four: parts along (theta, phi), and the places of the four quarters in units of their size
+# ways to divide a cell into four: parts along (theta, phi), and the positions of the parts in units of their size
 QUADRANTS, ALONG_THETA, ALONG_PHI = 0, 1, 2
 WAYS = np.array([(2, 2), (4, 1), (1, 4)])
 PLACES = np.array([[(0, 0), (1, 0), (0, 1), (1, 1)], [(k, 0) for k in range(4)], [(0, k) for k in range(4)]])
-ONE_WAY = 0.05  # ratio of the ranges of values along both coordinates, below which only the other is divided
+ONE_WAY = 0.05  # ratio of the ranges of values along the two coordinates below which only one of them is divided
 
 
 class Integral(NamedTuple):
@@ -65,7 +65,7 @@ class Integral(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """Row numbers of wo, side of the surface, lower corner and size in (theta, phi)."""
+    """Row of wo, side of the surface, lower corner and size in (theta, phi)."""
 
     row: np.ndarray
     side: np.ndarray
@@ -74,7 +74,7 @@ class _Cells(NamedTuple):
 
     @property
     def area(self) -> np.ndarray:
-        """Of each cell, in (theta, phi)."""
+        """Area of each cell, in (theta, phi)."""
         return np.asarray(self.size.prod(1))
 
     def take(self, which: np.ndarray) -> _Cells:
@@ -83,7 +83,7 @@ class _Cells(NamedTuple):
     def quarters(self, way: np.ndarray | None = None) -> _Cells:
         """The four quarters of each cell, adjacent in the result.
 
-        way  a number of WAYS per cell; None for QUADRANTS
+        way  index in WAYS per cell; None for QUADRANTS
         """
         way = np.zeros(len(self.row), int) if way is None else way
         size = self.size / WAYS[way]
@@ -97,7 +97,7 @@ def integrate(
     """int integrand(wo, wi) dwi for each row of wo (N, 3).
 
     sample     the model's sampling, which shows where its lobes are
-    integrand  (wo, wi) -> a vector with one entry per channel, of float64 Dr.Jit vectors; it runs inside a kernel
+    integrand  (wo, wi) -> a vector with one entry per channel, from float64 Dr.Jit vectors; it runs inside a kernel
     tolerance  absolute, per integral; if cells or samples run out, the reported error is larger
     """
     per, *more = SAMPLES
@@ -113,19 +113,19 @@ def integrate(
 def _integrate(
     sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float, seed: int, per: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values and errors of integrals, whose first cells follow `per` samples of each wo, and an estimate of the light
-    in lobes that are narrower than the cells and that no sample has shown, (N,).
+    """Values and errors of integrals whose first cells follow `per` samples of each wo, and an estimate of the light in
+    lobes that are narrower than the cells and that no sample has shown, (N,).
 
     Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as one
-    beside the streak. The light of samples that are alone in a cell which is divided for them estimates what is left
-    (Good1953: if N_1 of N draws are alone of their kind, kinds not seen yet have the probability N_1 / N).
+    beside the streak. The light of samples that are single in a cell divided because of them estimates what is left
+    (Good1953: if N_1 of N draws are the only ones of their kind, unseen kinds have the probability N_1 / N).
     """
     cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
     way[points.missed_by(cells.area, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
-    unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # by a single sample
+    unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # shown by a single sample
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
     allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
     for depth in range(DEPTH):
@@ -133,10 +133,10 @@ def _integrate(
         (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = inner.integral.reshape(-1, 4, channels)
         # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
-        # and if it is near their rim all of Gauss's
+        # and all of Gauss's rules if it is near their rim
         signed = np.stack([coarse, other.integral.reshape(-1, 4, channels).sum(1)]) - fine.sum(1)
         difference = np.abs(signed).max(0)
-        difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps cancel in part
+        difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps partly cancel
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells.area, 4.0 * inner.most.reshape(-1, 4).max(1))
@@ -164,10 +164,11 @@ def _integrate(
 
 
 class _Errors:
-    """The errors of the cells that are not divided, summed by integral, per channel (N, C).
+    """The errors of the cells that are not divided, summed per integral and channel, (N, C).
 
-    Over the edge of a step the errors of cells have either sign and mostly cancel: three standard errors of their sum
-    count. An edge along the cells misleads all of them alike: so does the sum itself, of two rules.
+    Along the edge of a step, the errors of cells have either sign and mostly cancel: the estimate is three standard
+    errors of their sum. An edge parallel to the cells misleads all of them alike: the estimate adds the sum itself, the
+    larger of two rules.
     """
 
     def __init__(self, count: int, channels: int) -> None:
@@ -175,7 +176,7 @@ class _Errors:
         self.squares = np.zeros((count, channels))
 
     def with_cells(self, row: np.ndarray, signed: np.ndarray, size: np.ndarray) -> _Errors:
-        """With more cells: their rows of wo (M,), the differences of both rules (2, M, C), their size (M, C)."""
+        """The sums with more cells: rows of wo (M,), differences of the two rules (2, M, C), and their size (M, C)."""
         count, channels = self.squares.shape
         more = _Errors(count, channels)
         for k in range(channels):
@@ -189,7 +190,7 @@ class _Errors:
 
 
 def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> Points:
-    """The points in divided cells, numbered by these cells' quarters."""
+    """The points in divided cells, renumbered by the quarters of these cells."""
     inside = divided[points.cell]
     cell, at = points.cell[inside], points.at[inside]
     parts = WAYS[way[cell]]
@@ -199,7 +200,7 @@ def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray)
 
 
 def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, Points]:
-    """The initial cells, divided around the samples that carry light, `per` of each wo, the mirror direction and wo,
+    """The initial cells, divided around the mirror direction, wo and the samples that carry light, `per` for each wo;
     and these samples inside them."""
     n_theta, n_phi = FIRST
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * FIRST_SIZE
@@ -220,7 +221,7 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, pe
          np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)], -1
     )  # fmt: skip
     below = (likely[:, 2] < 0.0).astype(int)
-    crowd = np.where(np.arange(len(likely)) < len(value), 1.0, CROWD * per)  # a marker alone divides its cell
+    crowd = np.where(np.arange(len(likely)) < len(value), 1.0, CROWD * per)  # a single marker divides its cell
     homes, first = np.zeros(len(likely), int), 0
     left = np.arange(len(likely))  # points in cells that are not accepted yet
     accepted: list[_Cells] = []
@@ -246,7 +247,7 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, pe
 
 
 def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    """The sum of the channels at rows of directions, (N,); 0 where it is not a number."""
+    """The sum of the channels at rows of directions, (N,); 0 where it is not finite."""
     types = backend.types("float64")
     values = list(integrand(backend.vector_of(wo, 3, types), backend.vector_of(wi, 3, types)))
     backend.drjit().eval(values)
@@ -254,14 +255,14 @@ def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
 
 
 def _key(row: np.ndarray, below: np.ndarray, at: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """The number of a cell by its row of wo, its side, and its place `at`, (M, 2) below `most`, among equal cells."""
+    """The index of a cell among equal ones, from row of wo, side, and position `at`, (M, 2) below `most`."""
     a, b = np.minimum(at.astype(np.int64), most - 1).T
     return np.asarray(((row.astype(np.int64) * 2 + below) * most[0] + a) * most[1] + b)
 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:
     """The integrand at the nodes of every cell, for each of some rules with ORDER^2 nodes, in one kernel; and the way
-    to divide each cell, by the first rule."""
+    to divide each cell, from the first rule."""
     dr = backend.drjit()
     types = backend.types("float64")
     nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
@@ -287,7 +288,7 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         area = sin * width * height
         weighed = [channel * (area * weight) for channel in value]
         summed = sum(value[1:], start=value[0]) * area
-        dr.eval(weighed, summed)  # together: each reduction would evaluate the integrand anew
+        dr.eval(weighed, summed)  # together: each reduction would evaluate the integrand again
         sums = [dr.block_sum(channel, each) for channel in weighed]
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         # nodes are in rows of equal theta; a range along theta needs columns

@@ -7,8 +7,8 @@ add up; 1 means no absorption.
 
 Three methods, in order of accuracy:
     closed form  known to the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
-    quadrature   microfacets by `quadrature`; any other `eval` by `cubature`, guided by `sample`
-    sampling     mean weight of `sample` over shifted lattices, with the standard error over the shifts
+    quadrature   microfacet models by `quadrature`; any other `eval` by `cubature`, guided by `sample`
+    sampling     mean weight of `sample` over randomly shifted lattices, with the standard error over the shifts
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ METHODS = ("auto", "closed-form", "quadrature", "sampling")
 
 
 class Albedo(NamedTuple):
-    """value (N, channels); error, its estimated error (N, channels); method, the name of the method."""
+    """value (N, channels); error, the estimated error of value (N, channels); method, the name of the method."""
 
     value: NDArray[np.float64]
     error: NDArray[np.float64]
@@ -55,17 +55,17 @@ def albedo(
     samples: int = 1 << 16,
     seed: int = 0,
 ) -> Albedo:
-    """Directional albedo of power, reflected plus transmitted, of any material.
+    """Directional albedo of any material in terms of power, reflected plus transmitted.
 
         go.albedo(go.Conductor.preset("Au", alpha=0.3), mu=[0.2, 1.0]).value        # (2, 3)
 
-    mu       cosine of wo, (N,) or a number in [-1, 1]; below 0 wo lies inside, for materials that transmit
+    mu       cosine of wo, (N,) or a number in [-1, 1]; below 0, wo lies inside, for materials that transmit
     phi      azimuth of wo, radians
     method   "auto" selects the first of "closed-form", "quadrature" and "sampling" that supports the material
-    samples  for "sampling", total per direction
+    samples  for "sampling", total number per direction
     Returns value, error and method. The error of a quadrature is its difference from a finer or coarser one, that of
     sampling one standard error.
-    Raises InputError if the method does not support the material, or a parameter has one value per ray.
+    Raises InputError if the method does not support the material, or if a parameter has one value per ray.
     """
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "albedo")
@@ -95,7 +95,7 @@ def albedo(
 
 
 def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """Unit vectors (N, 3) of cosine mu and azimuth phi."""
+    """Unit vectors (N, 3) with cosine mu and azimuth phi."""
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
     return frame.spherical_array(sin, mu, phi)
 
@@ -110,13 +110,13 @@ def check_uniform(model: BSDF) -> None:
 
 # --------------------------------------------------------------------------- closed forms and quadrature
 
-NODES, JUDGE = 64, 96  # of quadratures that a material performs itself, and of those that estimate their error
+NODES, JUDGE = 64, 96  # for quadratures that a material performs itself, and for those that estimate their error
 
 
 def known(
     model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
 ) -> NDArray[np.float64] | None:
-    """The albedo known to the material itself, or by quadrature over its microsurface; nodes None requests closed forms
+    """The albedo known to the material itself, or by quadrature over its microsurface; with nodes None, by closed forms
     only."""
 
     def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -129,7 +129,7 @@ def known(
 
 
 def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> NDArray[np.float64] | None:
-    """The albedo by quadrature over the facets' normals."""
+    """The albedo by quadrature over the normals of the facets."""
     surface = model.microsurface
     if surface is None or min(widths(surface.alpha)) < SMOOTH:
         return None
@@ -145,7 +145,7 @@ def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> N
             * (mu > 0.0)[:, None]
         )
     index = float(surface.eta)  # type: ignore[arg-type]
-    # for o below the surface the facets are rotated by 180 degrees: the azimuth of -o
+    # if o is below the surface, the facets are rotated by 180 degrees: the azimuth is that of -o
     azimuth = np.where(mu < 0.0, phi + np.pi, phi) - turn
     power = quadrature.glass(
         surface.ndf,

@@ -1,7 +1,7 @@
 """E(mu, alpha) by Monte Carlo, as in student implementations, for comparison with the quadrature.
 
-cosine   cosine-weighted wi; the weight is f pi. Unbiased, but a narrow lobe is rarely hit: below roughness 0.3 most
-         texels of 1024 samples are far too small
+cosine   cosine-weighted wi; the weight is f pi. Unbiased, but narrow lobes are rarely hit: below roughness 0.3, most
+         texels with 1024 samples are far too small
 ggx, beckmann, ... (the distribution's own name)   normals with density D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
 visible  visible normals; the weight is G / G1(o), at most 1 (Heitz2014b)
 """
@@ -51,13 +51,13 @@ def methods(ndf: str) -> tuple[str, ...]:
 class Sampling(NamedTuple):
     """How E is estimated from random samples.
 
-    method  "cosine", the distribution's name or "visible"; of a table also "quadrature", without samples
+    method  "cosine", the distribution's name or "visible"; for a table also "quadrature", without samples
     spp     samples per point, 1 or more
     points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each;
             "stratified": new ones for each, one in each cell of a square grid; `spp` must be a square
-    seed    of the points, where they are random
-    floor   lower bound of the denominator of D by method "cosine", as the homework's program has it: D is then at most
-            alpha_x alpha_y / floor; 0 is none
+    seed    seed of the points, if they are random
+    floor   lower bound of the denominator of D in method "cosine", as in the homework's program: D is then at most
+            alpha_x alpha_y / floor; 0 for none
     """
 
     method: str
@@ -108,7 +108,7 @@ def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precis
         body=body,
         labels=("i", "total", "squares", "rng"),
     )
-    dr.eval(total, squares)  # together: each alone would run the loop
+    dr.eval(total, squares)  # together: each by itself would run the loop
     mean = np.asarray(total.numpy(), float) / spp
     variance = np.maximum(np.asarray(squares.numpy(), float) / spp - mean**2, 0.0)
     return Estimate(mean.reshape(shape), np.sqrt(variance / spp).reshape(shape))
@@ -131,7 +131,7 @@ def _check(ndf: str, method: str, points: str, spp: int) -> None:
 def _weight(
     ndf: NDF, masking_name: str, method: str, wo: Array, widths: Array, u1: Array, u2: Array, bound: Array | None
 ) -> Array:
-    """f cos / pdf of one sample at F = 1; `bound` is the largest D by method "cosine"."""
+    """f cos / pdf of one sample at F = 1; `bound` is the largest D in method "cosine"."""
     dr = backend.drjit()
     if method == "cosine":
         wi = warp.square_to_cosine_hemisphere(u1, u2)

@@ -1,9 +1,9 @@
-"""The rule by which integrals over the normals of microfacets are evaluated: its variables, and where it is split.
+"""The quadrature rule for integrals over the normals of microfacets: its variables, and where it is split.
 
-**The boundary.** In the plane of n and m a reflection doubles angles. The projection of o onto this plane makes the
+**The boundary.** In the plane of n and m, a reflection doubles angles. The projection of o onto this plane makes the
 angle delta = atan(tan(theta_o) cos(phi_m)) with n, phi_m measured from o; that of i makes 2 theta_m - delta, so i is
-above the surface exactly for theta_m < pi/4 + delta / 2. Such an m has o.m > 0 as well. Inside the boundary the
-integrand is smooth, so Gauss-Legendre nodes that end on it converge geometrically.
+above the surface exactly if theta_m < pi/4 + delta / 2. Such an m has o.m > 0 as well. Inside the boundary the
+integrand is smooth, so Gauss-Legendre nodes on an interval that ends there converge geometrically.
 
 **The variables.** Normals are expressed by their stretched slopes, tan(theta_m) (cos phi_m, sin phi_m) =
 t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t dt db. Then
@@ -11,18 +11,18 @@ t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t 
   - o.m / (mu cos(theta_m)) = 1 + (S / mu) t cos(b - b_o), with S = |(alpha_x o_x, alpha_y o_y)| and b_o its angle:
     anisotropy affects only the boundary and G;
   - t = sinh(x) assigns the same number of nodes to each octave of slope, from the peak through GGX's long tail;
-  - across b - b_o = +-pi/2 the boundary jumps from theta_o's complement, small at grazing, to nearly pi/2, within an
+  - across b - b_o = +-pi/2, the boundary jumps from theta_o's complement, small at grazing, to nearly pi/2, within an
     angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, which is cot(theta_o) for one width. With
     b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the jump takes as much of x as
     the rest;
-  - where m's azimuth is o's, the integrand has an edge at grazing. For one width this is b = b_o, the end of both half
-    turns; for two widths it is nearby, and the half turns are made to end there.
+  - where the azimuths of m and o are equal, the integrand has an edge at grazing. For one width this is b = b_o, the
+    end of both half turns; for two widths it is nearby, and the half turns are made to end there.
 
 **Glass.** Reflection and transmission share the normals visible from o, theta_m < pi/2 + min(delta, 0). F has a
 square-root singularity at the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so
 it occurs at theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu is the length of o's projection. The
 integral is split there and at the boundary of reflection; the azimuths are split where A = cos_c, beyond which there is
-no total reflection. Each piece runs in s^2 (3 - 2 s), which makes a square root at either end smooth.
+no total reflection. Each piece is parametrized by s^2 (3 - 2 s), which makes a square root at either end smooth.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from ...optics import frame
 from ...optics.ndf import NDF
 from ...optics.special import gauss
 
-SMALLEST_MU = 1e-6  # the integrand contains 1 / mu: the limit mu -> 0 is evaluated here
+SMALLEST_MU = 1e-6  # the integrand contains 1 / mu: the limit mu -> 0 is evaluated at this value
 SMALLEST_ALPHA = 1e-5
 
 
@@ -65,7 +65,7 @@ def over_azimuths(
     ndf: NDF, terms: Integrand, channels: int, points: list[np.ndarray], nodes: tuple[int, int],
     sides: int, through: bool,
 ) -> list[np.ndarray]:  # fmt: skip
-    """One entry of a wavefront is a point and a stretched azimuth; the slopes are a loop inside the kernel."""
+    """Integrals over normals, one per point: each lane is a point and a stretched azimuth, with a loop over slopes."""
     dr = backend.drjit()
     kind = backend.types("float64")
     n_azimuth, n_slope = nodes
@@ -84,7 +84,7 @@ def over_azimuths(
     sums = _over_slopes(ndf, terms, channels, view, eta, slope, _cuts(view, eta, slope, limit), n_slope)
     factor = weight * view.alpha.x * view.alpha.y / view.mu
     scaled = [total * factor for total in sums]
-    dr.eval(scaled)  # together: each reduction would run the loop anew
+    dr.eval(scaled)  # together: each reduction would run the loop again
     return [np.asarray((dr.block_sum(total, block) * (2.0 / sides)).numpy()) for total in scaled]
 
 
@@ -93,7 +93,7 @@ class _View(NamedTuple):
 
     sin_o         sine of its angle to the normal
     cos_bo, sin_bo  the azimuth b_o of the stretched o
-    length        of the stretched o along the surface
+    length        length of the stretched o along the surface
     """
 
     mu: Array
@@ -127,7 +127,7 @@ def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side
     across = dr.norm(ops.vec2(alpha.x * sin_bo, alpha.y * cos_bo))
     leap = dr.minimum(view.mu * across / dr.maximum(view.length, 1e-9 * across), 1.0)
     a = _asinh(0.5 * ops.pi / leap)
-    # the edge where m's azimuth is o's is at the angle beta from b_o
+    # the edge at which the azimuths of m and o are equal is at the angle beta from b_o
     edge_x, edge_y = wo.x / alpha.x, wo.y / alpha.y
     beta = dr.atan2(edge_y * cos_bo - edge_x * sin_bo, edge_x * cos_bo + edge_y * sin_bo)
     beta = dr.select(view.length > 0.0, beta, 0.0)
@@ -163,8 +163,8 @@ def _glass_ends(view: _View, eta: Array, side: Array, leap: Array, a: Array, top
 
 
 def _in_pieces(chi: Array, top: Array, high: Array, low: Array) -> tuple[Array, Array]:
-    """(x, half its derivative) in the pieces [-1, low], [low, high], [high, top]; chi is the piece's number plus the
-    position in it."""
+    """(x, half its derivative) in the pieces [-1, low], [low, high], [high, top]; chi is the index of the piece plus
+    the position in it."""
     dr = backend.drjit()
     piece = dr.floor(chi)
     start = dr.select(piece < 0.5, -1.0, dr.select(piece < 1.5, low, high))
@@ -181,7 +181,7 @@ def _cuts(view: _View, eta: Array | None, slope: Array, limit: Array) -> list[Ar
     delta = dr.atan((slope.x * view.wo.x + slope.y * view.wo.y) / (spread * view.mu))
 
     def x_at(theta: Array) -> Array:
-        """The variable at an angle of the normal, limited to the distribution's end."""
+        """The variable x at an angle of the normal, limited to the distribution's end."""
         inside = theta < 0.5 * ops.pi - 1e-9
         t = dr.select(inside, dr.tan(dr.select(inside, theta, 0.0)) / spread, limit)
         return _asinh(dr.clip(t, 0.0, limit))
@@ -245,7 +245,7 @@ def _over_slopes(
 
 
 def _in_three(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of three pieces, each given as the piece's number plus the position in it."""
+    """Nodes and weights of three pieces, each node given as the index of its piece plus the position in it."""
     x, w = gauss(count)
     return np.concatenate([x, 1.0 + x, 2.0 + x]), np.tile(w, 3)
 

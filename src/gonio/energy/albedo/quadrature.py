@@ -1,12 +1,12 @@
-"""Directional albedo of microfacets by deterministic quadrature: E(mu, alpha), its average, the split sum.
+"""Directional albedo of microfacet models by deterministic quadrature: E(mu, alpha), its average, the split sum.
 
-With F = 1 the albedo of a microfacet BRDF is an integral over normals (dwi = 4 (o.m) dm, Walter2007, eq. 14):
+With F = 1, the albedo of a microfacet BRDF is an integral over normals (dwi = 4 (o.m) dm, Walter2007, eq. 14):
 
     E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over the m for which i lies above the surface.
 
-`normals` has the rule: its variables, and where it is split.
+`normals` has the quadrature rule: its variables, and where it is split.
 
-**The error** of any figure is estimated by the same integral with other numbers of nodes.
+**The error** of any value is estimated by the same integral with other numbers of nodes.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from ...optics.ndf import NDF, distribution
 from ...optics.special import gauss
 from .normals import Integrand, over_azimuths
 
-# Gauss-Legendre nodes over (chi, x). Measured errors of the worst texel of a 128 x 128 table with roughness >= 0.05:
+# Gauss-Legendre nodes in (chi, x). Measured errors of the worst texel of a 128 x 128 table with roughness >= 0.05:
 # 2e-7, and 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
 NODES = (40, 32)
 JUDGE = (60, 48)  # the reference for NODES
-# The same for two widths: 1.2e-5 for ratios down to 0.1; NODES would suffice for nearly equal widths
+# The same for two widths: 1.2e-5 for ratios down to 0.1; NODES would suffice for nearly equal widths.
 TURNED_NODES = (64, 32)
 TURNED_JUDGE = (96, 48)
-# Glass: over (each of three pieces of chi, each of five pieces of x)
+# For glass: nodes in (each of three pieces of chi, each of five pieces of x)
 GLASS_NODES = (12, 10)
 GLASS_JUDGE = (24, 20)
 
@@ -43,7 +43,7 @@ class Points(NamedTuple):
     """Points at which E is evaluated: numbers or arrays, which broadcast.
 
     mu              cosine of wo, in [0, 1]
-    alpha, alpha_y  widths along x and y; alpha_y None is isotropic
+    alpha, alpha_y  widths along x and y; isotropic if alpha_y is None
     phi             azimuth of wo, radians
     """
 
@@ -103,7 +103,7 @@ def reflected(
 ) -> np.ndarray:  # fmt: skip
     """Albedo of a microfacet BRDF for any Fresnel reflectance, a function from the facet's cosine to a spectrum.
 
-    Returns float64, the broadcast shape and channels last.
+    Returns float64 of the broadcast shape, with channels last.
     """
     known_masking(masking_name)
 
@@ -125,7 +125,8 @@ def glass(
 ) -> TwoWays:
     """Power reflected and transmitted by a rough dielectric (albedo 1); their sum is E(mu, alpha, eta).
 
-    eta  index on the far side over index on wo's side: above 1 light enters the denser medium, below 1 it leaves it
+    eta  index on the far side divided by that on wo's side: above 1, light enters the denser medium, below 1 it leaves
+         it
     """
     known_masking(masking_name)
     kind = fresnel.kind(fresnel_name)
@@ -159,8 +160,8 @@ def over_normals(
     eta: ArrayLike | None = None,
     nodes: tuple[int, int] | None = None,
 ) -> list[np.ndarray]:
-    """int D(m) (o.m) / mu terms(...) dm over the normals that mirror o above the surface or, with eta, are visible from
-    o.
+    """int D(m) (o.m) / mu terms(...) dm over the normals that reflect o to a direction above the surface or, with eta,
+    over those visible from o.
 
     terms     (ndf, wo, m, o.m, alpha, eta) -> `channels` values, without D
     Returns one array per channel, of the broadcast shape.
@@ -171,7 +172,7 @@ def over_normals(
     given = [points.mu, points.alpha, across, points.phi, 2.0 if eta is None else eta]
     arrays = np.broadcast_arrays(*[np.asarray(v, float) for v in given])
     shape, flat = arrays[0].shape, [a.ravel() for a in arrays]
-    sides = 1 if isotropic else 2  # without anisotropy both sides of the plane of incidence are equal
+    sides = 1 if isotropic else 2  # without anisotropy, the two sides of the plane of incidence are equal
     if eta is not None:
         nodes = (3 * nodes[0], nodes[1])
     rows = max(1, _LANES // (nodes[0] * sides))

@@ -1,7 +1,8 @@
 """Random walks on the facets (Heitz2016): the reference for every compensation.
 
-The microsurface is a random height field with GGX slopes, heights uniform in [-1, 1] (their distribution has no effect
-on results). A walker at height h moving along w hits it after a distance whose distribution follows Smith's masking:
+The microsurface is a random height field with GGX slopes and heights uniform in [-1, 1] (their distribution does not
+affect the results). A walker at height h moving along w hits it after a distance whose distribution follows Smith's
+masking:
 
     it escapes upward with probability G1(w, h) = C(h)^Lambda(w),  C(h) = (h + 1) / 2,
     otherwise the next height is C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for upward and downward directions alike.
@@ -25,8 +26,8 @@ from ...optics import frame, fresnel
 from ...optics.ndf import distribution
 from ...optics.roughness import widths
 
-MAX_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light remains after these
-FLAT = 1e-6  # below this |w.z| a walker stays at its height
+MAX_BOUNCES = 128  # at alpha = 1, less than 1e-9 of the light remains after these
+FLAT = 1e-6  # below this |w.z|, a walker stays at its height
 
 
 def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
@@ -36,13 +37,13 @@ def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
 
 
 def raised(base: Array, power: Scalar) -> Array:
-    """base^power, its logarithm limited to +-80: Dr.Jit's float64 power is NaN where it underflows."""
+    """base^power, with its logarithm limited to +-80: Dr.Jit's float64 power is NaN where it underflows."""
     dr = backend.drjit()
     return dr.exp(dr.clip(power * dr.log(base), -80.0, 80.0))
 
 
 def escape(w: Direction, height: Array, alpha: Pair) -> Array:
-    """G1(w, h): the probability to escape from C(h) = height along w; 0 downward."""
+    """G1(w, h): the probability of escape from C(h) = height along w; 0 downward."""
     dr = backend.drjit()
     power = maximum(distribution("ggx").Lambda(w, alpha), 0.0)
     return where(w.z > 0.0, raised(dr.clip(height, 1e-12, 1.0), power), 0.0)
@@ -85,10 +86,10 @@ class _Facets:
         self.base, self.alpha = base, alpha
         self.glass = base.transmits
         self.metal = base.microsurface.eta is None
-        self.albedo = 1.0 if self.metal else base.albedo  # the reflectance of a metal includes it
+        self.albedo = 1.0 if self.metal else base.albedo  # a metal's reflectance includes it
 
     def eta(self, side: Array) -> Array:
-        """Index on the far side over index in the walker's own medium."""
+        """Index on the far side divided by that in the walker's own medium."""
         if self.metal:
             return type(side)(1.0)
         return backend.drjit().select(side > 0.0, self.base.eta, 1.0 / self.base.eta)
@@ -99,7 +100,7 @@ class _Facets:
         return self.base.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
 
     def onward(self, v: Array, wi: Array, side: Array, height: Array) -> Array:
-        """Phase function from v to the target times the probability to escape along it; no albedo for glass."""
+        """Phase function from v to the target times the probability of escape along it; without the albedo of glass."""
         dr, alpha = backend.drjit(), self.alpha
         eta = self.eta(side)
         target = vec3(wi.x, wi.y, wi.z) * side
@@ -124,7 +125,7 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
 
     base   a conductor or a dielectric, bound
     wi     the target, or None
-    power  whether transmission is in power, or in radiance, which includes the factor (eta_o / eta_i)^2
+    power  whether transmission is in power; else in radiance, which includes the factor (eta_o / eta_i)^2
     The value includes |cos theta_i|.
     """
     if isinstance(wo, Node):
@@ -182,7 +183,7 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
 
 
 def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
-    """One generator per lane, seeded by the bits of both directions and the seed: new numbers for each pair."""
+    """One generator per lane, seeded by the bits of the two directions and the seed: new numbers for each pair."""
     dr = backend.drjit()
     kind = backend.types_like(type(wo))
     UInt = kind.module.UInt32
@@ -193,7 +194,7 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
         state = (state ^ (state >> 15)) * UInt(0xC2B2AE35)
         state = state ^ (state >> 13)
     count = dr.width(state)
-    # equal pairs in one call are distinguished by their lane
+    # equal pairs in one call differ by their lane
     lane = dr.arange(UInt, count) * UInt(0x9E3779B1)
     state = (state ^ lane ^ (lane >> 16)) * UInt(0x85EBCA6B)
     return kind.module.PCG32(size=count, initstate=kind.module.UInt64(state ^ (state >> 13)))
@@ -202,7 +203,7 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
 def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Mean weight, a spectrum, with which walkers from cosine mu leave the surface, and its standard error.
 
-    base  a Conductor or Dielectric with ndf "ggx"; mu below 0 starts inside glass
+    base  a Conductor or Dielectric with ndf "ggx"; if mu < 0, the walk starts inside the glass
     """
     dr = backend.drjit()
     kind = backend.types("float32")

@@ -1,16 +1,16 @@
 """The energy lost by single scattering, M(mu) = 1 - E(mu), as one short polynomial per roughness.
 
-A compensated material needs M at both directions of every pair. Two bilinear lookups are eight gathers, more expensive
+A compensated material needs M at both directions of every pair. Two bilinear lookups are eight gathers, which cost more
 than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of that. It is
-possible in the variable z of `gonio.energy.bend`, in which M is smooth at any width. M nearly vanishes toward the
-normal (z = 0), often toward grazing too, where a polynomial in powers of z would lose its digits in float32. Therefore
-it is expressed in the Bernstein basis with non-negative coefficients:
+possible in the variable z of `gonio.energy.bend`, in which M is smooth for any width. M nearly vanishes toward the
+normal (z = 0), and often toward grazing too, where a polynomial in powers of z would lose its digits in float32.
+Therefore it is expressed in the Bernstein basis with non-negative coefficients:
 
     M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
 Every term is positive, and z / r is computed without cancellation (`descent`), so M has full precision even where it is
-tiny. Rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, together with M_avg, which
-is the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Anisotropic
+tiny. The rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, together with M_avg,
+which is the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Anisotropic
 widths add two axes, see `anisotropic`.
 """
 
@@ -30,8 +30,8 @@ from .. import cache
 from ..albedo import normals, quadrature
 from ..bend import DEGREE, Form, cosine, descent, form_of, numpy_knee, numpy_rise
 
-ROWS = 129  # roughness 0 to 1; linear interpolation between them has an error of 3e-5
-LOBE_NODES = 256  # the interpolated density has an error of 1e-4; with 64 a sampled furnace lost 4e-4
+ROWS = 129  # roughness 0 to 1; linear interpolation between rows has an error of 3e-5
+LOBE_NODES = 256  # the interpolated density has an error of 1e-4; with 64 nodes, a sampled furnace lost 4e-4
 NODES_OF_FIT = 64
 STEPS_OF_FIT = 8
 
@@ -63,7 +63,7 @@ def _nodes(count: int) -> np.ndarray:
 
 
 def _importance(mu: np.ndarray) -> np.ndarray:
-    """The weight of the fit at mu: below mu = 0.02 albedo matters little, and that of glass has a cusp."""
+    """The weight of the fit at mu: below mu = 0.02, albedo matters little, and that of glass has a cusp."""
     return np.minimum(mu / 0.02, 1.0) + 0.02
 
 
@@ -82,14 +82,14 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
 
 
 def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """M for rows of coefficients at mu (rows, nodes), as `missing` computes it."""
+    """M for rows of coefficients at mu (rows, nodes), computed as in `missing`."""
     fall = 1.0 - numpy_rise(form, mu, bend[:, None])
     return np.einsum("rnk,rk->rn", bernstein(fall, form.degree), coefficients)
 
 
 @cache.of_members
 def isotropic(ndf: str, masking: str) -> Table:
-    """Coefficients over roughness (ROWS, CHANNELS) of a distribution and masking."""
+    """Coefficients over roughness, (ROWS, CHANNELS), for a distribution and masking."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, normals.SMALLEST_ALPHA)
@@ -123,10 +123,10 @@ TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by 
 
 @cache.of_members
 def anisotropic(ndf: str, masking: str) -> Table:
-    """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) of a metal with two widths.
+    """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) for a metal with two widths.
 
-    Over the azimuth M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi measured from
-    the axis of the larger width; the bend is that of the width along w, alpha_phi^2 = alpha_max^2 cos^2 +
+    In azimuth, M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi measured from the
+    axis of the larger width; the bend is that of the width along w, alpha_phi^2 = alpha_max^2 cos^2 +
     alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(6 - j), Y = (1 + y) / 2, in c_k; all are
     non-negative.
     """
@@ -152,7 +152,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
         by_cell = (np.stack(part, axis=1).reshape(len(big), -1) for part in (target, importance))
         c = np.array([_nearly_minimax(basis, *cell) for cell in zip(*by_cell, strict=True)])
         c = c.reshape(len(big), DEGREE + 1, HARMONICS)
-        # M_avg: over azimuth and cosine, of the fitted polynomial
+        # M_avg: the mean of the fitted polynomial over azimuth and cosine
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
         node, weight = gauss(64)
         average = np.zeros(len(big))
@@ -188,7 +188,7 @@ SIDES = ("thin", "dense")
 
 @cache.of_members
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its less dense and denser side."""
+    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from the less dense and denser side."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
@@ -213,8 +213,8 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 
 def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scalar]:
-    """The isotropic widths at which glass loses about as much as at two widths, along a direction, from the less dense
-    and from the denser side; root is sqrt(F0)."""
+    """The isotropic widths at which glass loses about as much as with the two widths, along a direction, from the less
+    dense and from the denser side; root is sqrt(F0)."""
     thin2, dense2 = _squares(sqr(w.x), sqr(w.y), ops.abs(w.z), sqr(alpha.x), sqr(alpha.y), root)
     return sqrt(ops.clamp(thin2, 1e-8, 1.0)), sqrt(ops.clamp(dense2, 1e-8, 1.0))
 
@@ -222,14 +222,14 @@ def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scala
 def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array, root: Array) -> tuple[Array, Array]:
     """The squares of `widths_along`.
 
-    At normal incidence the width is about the root of the mean square. At grazing incidence masking by the width along
-    the direction dominates. With S and D sum and difference of the squared widths,
+    At normal incidence, the width is about the root of the mean square. At grazing incidence, masking by the width
+    along the direction dominates. With S and D the sum and difference of the squared widths,
     alpha^2 = S / 2 + o D sin^2 cos(2 phi) + e D^2 / S; o and e are fitted to the width that yields M exactly, for
     indices 1.15, 1.5 and 2.2 and four pairs of widths.
     """
     S, D, difference, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
     bent, across, low2 = D * D / S, difference / (1.0 + cos), low * low
-    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near index 1 both sides are equal
+    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near index 1 the two sides are equal
     thin = 0.5 * S + D * difference * (0.5 - 0.7 * root + 0.06 * low8) + bent * (0.35 * root * (1.0 - 0.6 * low8))
     dense = 0.5 * S + D * difference * (low2 * low2 - 0.1) + bent * low * (1.3 * across * across - 0.48)
     return thin, dense + (thin - dense) * (near * near)
@@ -277,7 +277,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 
 @cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """`lobe` over (the root of sqrt(F0), roughness, u), for either side."""
+    """`lobe` over (the root of sqrt(F0), roughness, u), for each side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
@@ -291,7 +291,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.ndarray:
     """mu^2 at equal quantiles of the density M mu, for each row."""
-    grid = np.linspace(0.0, 1.0, 2049)  # of mu^2, in which the density is M / M_avg
+    grid = np.linspace(0.0, 1.0, 2049)  # values of mu^2, in which the density is M / M_avg
     density = evaluate(form, rows, bend, np.sqrt(np.maximum(grid, 1e-12))[None, :]) + 1e-9
     below = np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1)
     below = np.concatenate([np.zeros((len(rows), 1)), below], axis=1) / below[:, -1:]
@@ -310,7 +310,7 @@ Coefficients.__doc__ = "c_0 to c_10."
 
 @ops.function
 def turn(channels: tuple[Array, ...], along: Array, across: Array) -> Coefficients:
-    """c_0 to c_10 of a direction from the channels of `anisotropic`.
+    """c_0 to c_10 for a direction, from the channels of `anisotropic`.
 
     along, across  (1 + y) / 2 and (1 - y) / 2
     """
@@ -336,7 +336,7 @@ def _harmonics(along: Array, across: Array) -> Harmonics:
 
 @ops.function
 def _weigh(factors: tuple[Array, ...], terms: tuple[Array, ...]) -> Array:
-    """Sum of the terms, each times its factor."""
+    """Sum of the terms, each multiplied by its factor."""
     total = factors[0] * terms[0]
     for factor, value in zip(factors[1:], terms[1:], strict=True):
         total = ops.fma(factor, value, total)

@@ -1,10 +1,10 @@
-"""The energy lost by single scattering in rough glass, from both sides.
+"""The energy lost by single scattering in rough glass, for both sides of the surface.
 
 From side a, a fraction T_a of the lost energy goes to side b, the rest back to a (power, not radiance):
 
     f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
 
-so that a's albedo is completed for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
+so that a's albedo becomes complete for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
 T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is satisfied by
 T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
 
@@ -68,13 +68,13 @@ class TwoWidths(NamedTuple):
 
 
 class Glass(NamedTuple):
-    """Both sides; "thin" is the less dense one.
+    """Both sides of a surface; "thin" is the less dense one.
 
-    average  of M_avg over both sides
-    F_avg    the base's albedo; both lobes together preserve this fraction of the energy
+    average  mean of M_avg over the two sides
+    F_avg    the base's albedo; base and lobe together preserve this fraction of the energy
     place    coordinates in the tables of the lobes' inverses: index, width
-    inside   index inside over index outside
-    names    ndf, masking and Fresnel
+    inside   index inside divided by index outside
+    names    names of the ndf, masking and Fresnel
     two      the two widths if they differ
     """
 
@@ -158,7 +158,7 @@ class Glass(NamedTuple):
         return vec3(w.x, w.y, where(below, -w.z, w.z))
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        """Index on wi's side over index on wo's side."""
+        """Index on wi's side divided by that on wo's side."""
         return where(wo.z * wi.z > 0.0, 1.0, where(wo.z >= 0.0, self.inside, 1.0 / self.inside))
 
 
@@ -184,7 +184,7 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
         m_thin, m_dense = (maximum(m, 0.0) for m in lookup(curves.glass_of_two(*names), place[0], *aspect))
     both = maximum(m_thin + m_dense, 2.0 * lobe.NOTHING)
     some = (m_thin > lobe.NOTHING) & (m_dense > lobe.NOTHING) & (abs(index - 1.0) > 1e-4)
-    reflected: Array = base.mean_reflectance()  # a number, of glass
+    reflected: Array = base.mean_reflectance()  # a single number for glass
     enters = 1.0 - reflected
 
     def side(name: str, fit: tuple[Scalar, ...], of_mean: Scalar, average: Scalar, through: Scalar) -> Side:

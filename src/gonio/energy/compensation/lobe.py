@@ -15,7 +15,7 @@ class MissingEnergy(Protocol):
     """M(mu) = 1 - E(mu), E the directional albedo of a base at F = 1, and the broad lobe M(mu_i) mu_i that returns it.
 
     average  M_avg = 1 - E_avg = 2 int M mu dmu
-    F_avg    fraction of the light preserved by one bounce; colors become more saturated by it
+    F_avg    fraction of the light preserved by one bounce, which makes colors more saturated
     factor   factor applied once to all light that leaves
     """
 
@@ -50,11 +50,11 @@ class MissingEnergy(Protocol):
         """A direction with that density."""
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        """Index on wi's side over index on wo's side."""
+        """Index on wi's side divided by that on wo's side."""
 
 
 def above(wo: Direction, wi: Direction) -> Mask:
-    """Whether both lie above the surface."""
+    """Whether both directions lie above the surface."""
     return (wo.z > 0.0) & (wi.z > 0.0)
 
 

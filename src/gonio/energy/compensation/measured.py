@@ -2,7 +2,7 @@
 
 `KullaConty` accepts any base that only reflects. To separate the loss of single scattering from intended absorption, E
 is measured on the lossless variant of the base: F = 1, and 1 for every color that is a fraction of the light (a
-spectrum whose range ends at 1, such as an albedo), in inner materials too. Then, over the channels,
+spectrum whose range ends at 1, such as an albedo), also in inner materials. Then, with maxima over the channels,
 
     M(mu) = 1 - max E_white(mu), at least 0,        F_avg = E_avg / max E_avg,white,
 
@@ -42,11 +42,11 @@ from ...optics.lattice import r_sequence
 from ...optics.special import gauss
 from . import lobe
 
-# of M at equal steps of x, mu = sin^2(pi x / 2), linear between them: E behaves like a root of mu at grazing and, if it
-# depends on sin(theta) as Oren-Nayar's does, like a root of 1 - mu at the normal
+# nodes of M at equal steps of x, mu = sin^2(pi x / 2), linear between them: E behaves like a root of mu at grazing and,
+# if it depends on sin(theta) as Oren-Nayar's does, like a root of 1 - mu at the normal
 NODES = 65
 POINTS = 1 << 16  # samples per node. Furnace errors: 1e-4 for Phong and Oren-Nayar, 4e-4 for mixtures
-LOBE_NODES = 256  # as `curves.LOBE_NODES`
+LOBE_NODES = 256  # as for `curves.LOBE_NODES`
 SMALLEST_MU = 1e-4
 
 
@@ -101,7 +101,7 @@ class Measured(NamedTuple):
 
 
 def measured(base: BSDF) -> Measured:
-    """The lost energy of a bound base that only reflects, measured on it and its lossless variant."""
+    """The lost energy of a bound base that only reflects, measured on the base and its lossless variant."""
     base = _uniform(base)
     dr = backend.drjit()
     types = _types(base)
@@ -121,7 +121,7 @@ def measured(base: BSDF) -> Measured:
 
 def _uniform(base: BSDF) -> BSDF:
     """The bound base with one entry per value. Raises an error if it cannot be measured: while it or a Dr.Jit loop is
-    recorded, or if its values vary from ray to ray."""
+    being recorded, or if its values vary from ray to ray."""
     _check_computed(*binding.values(base))
     dr = backend.drjit()
     name = type(base).__name__
@@ -157,7 +157,7 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
     """E of the lossless base and of the base itself at each node, averaged over azimuth: spectra with NODES entries.
 
     Directions come from `sample` with the same POINTS of a lattice at every node, so the error is smooth in mu.
-    Directions and densities are held fixed where the values are differentiated.
+    Directions and densities are held fixed when the values are differentiated.
     """
     dr = backend.drjit()
     UInt = kind.module.UInt32
@@ -175,7 +175,7 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
     def albedo(model: BSDF) -> Array:
         value = model.eval(wo, wi)
         parts = [channel * share for channel in value]
-        dr.eval(parts)  # together: each reduction would evaluate the base anew
+        dr.eval(parts)  # together: each reduction would evaluate the base again
         return type(value)(*[dr.block_sum(part, POINTS) for part in parts])
 
     albedos = albedo(white), albedo(base)
@@ -198,7 +198,7 @@ def _averaging() -> np.ndarray:
 
 def _inverse(lost: np.ndarray) -> np.ndarray:
     """mu^2 at equal quantiles of the density M mu."""
-    grid = np.linspace(0.0, 1.0, 4097)  # of mu^2, in which the density is M / M_avg
+    grid = np.linspace(0.0, 1.0, 4097)  # values of mu^2, in which the density is M / M_avg
     x = np.arcsin(grid**0.25) * (2.0 / PI)
     density = np.interp(x, np.linspace(0.0, 1.0, NODES), lost) + 1e-9
     below = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
@@ -206,7 +206,7 @@ def _inverse(lost: np.ndarray) -> np.ndarray:
 
 
 def _read(table: Array, x: Array) -> Array:
-    """A derived array with nodes at both ends of [0, 1], interpolated linearly."""
+    """A value interpolated linearly in a derived array with nodes at both ends of [0, 1]."""
     dr = backend.drjit()
     kind = backend.types_like(type(x))
     last = dr.width(table) - 1

@@ -1,4 +1,4 @@
-"""The missing energy of a base, and the check whether a base can be compensated."""
+"""The missing energy of a base, and the check of whether a base can be compensated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = F
     """Raise InputError if a base cannot be compensated.
 
     transmitting  whether a microsurface may transmit
-    any_base      whether bases other than microsurfaces are accepted: any that reflects by a finite lobe
+    any_base      whether any base that reflects by a finite lobe is accepted, not only microsurfaces
     """
     name = type(base).__name__
     if base.microsurface is not None:

@@ -14,13 +14,13 @@ from ...optics.roughness import SMOOTH, widths
 from ..bend import form_of, knee
 from . import curves, lobe
 
-APART = 0.05  # relative difference of two widths from which their own fit alone holds
+APART = 0.05  # relative difference of two widths above which only their own fit is used
 
 
 class Reflecting(NamedTuple):
     """M as one Bernstein polynomial per width; see `curves`.
 
-    c             its coefficients; with two widths, at their mean width
+    c             coefficients of the polynomial; with two widths, at their mean width
     bend          the cosine at which masking sets in
     scale         1 / (pi M_avg) of that polynomial, i.e. of the sampled lobe
     true_scale         1 / (pi M_avg) of M itself; equal to `scale` with one width
@@ -29,7 +29,7 @@ class Reflecting(NamedTuple):
     factor        the base's albedo
     row           coordinate in the table of the lobe's inverse
     two           `TwoWidths` if the widths differ
-    ndf, masking  by name
+    ndf, masking  names of the distribution and the masking term
     """
 
     c: tuple[Scalar, ...]
@@ -52,7 +52,7 @@ class Reflecting(NamedTuple):
         return even + self.two.apart * (self.two.at(w, self.ndf, self.masking) - even)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M at a direction above the surface at the mean width, by which the lobe is sampled."""
+        """M at the mean width, by which the lobe is sampled, at a direction above the surface."""
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
@@ -68,7 +68,7 @@ class Reflecting(NamedTuple):
         return where((self.scale > 0.0) & (wo.z > 0.0), self.of_mean_width(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg), at the mean of two widths."""
+        """M(mu_i) mu_i / (pi M_avg), at the mean of the two widths."""
         return self.of_mean_width(wi) * maximum(wi.z, 0.0) * self.scale
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
@@ -85,9 +85,9 @@ class TwoWidths(NamedTuple):
 
     c_phi     coefficients in azimuth of each coefficient of M
     alpha     the widths
-    rotation  the base's
-    apart     weight of this M against that of the mean width: 0 for equal widths, where the two fits differ by up to
-              2 % of a dark value
+    rotation  rotation of the base
+    apart     weight of this M relative to that of the mean width: 0 for equal widths, where the two fits differ by up
+              to 2 % of a dark value
     """
 
     c_phi: tuple[Scalar, ...]
@@ -136,7 +136,7 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
 
 
 def has_two_widths(base: BSDF) -> bool:
-    """Whether an unbound base has or may have two different widths; it shapes the code."""
+    """Whether an unbound base has or may have two different widths, on which the code depends."""
     surface = base.microsurface
     if surface is None:
         return False
@@ -156,7 +156,7 @@ class Azimuth(NamedTuple):
 
 @function
 def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
-    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; at the normal the azimuth is arbitrary."""
+    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; at the normal, the azimuth is arbitrary."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
     width = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))

@@ -1,7 +1,7 @@
-"""Light from polygons by linearly transformed cosines (Heitz2016a): the formulas of shaders, in the vocabulary.
+"""Light from polygons by linearly transformed cosines (Heitz2016a), in the operations from which shaders are written.
 
-A lobe is approximated by E(o) D(i), D the cosine lobe seen through a matrix W: D(i) = cos+(W i) |det W| / (pi |W i|^3).
-A polygon seen by the lobe is the polygon W P seen by the cosine, whose integral is known (Lambert).
+A lobe is approximated by E(o) D(i), D the cosine lobe transformed by a matrix W: D(i) = cos+(W i) |det W| / (pi
+|W i|^3). The integral of D over a polygon P is that of the cosine lobe over the polygon W P, which is known (Lambert).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Corners = tuple[Direction, Direction, Direction, Direction]
 
 @function
 def edge(a: Direction, b: Direction) -> Scalar:
-    """Integral of an edge of a polygon, times 2 pi: its angle, times the height of the unit normal of its plane."""
+    """Integral along an edge of a polygon, times 2 pi: its angle times the height of the unit normal of its plane."""
     across = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
     sine = norm(across)
     return across.z * safe_div(ops.atan2(sine, where(sine > 0.0, dot(a, b), 1.0)), sine)
@@ -36,7 +36,7 @@ def edge(a: Direction, b: Direction) -> Scalar:
 
 @function
 def visible_edge(a: Direction, b: Direction) -> Scalar:
-    """`edge` of the part above the horizon z = 0."""
+    """`edge` for the part above the horizon z = 0."""
     cut = horizon(a, b)
     value = edge(where(a.z > 0.0, a, cut), where(b.z > 0.0, b, cut))
     return where(maximum(a.z, b.z) > 0.0, value, 0.0)
@@ -50,13 +50,13 @@ def horizon(a: Direction, b: Direction) -> Direction:
 
 @function
 def leaving(a: Direction, b: Direction) -> Direction:
-    """`horizon` of an edge that leads below, else 0."""
+    """`horizon` for an edge that leads below the horizon, else 0."""
     return where((a.z > 0.0) & (b.z <= 0.0), horizon(a, b), 0.0 * a)
 
 
 @function
 def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scalar:
-    """Part of a cosine lobe around +z that a convex quadrilateral covers: 1 for the hemisphere.
+    """Fraction of a cosine lobe around +z that a convex quadrilateral covers: 1 for the hemisphere.
 
     a, b, c, d  vectors to its corners, in order; the part below z = 0 is cut off
     """
@@ -68,7 +68,7 @@ def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scala
 
 @function
 def to_cosine(first: Scalar, second: Scalar, third: Scalar, fourth: Scalar, wo: Direction, p: Direction) -> Direction:
-    """W p, of unit length: first, 0, second; 0, 1, 0; third, 0, fourth are the rows of W, where wo has no y."""
+    """W p, normalized; the rows of W are (first, 0, second), (0, 1, 0), (third, 0, fourth), in axes with wo.y = 0."""
     size = sqrt(maximum(wo.x * wo.x + wo.y * wo.y, 1e-20))
     along = where(size > 1e-8, (p.x * wo.x + p.y * wo.y) / size, p.x)
     aside = where(size > 1e-8, (p.y * wo.x - p.x * wo.y) / size, p.y)
@@ -76,9 +76,9 @@ def to_cosine(first: Scalar, second: Scalar, third: Scalar, fourth: Scalar, wo: 
 
 
 def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
-    """Part of the lobe of W that a quadrilateral covers.
+    """Fraction of the lobe of W that a quadrilateral covers.
 
-    inverse  the four numbers of W, as the table has them
+    inverse  the four numbers of W, as stored in the table
     corners  see `cosine_quad`
     """
     first, second, third, fourth = inverse
@@ -88,7 +88,7 @@ def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar
 
 @function
 def in_view(wo: Direction, p: Direction) -> Direction:
-    """p in the frame whose x axis lies below wo, of a surface whose own axes are planes of symmetry.
+    """p in the frame whose x axis lies below wo, for a surface whose own axes are planes of symmetry.
 
     wo and p are mirrored first, so that wo lies between +x and +y.
     """
@@ -100,7 +100,7 @@ def in_view(wo: Direction, p: Direction) -> Direction:
 
 
 def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
-    """`quad` of an anisotropic lobe.
+    """`quad` for an anisotropic lobe.
 
     inverse  the numbers of W by rows, without the middle one, which is 1; W acts in the frame of `in_view`
     """
@@ -115,7 +115,7 @@ def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) ->
 
 
 def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """`coordinates` of a table with an axis for the azimuth, before that for the angle."""
+    """`coordinates` for a table that has an axis for the azimuth before that for the angle."""
     size = wo.x * wo.x + wo.y * wo.y
     azimuth = ops.atan2(ops.abs(wo.y), where(size > 1e-16, ops.abs(wo.x), 1.0)) * (2.0 / ops.pi)
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
@@ -124,6 +124,6 @@ def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[
 
 
 def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """Where a table is read: of one row only the angle counts."""
+    """The coordinates at which a table is read; if it has a single row, only that of the angle."""
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
     return (inset(minimum(roughness, 1.0), table.shape[0]), column) if len(table.shape) == 2 else (column,)

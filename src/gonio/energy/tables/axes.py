@@ -5,8 +5,8 @@
     stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), see `stretch`, in which E is
                smooth: the error of bilinear interpolation is a hundredth of that on a linear axis
 
-Two widths: the larger is roughness^2, and their ratio is the table's. E is even in phi about both axes of the surface,
-so a quarter turn suffices, and mirroring at its ends is exact.
+With two widths, the larger is roughness^2, and their ratio is that of the table. E is even in phi about both axes of
+the surface, so a quarter turn suffices, and mirroring at its ends is exact.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Axes:
         return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
 
     def at(self, *index: Any) -> Points:
-        """The points at indices, integers or between nodes, one array per axis; they broadcast."""
+        """The points at given indices, integers or between nodes, with one array per axis; they broadcast."""
         roughness = self.roughness(index[-2])
         if not self.azimuths:
             mu, alpha = np.broadcast_arrays(self.mu(index[-1], roughness), roughness**2)
@@ -74,7 +74,7 @@ class Axes:
         return turn if self.layout == "linear" else np.arctan2(np.sin(turn), self.aspect * np.cos(turn))
 
     def mu(self, index: Any, roughness: Any, phi: Any = 0.0) -> np.ndarray:
-        """Cosine at an index, for a row and slice."""
+        """Cosine at an index, for given roughness and azimuth."""
         x = self._unit(index, self.size)
         if self.layout == "linear":
             return x + 0.0 * roughness + 0.0 * phi
@@ -122,7 +122,7 @@ def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
 
 
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The cosine at a position x in [0, 1] of the stretched axis for a width."""
+    """The cosine at a position x in [0, 1] of the stretched axis, for a given width."""
     form, _ = stretch(ndf, masking)
     knee = bend.numpy_knee(form, masking, np.maximum(alpha, normals.SMALLEST_ALPHA))
     return bend.cosine(form, x, knee)

@@ -41,7 +41,7 @@ LUTS = {
 }
 NAMES = {"E": ("E",), "Eavg": ("E_avg",), "dfg": ("dfg",), "glass": ("E_glass_thin", "E_glass_dense")}
 MAX_SIZE = 4096
-AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: the error of linear interpolation is 1.2e-3
+AZIMUTHS = 24  # stretched layout, alpha_y = alpha_x / 4: the error of linear interpolation is 1.2e-3
 LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
 MAX_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) for eta = 5
@@ -62,10 +62,10 @@ def bake(
     """Tables of a distribution by name (F = 1), or of a material.
 
     target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis; a Dielectric from outside.
-             For any other material E[mu] and E_avg with its own parameters
-    lut      the tables; None is E and Eavg, and dfg of a distribution
+             For any other material, E[mu] and E_avg with its own parameters
+    lut      the tables; if None, E and Eavg, and for a distribution also dfg
     masking  for a distribution, by default smith-correlated; a material has its own
-    aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1 it adds the axis phi, a
+    aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1, it adds the axis phi, a
              quarter turn from x. A material has its own, the ratio of its two widths; its rotation is ignored
     sampling by quadrature, or from samples; E_avg of a sampled table is integrated from its rows
     Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and tables that the target does not have.
@@ -111,11 +111,11 @@ def _check_options(sampling: Sampling, of_material: Mapping[str, object]) -> Non
     floor, method = sampling.floor, sampling.method
     if floor < 0.0 or (floor > 0.0 and method != "cosine"):
         hint = "give a number of 0 or more with --method cosine; the other methods do not evaluate D"
-        raise InputError(f"a floor of {floor:g} by method '{method}'", "--floor", hint)
+        raise InputError(f"a floor of {floor:g} with method '{method}'", "--floor", hint)
 
 
 def _described(asked: Target, axes: Axes, sampling: Sampling) -> dict[str, object]:
-    """The manifest's account of the target, the method and the axes."""
+    """The entries of the manifest for the target, the method and the axes."""
     options = {name: value for name, value in sampling._asdict().items() if name != "floor" or value}
     return {
         "ndf": asked.ndf,
@@ -131,7 +131,7 @@ def _described(asked: Target, axes: Axes, sampling: Sampling) -> dict[str, objec
 def cached(target: str | BSDF, **options: Any) -> Baked:
     """`bake`, cached in the user's cache folder (`gonio.energy.cache`).
 
-    Only distributions and microsurfaces of Gonio are cached; the formulas of other materials may be in any file.
+    Only distributions and microsurfaces of Gonio are cached: the formulas of other materials may be in any file.
     """
     if isinstance(target, BSDF) and not tabulated(target):
         return bake(target, **options)
@@ -183,9 +183,9 @@ def _check(lut: tuple[str, ...] | list[str], size: int, layout: str, sampling: S
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
     if not 1 <= size <= MAX_SIZE:
-        raise InputError(f"a table of {size} x {size} asked for", "--resolution", f"give 1 to {MAX_SIZE}")
+        raise InputError(f"a table of {size} x {size} requested", "--resolution", f"give 1 to {MAX_SIZE}")
     if sampling.spp < 1:
-        raise InputError(f"{sampling.spp} samples asked for", "--samples", "give 1 or more")
+        raise InputError(f"{sampling.spp} samples requested", "--samples", "give 1 or more")
     if (points := sampling.points) not in monte_carlo.POINTS:
         raise InputError(f"unknown points '{points}'", "--sampler", did_you_mean(points, list(monte_carlo.POINTS)))
 
@@ -241,7 +241,7 @@ def _directional(
 ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
     exact = asked.exact(axes.nodes())
     if sampling.method == "quadrature":
-        # compared at the most difficult columns, next to grazing and next to the normal, and at every fourth
+        # compared at the most difficult columns, near grazing and near the normal, and at every fourth
         n = axes.size
         some = np.unique(np.concatenate([np.arange(min(4, n)), np.arange(0, n, 4), [n - 1]]))
         slices = [np.arange(0, axes.azimuths, 5)] if axes.azimuths else []
@@ -309,7 +309,7 @@ def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> fl
 
 
 def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
-    """Both sides over (sqrt_f0, roughness, mu): reflected and transmitted power; their sum is E."""
+    """Tables for both sides over (sqrt_f0, roughness, mu): reflected and transmitted power, whose sum is E."""
 
     def root(index: Any) -> Any:
         return (index + 0.5) / GLASS_STEPS * MAX_ROOT

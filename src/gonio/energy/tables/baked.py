@@ -76,7 +76,7 @@ def _seal(text: str) -> str:
 
 
 def read(path: Path) -> Baked:
-    """The tables in a file. Raises ValueError with the reason if it is damaged, altered or foreign."""
+    """The tables in a file. Raises ValueError with the reason if the file is damaged, altered or foreign."""
     try:
         arrays = archives.read(path)
         text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
@@ -109,7 +109,7 @@ def load(path: str | Path) -> Baked:
 
 
 def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: bool = False) -> dict[str, np.ndarray]:
-    """E, E_avg and dfg in the homework's form: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels,
+    """E, E_avg and dfg in the homework's form: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels, and
     E_avg is constant along a row; dfg has A in red and B in green.
 
     store  "E" or "1-E", for E and E_avg
@@ -117,7 +117,7 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: b
     wrap   convert to bytes as the homework's program does: rounded down, and 256 becomes 0
     """
     if store not in ("E", "1-E"):
-        raise InputError(f"unknown '{store}'", "--store", "E or 1-E")
+        raise InputError(f"unknown form '{store}'", "--store", "give E or 1-E")
     size = baked.manifest["size"]
     pictures: dict[str, np.ndarray] = {}
     for name in ("E", "E_avg"):
@@ -134,7 +134,7 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: b
 
 
 def _bytes(value: np.ndarray, wrap: bool) -> np.ndarray:
-    """Values of 0 to 1 in 8 bits; with `wrap`, modulo 256 in place of clipped."""
+    """Values of 0 to 1 in 8 bits; with `wrap`, modulo 256 instead of clipped."""
     if wrap:
         return (np.floor(value * 255.0).astype(np.int64) % 256).astype(np.uint8)
     return np.round(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)

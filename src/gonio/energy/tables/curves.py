@@ -1,12 +1,13 @@
-"""Albedos as short formulas for shaders: rational functions of roughness and cosine, fitted for the largest error.
+"""Albedos as short formulas for shaders: rational functions of roughness and cosine, fitted to minimize the maximum
+error.
 
-    P(x, y) / Q(x, y),  P and Q polynomials of a total degree, Q(0, 0) = 1
+    P(x, y) / Q(x, y),  P and Q polynomials of a given total degree, Q(0, 0) = 1
 
     x is the roughness or alpha, its square; y the cosine, its root, or sqrt(mu / (mu + 4 alpha)) or
-    sqrt(mu^2 + alpha^2), in which E and B / E of microfacets are smooth: whichever fits best.
+    sqrt(mu^2 + alpha^2), in which E and B / E of microfacet models are smooth: whichever fits best.
 
 Each step solves a linear problem weighted by the last denominator (Sanathanan and Koerner), and weights grow where the
-error is large (Lawson), so that the largest error falls toward the smallest possible.
+error is large (Lawson), so that the maximum error approaches the smallest possible.
 """
 
 from __future__ import annotations
@@ -29,19 +30,19 @@ from .target import Target
 
 Array: TypeAlias = NDArray[np.float64]
 
-LEAST_ROUGHNESS, LEAST_COSINE = 0.045, 0.02  # below, the albedo has a knee that a short formula cannot follow
+LEAST_ROUGHNESS, LEAST_COSINE = 0.045, 0.02  # below these, the albedo has a knee that a short formula cannot follow
 ROWS, COLUMNS = 17, 33
 LARGEST_ORDER = 8
 STEPS = 30
-SAMPLES = 1 << 14  # of an albedo that only sampling gives for each roughness
+SAMPLES = 1 << 14  # for an albedo that only sampling gives at each roughness
 
 
 class Rational(NamedTuple):
     """P / Q, a rational function of one or two variables.
 
-    above, below  coefficients of P and Q by powers of x (rows) and y
-    forms         "roughness" or "alpha", and "mu", "root", "bent" or "soft", of x and y
-    error, mean   the largest and the mean error over the grid of the fit
+    above, below  coefficients of P and Q by powers of x (rows) and y (columns)
+    forms         "roughness" or "alpha" for x, and "mu", "root", "bent" or "soft" for y
+    error, mean   the largest and the mean error on the grid of the fit
     """
 
     above: Array
@@ -51,7 +52,7 @@ class Rational(NamedTuple):
     mean: float
 
     def __call__(self, x: Scalar, y: Scalar) -> Scalar:
-        """The value at the forms of roughness and cosine (`variables`)."""
+        """The value at the variables x and y of roughness and cosine (`variables`)."""
         value = _horner(self.above, x, y)
         return value / _horner(self.below, x, y) if np.count_nonzero(self.below) > 1 else value
 
@@ -59,10 +60,10 @@ class Rational(NamedTuple):
 class Curve(NamedTuple):
     """A quantity of a material as code: a rational function per channel, or a single one.
 
-    name, doc  of the function
+    name, doc  name and description of the function
     angle      whether it depends on the cosine
     swept      whether it depends on the roughness
-    parts      the functions of its components; of "dfg" those of A + B and B / (A + B), which both are at most 1
+    parts      the functions of its components; for "dfg" those of A + B and B / (A + B), which are both at most 1
     """
 
     name: str
@@ -73,12 +74,12 @@ class Curve(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Largest error over the grid, of all components; of A and B a bound, the sum of both errors."""
+        """Largest error on the grid, over all components; for A and B a bound, the sum of both errors."""
         return self._all([part.error for part in self.parts])
 
     @property
     def mean(self) -> float:
-        """Mean error over the grid, of the worst component; of A and B a bound."""
+        """Mean error on the grid, of the worst component; for A and B a bound."""
         return self._all([part.mean for part in self.parts])
 
     def _all(self, errors: list[float]) -> float:
@@ -86,7 +87,7 @@ class Curve(NamedTuple):
 
 
 def degrees(order: str | int) -> tuple[int, int]:
-    """The degrees of numerator and denominator: "4" is 4 / 4, "4/2" both, "5/0" a polynomial."""
+    """The degrees of numerator and denominator: "4" means 4 / 4, "4/2" gives both, "5/0" is a polynomial."""
     match = re.fullmatch(r"(\d)(?:/(\d))?", str(order).strip())
     above, below = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not match or not 1 <= above <= LARGEST_ORDER or below > LARGEST_ORDER:
@@ -96,7 +97,7 @@ def degrees(order: str | int) -> tuple[int, int]:
 
 
 class Samples(NamedTuple):
-    """Values on the grid of a fit: name -> (rows, columns, channels), with one row where nothing is swept."""
+    """Values on the grid of a fit: name -> (rows, columns, channels), with one row if nothing is swept."""
 
     roughness: Array
     mu: Array
@@ -105,7 +106,7 @@ class Samples(NamedTuple):
 
 
 def sample(model: BSDF, names: tuple[str, ...] = ("albedo", "average_albedo", "dfg")) -> Samples:
-    """E, its average and, of a microsurface, A and B of the split sum, over roughness and cosine."""
+    """E, its average and, for a microsurface, A and B of the split sum, over roughness and cosine."""
     path = next(ltc.roughness_paths(model), "")
     roughness = np.maximum(np.linspace(0.0, 1.0, ROWS), LEAST_ROUGHNESS) if path else np.zeros(1)
     mu = np.maximum(np.linspace(0.0, 1.0, COLUMNS) ** 2, LEAST_COSINE)
@@ -157,7 +158,7 @@ def fit(samples: Samples, order: str | int, names: tuple[str, ...] = ()) -> list
 
 
 def variables(form: tuple[str, str], roughness: Any, mu: Any) -> tuple[Any, Any]:
-    """x and y of a form."""
+    """The variables x and y of a form."""
     alpha = roughness * roughness
     x = alpha if form[0] == "alpha" else roughness
     if form[1] == "bent":
@@ -188,10 +189,10 @@ def _fitted(roughness: Array, mu: Array, values: Array, above: int, below: int, 
     last, weight, ridge = np.ones(len(values)), np.ones(len(values)), 1e-6
     best, error, mean = np.zeros(len(up) + len(down)), np.inf, np.inf
     system = np.concatenate([tops, -values[:, None] * bottoms[:, 1:]], axis=1)
-    # in columns made orthogonal once, the normal equations of every step are well conditioned
+    # with columns made orthogonal once, the normal equations of every step are well conditioned
     z, r = np.linalg.qr(system)
     back = np.linalg.inv(r + 1e-13 * np.eye(len(r)))
-    damped = back[len(up) :].T @ back[len(up) :]  # holds Q near 1
+    damped = back[len(up) :].T @ back[len(up) :]  # keeps Q near 1
     for _ in range(STEPS):
         scaled = z * (weight / last**2)[:, None]
         matrix = np.einsum("ki,kj->ij", scaled, z) + ridge**2 * damped
@@ -218,7 +219,7 @@ def _powers(degree: int, rows: bool, columns: bool) -> list[tuple[int, int]]:
 def _array(powers: list[tuple[int, int]], numbers: Array) -> Array:
     made = np.zeros([max(p[axis] for p in powers) + 1 for axis in (0, 1)])
     for place, number in zip(powers, numbers, strict=True):
-        made[place] = float(np.float32(number))  # as a shader has them
+        made[place] = float(np.float32(number))  # as in a shader
     return made
 
 

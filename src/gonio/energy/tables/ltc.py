@@ -2,13 +2,13 @@
 
     D(i) = cos+(W i) |det W| / (pi |W i|^3),   W = [[a, 0, b], [0, 1, 0], [c, 0, d]]  in the plane of o and n
 
-W minimizes int |f |cos| / E - D|^p di over the whole sphere, also below the horizon, where f is 0 and D may not be:
-first with p = 3 as in the paper, from there with p = 1.5 and from there with p = 1.1, since integrals over lights miss
-at most the share of light that D puts elsewhere, which is p = 1, while p = 3 fits the peak of a lobe at the cost of its
-tail. Where the horizon cuts a lobe in half, p = 1.5 puts up to an eighth more of the light elsewhere. The integral
-is a sum over fixed points: directions that the material samples, the same mirrored at the horizon, and directions
-spread evenly. The steps are those of Gauss and Newton, damped (Levenberg and Marquardt), for all cosines of a roughness
-at once, from two starts: the fit of the rougher row, and the covariance of the lobe.
+W minimizes int |f |cos| / E - D|^p di over the whole sphere, including directions below the horizon, where f is 0 and D
+may not be. The fit uses p = 3, as in the paper, then p = 1.5 starting from its result, then p = 1.1: integrals over
+lights miss at most the fraction of the light that D misplaces, which is p = 1, whereas p = 3 fits the peak of a lobe at
+the cost of its tail. Where the horizon cuts a lobe in half, p = 1.5 misplaces up to an eighth more of the light. The
+integral is a sum over fixed points: directions that the material samples, the same mirrored at the horizon, and evenly
+spread directions. The steps are those of Gauss and Newton, damped (Levenberg and Marquardt), for all cosines of a
+roughness at once, from two starts: the fit of the rougher row, and the covariance of the lobe.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ LOBE, SPHERE = 768, 384  # points per cell
 FINER = 24  # times as many points for the integrals over polygons
 STEPS = 30
 POWERS = (3.0, 1.5, 1.1)  # of |f - D|, in order: 3, the paper's, converges from afar and fits the peak; 1 fits the tail
-SMALL = 1e-3  # of the lobe's peak: smaller differences do not gain more weight
+SMALL = 1e-3  # of the lobe's peak: smaller differences gain no further weight
 POLYGONS = 1024
 
 
 class Row(NamedTuple):
     """A row of the table: the numbers of W, E in color, and the errors of each cell.
 
-    inverse   (size, 5): a, b, the middle one, c, d
-    norm      (size, channels): E; of a distribution (E, B), so that E = F0 (E - B) + B for Schlick's Fresnel
-    misplaced (size,): half of int |f cos / E - D|, the share of the light that goes elsewhere
+    inverse   (size, 5): a, b, the middle entry, c, d
+    norm      (size, channels): E; for a distribution (E, B), so that E = F0 (E - B) + B for Schlick's Fresnel
+    misplaced (size,): half of int |f cos / E - D|, the fraction of the light that is misplaced
     cubed     (size,): int |f cos - E D|^3, which the paper minimizes
     """
 
@@ -61,11 +61,11 @@ class Row(NamedTuple):
 
 
 class Form(NamedTuple):
-    """How numbers describe W, one row of them per cell, and D by them.
+    """How numbers describe W, with one row of them per cell, and D as a function of them.
 
     density   (numbers, wi) -> D (cells, K)
     slopes    (numbers, wi) -> D, and its derivatives (cells, numbers, K)
-    mirrored  numbers -> whether W mirrors, (cells,)
+    mirrored  numbers -> whether W contains a reflection, (cells,)
     """
 
     density: Callable[[Array, Array], Array]
@@ -74,7 +74,7 @@ class Form(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Directions of integration per cell, their weights and the values there.
+    """Integration directions per cell, their weights and the values there.
 
     wi (cells, K, 3); weight (cells, K); value (cells, K, channels): f |cos theta_i|
     """
@@ -87,10 +87,10 @@ class Points(NamedTuple):
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
     """Tables of an isotropic material over (roughness, sqrt(1 - mu)), nodes at both ends.
 
-    schlick  store E and B in place of E in color, of a material with F = 1
+    schlick  store E and B instead of E in color, for a material with F = 1
     Returns arrays ltc_inverse (..., 4), ltc_norm (..., 2 or 3), ltc_error (..., 1); the manifest states the mean and
     the largest error of the lobe and of integrals over random quadrilaterals. A material without a roughness has one
-    row. Raises InputError if it has a mirror lobe, is estimated by sampling or absorbs everything.
+    row. Raises InputError if the material has a mirror lobe, is estimated by sampling or absorbs everything.
     """
     path = check(model, size)
     roughness = np.linspace(0.0, 1.0, size) if path else np.zeros(1)
@@ -126,11 +126,11 @@ def cosines(size: int) -> Array:
 
 
 def check(model: BSDF, size: int) -> str:
-    """The path of the parameter that the roughness sets, or ""."""
+    """The path of the parameter that the roughness sets; "" if there is none."""
     check_uniform(model)
     kind = type(model).__name__
     if not 2 <= size <= 256:
-        raise InputError(f"linearly transformed cosines of {size} x {size} asked for", "--resolution", "give 2 to 256")
+        raise InputError(f"linearly transformed cosines of {size} x {size} requested", "--resolution", "give 2 to 256")
     path = next(roughness_paths(model), "")
     if model.stochastic or at(model, path, 1.0).delta != "never":
         what = f"{kind} is estimated by random walks" if model.stochastic else f"{kind} has a mirror lobe"
@@ -147,7 +147,7 @@ def roughness_paths(model: BSDF) -> Iterator[str]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material of a roughness; a width is its square."""
+    """The material at a roughness; a width is its square."""
     if not path:
         return model
     value = max(roughness, MIN_ROUGHNESS)
@@ -159,14 +159,14 @@ def at(model: BSDF, path: str, roughness: float) -> BSDF:
 
 
 def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, phi: Array | None = None) -> Points:
-    """Points for the integrals over a lobe and its surroundings, of each cosine, at azimuths phi or 0."""
+    """Points for the integrals over a lobe and its surroundings, for each cosine, at azimuths phi or 0."""
     kind = backend.types("float64")
     bound, cells = model.bind(kind), len(mu)
     wo = direction(mu, np.zeros_like(mu) if phi is None else phi)
     u = np.tile(r_sequence(lobe, 3, 0.5), (cells, 1))
     sampled = bound.sample(kind.vec3(np.repeat(wo, lobe, 0).T), kind.vec3(u.T), "importance")
     near = np.array(sampled.wi, float).T.reshape(cells, lobe, 3)
-    lost = near[..., 2] <= 0.0  # transmitted, or without a value: no direction that f needs
+    lost = near[..., 2] <= 0.0  # transmitted, or without a value: a direction that f does not need
     flat = r_sequence(sphere, 3, 0.5)
     z = 2.0 * flat[:, 0] - 1.0
     even = spherical_array(np.sqrt(1.0 - z**2), z, 2.0 * np.pi * flat[:, 1])
@@ -186,7 +186,7 @@ def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, ph
 
 
 def _norm(model: BSDF, mu: Array, schlick: bool) -> Array:
-    """E in color at each cosine, of the reflected light; or E and B of a distribution, F = 1."""
+    """E in color at each cosine, for the reflected light; or E and B of a distribution, F = 1."""
     surface = model.microsurface
     if schlick and surface is not None:
         x, _ = pair_of(surface.alpha)
@@ -220,7 +220,7 @@ def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
 
 
 def _fit(given: tuple[Array, Array, Array], starts: list[Array], power: float) -> Array:
-    """W of each cell for a power, from the best of its starts, and from the fits of its neighbors where better."""
+    """W of each cell for a power p, from the best of its starts, and from the fits of its neighbors if better."""
     losses = [loss_of(PLANE, start, *given, power) for start in starts]
     chosen = np.argmin(losses, axis=0)
     best, loss = fitted(PLANE, *given, np.array(starts)[chosen, np.arange(len(chosen))], power)
@@ -236,7 +236,7 @@ def _fit(given: tuple[Array, Array, Array], starts: list[Array], power: float) -
 def lobe_errors(
     points: Points, lobe: Array, total: Array, inverse: Array, form: Form | None = None
 ) -> tuple[Array, Array]:
-    """(int |f cos - E D|^3, half of int |f cos / E - D|) of each cell; total (cells, 1) is E."""
+    """(int |f cos - E D|^3, half of int |f cos / E - D|) for each cell; total (cells, 1) is E."""
     difference = np.abs(lobe - total * (form or PLANE).density(inverse, points.wi))
     shares = 0.5 * np.sum(points.weight * difference, axis=1) / total[:, 0]
     return np.sum(points.weight * difference**3, axis=1), shares
@@ -250,7 +250,7 @@ def _first(points: Points, lobe: Array) -> Array:
     x = np.stack([z[:, 2], 0.0 * z[:, 0], -z[:, 0]], axis=1)
     along, up = (np.einsum("ck,ckx,cx->ck", np.ones_like(weight), points.wi, axis) for axis in (x, z))
     squares = [np.sum(weight * part**2, axis=1) for part in (along, points.wi[..., 1], up)]
-    # a cosine lobe has the mean squares 1/4, 1/4, 1/2
+    # a cosine lobe has mean squares of 1/4, 1/4 and 1/2
     wide, aside = (np.sqrt(np.maximum(2.0 * part / squares[2], 1e-12)) for part in squares[:2])
     return np.stack([x[:, 0] / wide, x[:, 2] / wide, 1.0 / aside, z[:, 0], z[:, 2]], axis=1)
 
@@ -298,7 +298,7 @@ PLANE = Form(_density, _slopes, _mirrored)  # a mirror plane through o and n
 
 
 def loss_of(form: Form, inverse: Array, wi: Array, weight: Array, lobe: Array, power: float = 3.0) -> Array:
-    """int |f - D|^power of each cell; infinite where W mirrors."""
+    """int |f - D|^power for each cell; infinite if W contains a reflection."""
     with np.errstate(all="ignore"):
         loss = np.sum(weight * np.abs(lobe - form.density(inverse, wi)) ** power, axis=1)
     return np.where(form.mirrored(inverse) | ~np.isfinite(loss), np.inf, loss)
@@ -307,7 +307,7 @@ def loss_of(form: Form, inverse: Array, wi: Array, weight: Array, lobe: Array, p
 def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array, power: float = 3.0) -> tuple[Array, Array]:
     """(W, loss) of each cell from a start, by damped steps of Newton's method without second derivatives of D.
 
-    power  of |f - D| in the integral; below 2 the steps weight small differences more, to a bound (`SMALL`)
+    power  of |f - D| in the integral; below 2, the steps give small differences more weight, up to a bound (`SMALL`)
     """
     inverse, damping = start.copy(), np.full(len(start), 1e-2)
     loss = loss_of(form, inverse, wi, weight, lobe, power)
@@ -356,7 +356,7 @@ def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse:
 
 
 def random_quads(rng: np.random.Generator, count: int) -> Array:
-    """Corners (count, 4, 3) of rectangles of sides 0.2 to 2, at a distance of 1 above the surface, turned at random."""
+    """Corners (count, 4, 3) of randomly rotated rectangles above the surface, with sides of 0.2 to 2, at distance 1."""
     z, phi = rng.random(count), 2.0 * np.pi * rng.random(count)
     center = spherical_array(np.sqrt(1.0 - z**2), z, phi)
     turn, _ = np.linalg.qr(rng.normal(size=(count, 3, 3)))
@@ -373,7 +373,7 @@ def inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
 
 
 def covered(inverse: Array, wo: Array, corners: Array) -> Array:
-    """The part of the lobe of each W (N, 5), seen along wo (N, 3), that a quadrilateral covers, as in shaders."""
+    """The fraction of the lobe of each W (N, 5) for wo (N, 3) that a quadrilateral covers, computed as in shaders."""
     kind = backend.types("float64")
     numbers: Any = tuple(kind.float(part) for part in (inverse / inverse[:, 2:3])[:, (0, 1, 3, 4)].T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))

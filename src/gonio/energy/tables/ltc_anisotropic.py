@@ -2,10 +2,10 @@
 
     D(i) = cos+(W i) |det W| / (pi |W i|^3)
 
-The surface's axes are planes of symmetry, so azimuths of one quarter suffice. W acts in the frame whose x axis lies
-below o. D is the same for a multiple of W and for W turned about the axis of the cosine: of these matrices the table
-holds the one whose upper left block is symmetric and whose middle number is 1, so that neighbors can be interpolated.
-The fit is that of `ltc`, with nine numbers.
+The surface's axes are planes of symmetry, so azimuths of one quarter turn suffice. W acts in the frame whose x axis
+lies below o. D is the same for a multiple of W and for W rotated about the axis of the cosine; the table holds the
+matrix whose upper left block is symmetric and whose middle entry is 1, so that neighbors can be interpolated. The fit
+is that of `ltc`, with nine numbers.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from .target import describe
 
 SIZE = 16
 AZIMUTHS = 9  # from 0 to pi / 2
-PLACES = 64  # of `polygon_errors`, with 16 quadrilaterals each
+PLACES = 64  # points at which `polygon_errors` tests 16 quadrilaterals each
 
 
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
     """Tables over (roughness, azimuth, sqrt(1 - mu)), nodes at both ends; as `ltc.bake`, with eight numbers of W.
 
-    The roughness is the root of the larger width; the quotient of the widths is the material's.
-    Raises InputError if the axes of x and y are no planes of symmetry, and as `ltc.bake`.
+    The roughness is the root of the larger width; the ratio of the widths is the material's.
+    Raises InputError if the x and y axes are not axes of symmetry, and as `ltc.bake`.
     """
     path = ltc.check(model, size)
     _check_symmetry(model)
@@ -73,7 +73,7 @@ def _errors(values: Array) -> dict[str, float]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material of a roughness: its widths, in their proportion, or its parameter of that name."""
+    """The material at a roughness: its widths, in their proportion, or its parameter of that name."""
     leaf = next((leaf for leaf in tree.leaves(model) if leaf.path == path), None)
     if leaf is None or leaf.parameter.kind != "alpha":
         return ltc.at(model, path, roughness)
@@ -101,7 +101,7 @@ def _check_symmetry(model: BSDF) -> None:
 
 
 def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool) -> tuple[Array, Array, Array, Array]:
-    """W (azimuths, cosines, 9), E, the light elsewhere and the measure of the fit of one roughness."""
+    """W (azimuths, cosines, 9), E, the misplaced light and the cubed error of the fit, for one roughness."""
     shape = len(phi), len(mu)
     across, azimuths = np.tile(mu, len(phi)), np.repeat(phi, len(mu))
     points = ltc.points_of(model, across, phi=azimuths)
@@ -117,7 +117,7 @@ def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool)
         better = ltc.loss_of(MATRIX, start, *parts) < ltc.loss_of(MATRIX, best, *parts)
         best = np.where(better[:, None], start, best)
     best, loss = ltc.fitted(MATRIX, *parts, best)
-    for axis in (0, 1):  # the fits of the neighbors, where they are better
+    for axis in (0, 1):  # the fits of the neighbors, if they are better
         for side in (1, -1):
             other = np.roll(best.reshape(*shape, 9), side, axis).reshape(-1, 9)
             cells = np.flatnonzero(ltc.loss_of(MATRIX, other, *parts) < loss)
@@ -148,7 +148,7 @@ def _in_view(wi: Array, phi: Array) -> Array:
 
 
 def _first(points: Points, lobe: Array) -> Array:
-    """W from the mean and the covariance of a lobe, whose axes lie across the mean."""
+    """W from the mean and the covariance of a lobe, with its axes perpendicular to the mean."""
     weight = points.weight * lobe
     z = np.einsum("ck,ckx->cx", weight, points.wi)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -159,7 +159,7 @@ def _first(points: Points, lobe: Array) -> Array:
     squares = np.einsum("ck,cki,ckj->cij", weight, local, local)
     sizes, axes = np.linalg.eigh(2.0 * squares[:, :2, :2] / squares[:, 2:, 2:])
     over = 1.0 / np.sqrt(np.maximum(sizes, 1e-12))
-    upper = (axes * over[:, None]) @ np.swapaxes(axes, 1, 2) @ frame[:, :2]  # a cosine lobe has the sizes 1
+    upper = (axes * over[:, None]) @ np.swapaxes(axes, 1, 2) @ frame[:, :2]  # a cosine lobe has sizes of 1
     return np.concatenate([upper, frame[:, 2:]], axis=1).reshape(-1, 9)
 
 
@@ -205,7 +205,7 @@ def _gauge(matrix: Array) -> Array:
 
 
 def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
-    """|integral by the interpolated table - by summing f| / E, over random quadrilaterals at random places of it."""
+    """|integral by the interpolated table - by summing f| / E, over random quadrilaterals at random points of it."""
     random = np.random.default_rng(1)
     each = ltc.POLYGONS // PLACES
     corners = ltc.random_quads(random, each * PLACES)
@@ -224,7 +224,7 @@ def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
 
 
 def covered(inverse: Array, roughness: Array, wo: Array, corners: Array) -> Array:
-    """The part of the lobe seen along wo (N, 3) that a quadrilateral (N, 4, 3) covers, by the table, as in shaders."""
+    """The fraction of the lobe for wo (N, 3) that a quadrilateral (N, 4, 3) covers, by the table, as in shaders."""
     kind = backend.types("float64")
     table, outgoing = Table("ltc_inverse", inverse), kind.vec3(wo.T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))

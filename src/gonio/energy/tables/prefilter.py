@@ -3,10 +3,10 @@
     light reflected at o ~ E(o) L_alpha(r),   L_alpha(r) = int L(i) k(r.i) di / int k(r.i) di,   r = o mirrored at n,
     k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe at normal incidence, o = n = r, weighted by i.n.
 
-**The method.** The kernel depends on the angle between r and i only. Between two circles of latitude it is therefore a
-convolution over the azimuth, a product of Fourier series; over the latitudes a plain sum remains. Every texel
-contributes and nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide,
-the map is averaged in blocks first; where it is narrower than a few texels, the map is interpolated.
+**The method.** The kernel depends only on the angle between r and i. Between two circles of latitude it is therefore a
+convolution in azimuth, a product of Fourier series; the latitudes are simply summed. Every texel contributes and
+nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide, the map is first
+averaged in blocks; where it is narrower than a few texels, the map is interpolated.
 
 **Two errors.** The error of the blur (each level compared with a sum over every finely divided texel of the map) is
 invisible. The error of the split sum itself is not: it assumes a circular lobe, cut by the horizon, with uniform
@@ -38,10 +38,10 @@ Environment: TypeAlias = NDArray[np.floating]
 LEVELS = 6
 MAX_LEVELS = 10  # lobes narrower than (1 / 9)^2 would need grids of several thousand rows
 MIN_ROWS, MAX_ROWS = 4, 4096  # rows of the map
-STEPS = 8.0  # rows of the grid per half width of a lobe, and
-MIN_GRID = 128  # in total: the error of the blur is then about 1e-3 at most
+STEPS = 8.0  # rows of the grid per half width of a lobe
+MIN_GRID = 128  # smallest number of rows: the error of the blur is then about 1e-3 at most
 JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
-COSINES = (1.0, 0.7, 0.3)  # n.o at which the split sum is judged
+COSINES = (1.0, 0.7, 0.3)  # n.o at which the error of the split sum is measured
 _LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 SCHEMA = 2
 
@@ -54,11 +54,11 @@ def roughness_of(level: int, levels: int) -> float:
 def prefilter(
     environment: Environment, ndf: str = "ggx", levels: int = LEVELS, location: str = "environment"
 ) -> list[Array]:
-    """The levels of an environment, each half as large as the one before; the first is the map itself.
+    """The levels of an environment, each half as large as the previous one; the first is the map itself.
 
     environment  latitude-longitude radiance, (H, 2 H, channels), row 0 toward +z
     location     the name of the environment in errors
-    Level l is for roughness l / (levels - 1), its texels in the order of the map's.
+    Level l is for roughness l / (levels - 1); its texels are ordered as those of the map.
     Raises InputError for a map of another shape, with negative or non-finite values, or too small for this many levels,
     and for an unknown distribution.
     """
@@ -75,7 +75,7 @@ def bake(
     errors.
 
     masking  for the error of the split sum
-    name     of the environment, for the manifest
+    name     name of the environment in the manifest
     """
     quadrature.known_masking(masking)
     made = prefilter(environment, ndf, levels, name)
@@ -114,7 +114,7 @@ def _checked(environment: Environment, levels: int, location: str) -> Array:
     source = np.asarray(environment, dtype=np.float64)
     if source.ndim != 3 or source.shape[1] != 2 * source.shape[0] or source.size == 0:
         what = f"a picture of shape {source.shape}, expected latitude-longitude: (H, 2 H, channels)"
-        raise InputError(what, location, "give a panorama twice as wide as high, the zenith on top")
+        raise InputError(what, location, "give a panorama twice as wide as high, with the zenith on top")
     bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
     if bad:
         raise InputError(
@@ -140,7 +140,7 @@ def _half_width(alpha: float) -> float:
 
 
 def _kernel(lobe: NDF, alpha: float, z: Array) -> Array:
-    """k(r.i), of any shape."""
+    """k(r.i) for z = r.i of any shape."""
     kind = backend.types("float64")
     width = backend.float_of(alpha, kind)
     cosine = kind.float(np.ascontiguousarray(z.ravel()))
@@ -154,7 +154,7 @@ def _root(x: Scalar) -> Scalar:
 
 
 def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
-    """One level, by convolution over the azimuth and a sum over latitudes."""
+    """One level, by convolution in azimuth and a sum over latitudes."""
     alpha = roughness_of(level, levels) ** 2
     light = _resampled(source, max(STEPS * np.pi / _half_width(alpha), MIN_GRID))
     (rows, columns), channels = light.shape[:2], light.shape[2]
@@ -187,7 +187,7 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
 
 
 def _at_centers(series: NDArray[np.complex128], width: int) -> Array:
-    """A Fourier series over axis 1 at `width` even steps."""
+    """A Fourier series along axis 1 at `width` equidistant points."""
     fold = max(1, -(-2 * series.shape[1] // width))
     return np.fft.irfft(series, fold * width, axis=1)[:, ::fold] * (fold * width)
 
@@ -223,12 +223,12 @@ def _between(values: Array, at: Array, axis: int) -> Array:
 
 
 def _centers(rows: int) -> Array:
-    """Angles from the zenith."""
+    """Angles from the zenith of the centers of the rows."""
     return (np.arange(rows) + 0.5) / rows * np.pi
 
 
 def _bands(rows: int) -> Array:
-    """Solid angle of a row over 2 pi."""
+    """Solid angle of each row divided by 2 pi."""
     edges = np.cos(np.arange(rows + 1) / rows * np.pi)
     return edges[:-1] - edges[1:]
 
@@ -254,7 +254,8 @@ def read(level: Array, directions: Array) -> Array:
 
 def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, float]]:
     """Per level: `max` and `rms` error of the blur at texels; `interpolation`, the largest error between texels and
-    halfway to the previous level; `split sum`, rms. In units of the root mean square of the exact values.
+    halfway to the previous level; `split sum`, the RMS error of the split sum. All are relative to the RMS of the exact
+    values.
 
     Computed by sums over every texel of the map, in eight evenly spread directions and at the level's brightest texel.
     """
@@ -342,20 +343,20 @@ def _above(i: Direction, value: Scalar) -> Scalar:
 
 
 def _frame(n: Array) -> Array:
-    """Two unit vectors across n, and n."""
+    """Two unit vectors perpendicular to n, and n."""
     t = np.cross([0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0], n)
     t /= np.linalg.norm(t)
     return np.stack([t, np.cross(n, t), n])
 
 
 def _mirrored(r: Array, mu: float) -> tuple[Array, Array]:
-    """o and n with mirrored direction r and o.n = mu; in an arbitrary plane through r."""
+    """o and n with mirror direction r and o.n = mu, in an arbitrary plane through r."""
     n = mu * r + np.sqrt(1.0 - mu * mu) * _frame(r)[0]
     return 2.0 * mu * n - r, n
 
 
 def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
-    """Directions of the texels' centers in rows start to stop, (N, 3)."""
+    """Directions of the centers of the texels in rows start to stop, (N, 3)."""
     height, width = level.shape[:2]
     theta, phi = _centers(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
     sine = np.sin(theta)

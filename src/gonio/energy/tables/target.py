@@ -52,7 +52,7 @@ class Target:
 
     @property
     def conducts(self) -> bool:
-        """Whether it is a metal; other targets have an index to sweep."""
+        """Whether it is a metal; other targets have an index that can be swept."""
         return self.model is not None and self.model.microsurface.eta is None
 
     def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:

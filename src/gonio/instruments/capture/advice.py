@@ -13,12 +13,12 @@ from .pixels import Chosen, Scene
 
 NARROW = 5.0  # degrees: a smaller range of difference angles does not determine the Fresnel term
 HIGHLIGHT = 4.0  # degrees of the half vector within which the peak of a highlight lies
-CLIPPED = 0.02  # share of the lit pixels
-VAGUE = 0.25  # relative half width of an interval from which a parameter is reported as uncertain
-SMALL = 2.0  # pixels, the smallest lobe width that is resolved
-FAR = 3.0  # standard deviations from which a calibration error exceeds its stated uncertainty
-ALIKE = 4.0  # pixels that count as one, from which noise alone does not explain the residuals
-WRONG = 0.05  # relative difference of model and pictures
+CLIPPED = 0.02  # fraction of the lit pixels
+VAGUE = 0.25  # relative half width of an interval above which a parameter is reported as uncertain
+SMALL = 2.0  # smallest lobe width in pixels that is resolved
+FAR = 3.0  # standard deviations above which a calibration error exceeds its stated uncertainty
+ALIKE = 4.0  # pixels that count as one, above which noise alone does not explain the residuals
+WRONG = 0.05  # relative difference of model and pictures that is reported
 
 
 def on(scene: Scene, chosen: Chosen, result: Fitted | None) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""The calibration file: camera, ball, lamps and photographs, and how sure each is.
+"""The calibration file: camera, ball, lamps and photographs, and the uncertainty of each.
 
-Everything is in the camera's frame: x to the right of the picture, y downward, z forward; any unit of length, the same
-throughout. Pixels are counted from the picture's upper left corner, whose pixel has its middle at (0.5, 0.5).
+Everything is in the camera's frame: x to the right of the picture, y downward, z forward; lengths are in any unit, the
+same throughout. Pixel coordinates start at the picture's upper left corner; the center of its first pixel is at
+(0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -28,18 +29,18 @@ Light = Positive | tuple[Positive, Positive, Positive]
 
 
 class Camera(Part):
-    """A pinhole with radial distortion."""
+    """A pinhole camera with radial distortion."""
 
     size: tuple[Whole, Whole]
     """[width, height] of a photograph, pixels."""
     focal: Positive
     """Focal length, in the unit of `pixel`."""
     pixel: Positive = 1.0
-    """Distance of two pixels on the sensor; where it is left out, `focal` is in pixels."""
+    """Distance between two pixels on the sensor; if omitted, `focal` is in pixels."""
     principal: Pair | None = None
-    """Where the optical axis meets the picture, pixels; the middle where left out."""
+    """Point where the optical axis meets the picture, pixels; the center if omitted."""
     k1: Number = 0.0
-    """Radial distortion: x' = x (1 + k1 r^2 + k2 r^4) of x, y over z (Brown1971, as OpenCV has it)."""
+    """Radial distortion: x' = x (1 + k1 r^2 + k2 r^4) with x, y divided by z (Brown1971, as in OpenCV)."""
     k2: Number = 0.0
 
     @property
@@ -52,7 +53,7 @@ class Camera(Part):
 
 
 class Ball(Part):
-    """A ball: its place is given, or its outline in the picture, or neither; then the outline is found."""
+    """A ball: its center is given, or its outline in the picture; without either, the outline is detected."""
 
     radius: Positive
     center: Vector | None = None
@@ -64,7 +65,7 @@ class Ball(Part):
         if self.center is not None and self.outline is not None:
             raise invalid("both center and outline are given", "keep one", "outline")
         if self.center is not None and np.linalg.norm(self.center) <= self.radius:
-            raise invalid("the camera stands inside the ball", "is center in the camera's frame?", "center")
+            raise invalid("the camera is inside the ball", "is center in the camera's frame?", "center")
         return self
 
 
@@ -79,31 +80,31 @@ class Flat(Part):
     def _spans_a_plane(self) -> Flat:
         area = np.linalg.norm(np.cross(self.edge0, self.edge1))
         if area <= 1e-9 * np.linalg.norm(self.edge0) * np.linalg.norm(self.edge1):
-            raise invalid("edge0 and edge1 span no plane", "turn one of them", "edge1")
+            raise invalid("edge0 and edge1 span no plane", "rotate one of them", "edge1")
         return self
 
 
 class Reference(Flat):
-    """A flat white target that scatters evenly (Lambert): it tells the lamps' intensities."""
+    """A flat white diffuse (Lambertian) target, from which the intensities of the lamps follow."""
 
     albedo: Light
-    """What it reflects, such as 0.99."""
+    """Its reflectance, such as 0.99."""
 
 
 class Lamp(Part):
-    """A lamp that is small beside its distance."""
+    """A lamp that is small compared with its distance."""
 
     position: Vector | None = None
-    """Where it stands; where left out, it is found in the mirror balls."""
+    """Position of the lamp; if omitted, it is derived from the mirror balls."""
     distance: Positive | None = None
-    """From the middle of the ball; with one mirror ball alone it must be known."""
+    """Distance from the center of the ball; required if there is only one mirror ball."""
     intensity: Light | None = None
     """Radiant intensity, such that a photograph holds f cos theta_i intensity / distance^2 times seconds; a number or
-    [r, g, b]. Where left out, a photograph of the reference tells it."""
+    [r, g, b]. If omitted, it is derived from a photograph of the reference."""
 
 
 class Exposure(Part):
-    """A picture, and how long it was exposed; where `seconds` is left out, the file itself must tell."""
+    """A picture and its exposure time; if `seconds` is omitted, it is read from the file itself."""
 
     file: str = Field(min_length=1)
     seconds: Positive | None = None
@@ -122,7 +123,7 @@ class Shot(Part):
     @model_validator(mode="after")
     def _some_file(self) -> Shot:
         if (self.file is None) == (not self.exposures):
-            raise invalid("file or exposures expected, one of them", 'such as {"file": "a.exr", "seconds": 0.1}')
+            raise invalid("exactly one of file and exposures expected", 'such as {"file": "a.exr", "seconds": 0.1}')
         return self
 
     @property
@@ -131,32 +132,32 @@ class Shot(Part):
 
 
 class Uncertainty(Part):
-    """One standard deviation of what the calibration says; what is left out is taken as exact, an outline that is found
-    as exact as it was found."""
+    """Standard deviations of the calibration. Omitted quantities count as exact; a detected outline has the uncertainty
+    of its detection."""
 
     light: NonNegative = 0.0
-    """Of a lamp's direction, each way, degrees."""
+    """Standard deviation of a lamp's direction along each axis, degrees."""
     intensity: NonNegative = 0.0
-    """Of each lamp's intensity, relative."""
+    """Relative standard deviation of each lamp's intensity."""
     scale: NonNegative = 0.0
-    """Of all intensities together, relative."""
+    """Relative standard deviation of the scale of all intensities together."""
     seconds: NonNegative = 0.0
-    """Of each exposure time, relative: of a setting of the shutter, in all series alike."""
+    """Relative standard deviation of each exposure time: of a shutter setting, equal in all series."""
     center: NonNegative | None = None
-    """Of the ball's middle, each way, pixels."""
+    """Standard deviation of the ball's center along each axis, pixels."""
     radius: NonNegative | None = None
-    """Of the ball's radius in the picture, relative."""
+    """Relative standard deviation of the ball's radius in the picture."""
 
 
 class Calibration(Part):
-    """What stood where when the photographs were taken, and how sure that is."""
+    """The arrangement in which the photographs were taken, and its uncertainty."""
 
     camera: Camera
     response: Literal["linear", "srgb"] | list[Pair] = "linear"
-    """How a file of whole numbers stores light: in proportion, as sRGB, or by a curve of [value, light] pairs from
-    [0, 0] to [1, 1]. Files of floating-point numbers are linear."""
+    """How an integer file stores light: linearly, as sRGB, or by a curve of [value, light] pairs from [0, 0] to [1, 1].
+    Floating-point files are linear."""
     saturation: Annotated[Number, Field(gt=0, le=1)] = 0.99
-    """Value from which on a file of whole numbers is saturated."""
+    """Value at and above which an integer file is saturated."""
     ball: Ball | None = None
     flat: Flat | None = None
     reference: Reference | None = None
@@ -164,7 +165,7 @@ class Calibration(Part):
     """Mirror balls in the pictures."""
     lights: dict[str, Lamp]
     photographs: list[Shot]
-    """In any order; none yet where the first ones are to be planned."""
+    """In any order; empty if the first ones are to be planned."""
     uncertainty: Uncertainty = Uncertainty()
 
     @model_validator(mode="after")
@@ -182,20 +183,20 @@ class Calibration(Part):
         return self
 
     def intensity(self, light: str) -> Floats | None:
-        """Of a lamp, (3,); None where it is not given."""
+        """Intensity of a lamp, (3,); None if it is not given."""
         given = self.lights[light].intensity
         return None if given is None else np.array(rgb(given))
 
 
 def read(path: Path) -> Calibration:
-    """The calibration in a file. Raises InputError for all that is wrong with it."""
+    """The calibration in a file. Raises InputError if anything in it is invalid."""
     if not path.is_file():
-        raise InputError("no calibration file", str(path), f"name one by --calibration, or add {NAME} to the folder")
+        raise InputError("no calibration file", str(path), f"name one with --calibration, or add {NAME} to the folder")
     return made(read_json(path), path)
 
 
 def made(raw: Mapping[str, Json], path: Path) -> Calibration:
-    """The calibration of a file's contents."""
+    """The calibration from the contents of a file."""
     given = json.loads(json.dumps(dict(raw)))
     try:
         return Calibration.model_validate(given)

@@ -21,8 +21,8 @@ from .pixels import Chosen, Pixels, Scene, directions
 from .problem import Faults, Problem, across, inverse_of, middle_of
 
 FEW = 12_000  # pixels for the first steps; the last steps use all
-LEAST_NOISE = 1e-4  # relative: pixels below it count as exact; it avoids a division by 0
-CERTAIN = 20.0  # signal-to-noise ratio from which a pixel is used to estimate the remaining noise
+LEAST_NOISE = 1e-4  # relative noise below which pixels count as exact; it avoids a division by 0
+CERTAIN = 20.0  # signal-to-noise ratio above which a pixel is used to estimate the remaining noise
 MEDIAN_CHI2 = 0.454936  # median of a squared standard normal variable
 
 __all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "middle_of"]
@@ -34,9 +34,9 @@ class Fitted:
 
     fit      its parameters, as returned by `go.fit`
     faults   calibration errors by name: (estimate, standard error), in stated standard deviations
-    noise    mean standard deviation of pixels about the fit, over their mean
+    noise    mean standard deviation of pixels about the fit, divided by their mean
     problem  the solved problem
-    numbers  its solution
+    numbers  solution of the problem
     """
 
     fit: Fit
@@ -77,7 +77,7 @@ def fitted(
     full.reweigh(numbers)
     full.alike = _alike(full, numbers)
     full.reweigh(numbers)
-    # one standard error changes the sum of squares by 1, which is small against its total
+    # one standard error changes the sum of squares by 1, which is little compared with its total
     numbers = solve(full, numbers, steps=6, tolerance=1e-10).numbers
     full.noise = _noise(full, numbers)
     full.reweigh(numbers)
@@ -154,7 +154,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     inverse = inverse_of(hessian + prior)
     # the sandwich estimator (Liang1986) with the priors
     covariance = inverse @ (spread + prior) @ inverse
-    # few tiles per parameter make residuals too small, so pixel noise is the lower bound
+    # with few tiles per parameter, residuals are too small, so pixel noise is the lower bound
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
     undetermined = undetermined_groups(hessian + prior)
     variance[[number for group in undetermined for number in group]] = np.inf

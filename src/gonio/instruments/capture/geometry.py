@@ -1,5 +1,5 @@
 """Geometry of photographs in the camera's frame: rays of pixels, the position of the ball from its outline, lamps from
-highlights in mirror balls, and local directions at the point of a pixel."""
+highlights in mirror balls, and local directions at the point that a pixel shows."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .photographs import Photograph
 Array = backend.Array
 ANGLES = 720  # angles at which the outline is detected
 INSIDE = 2.0  # pixels inside the edge where the brightness of the ball is sampled
-SHARP = 2.5  # pixels within which an outline rises; a shadow's edge takes longer
-MIN_VISIBLE = 0.25  # of the outline that must be detected
-ROUND = 0.6  # of the detected outline that must lie on one circle
-BRIGHT = 0.3  # of the brightest value, upper bound of the background
-SYSTEMATIC = 0.1  # pixels of systematic error of a detected outline: limbs darken toward the edge
+SHARP = 2.5  # pixels within which an outline rises; the edge of a shadow takes longer
+MIN_VISIBLE = 0.25  # fraction of the outline that must be detected
+ROUND = 0.6  # fraction of the detected outline that must lie on one circle
+BRIGHT = 0.3  # upper bound of the background, relative to the brightest value
+SYSTEMATIC = 0.1  # systematic error of a detected outline, pixels: limbs darken toward the edge
 
 
 # ---------------------------------------------------------------------- camera
@@ -45,14 +45,14 @@ def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
     square = radius**2
     if np.any(np.abs(radius * (1.0 + camera.k1 * square + camera.k2 * square**2) - bent) > 1e-9 * (1.0 + bent)):
         what = f"k1 = {camera.k1:g} and k2 = {camera.k2:g} fold the picture over"
-        raise InputError(what, "camera", "a lens bends less than that; are they those of x over z?")
+        raise InputError(what, "camera", "real lenses distort less; do k1 and k2 refer to x / z?")
     ratio = np.where(bent > 0.0, radius / np.where(bent > 0.0, bent, 1.0), 1.0)
     directions = np.stack([across * ratio, down * ratio, np.ones_like(across)], -1)
     return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
 
 def pixels_of(camera: Camera, points: Floats) -> Floats:
-    """Pixel coordinates (N, 2) at which points (N, 3) before the camera are seen."""
+    """Pixel coordinates (N, 2) of points (N, 3) in front of the camera."""
     flat = points[:, :2] / points[:, 2:]
     square = np.sum(flat * flat, axis=1, keepdims=True)
     bent = flat * (1.0 + camera.k1 * square + camera.k2 * square**2)
@@ -67,10 +67,10 @@ class Placed:
     """A ball in the camera's frame.
 
     center   (3,)
-    radius   of the ball
+    radius   radius of the ball
     pixel    length that a pixel spans at its distance
     off      standard deviations of its detected position, pixels, and of its radius, relative
-    given    whether its position was given; otherwise it follows from its outline and radius
+    given    whether its position was given; otherwise it follows from outline and radius
     """
 
     center: Floats
@@ -93,9 +93,9 @@ def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
 
 
 def _cone(directions: Floats) -> Floats:
-    """m of the cone d . m = 1 through unit directions: its axis is m / |m|, and cos of its half angle 1 / |m|.
+    """m of the cone d . m = 1 through unit directions: its axis is m / |m|, and the cosine of its half angle 1 / |m|.
 
-    A ball's outline is such a cone about its middle; in m that is a linear problem.
+    A ball's outline is such a cone about the direction of its center; the fit of m is a linear problem.
     """
     return np.asarray(np.linalg.lstsq(directions, np.ones(len(directions)), rcond=None)[0])
 
@@ -110,16 +110,16 @@ def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid
     """Detect the outline of the ball in all photographs together, since each lamp lights a different part."""
     from scipy import ndimage
 
-    hint = 'the ground must be dark; or give "center" or "outline" of the ball'
+    hint = 'the background must be dark; or give "center" or "outline" of the ball'
     shots = [one for one in photographs if one.shot.sample == "ball"]
     brightness = np.zeros(shots[0].radiance.shape[:2])
     for one in shots:
         gray = np.where(one.saturated, np.inf, one.radiance.mean(axis=-1))
         bright = float(np.percentile(gray[np.isfinite(gray)], 99.0))
         if not bright > 0.0:
-            raise InputError("no ball in it: it is dark", one.name, "was the lamp on?")
+            raise InputError("no ball found: the photograph is dark", one.name, "was the lamp on?")
         if float(np.median(_rim(gray))) > BRIGHT * bright:
-            raise InputError("no ball in it: the ground is as bright as all else", one.name, hint)
+            raise InputError("no ball found: the background is as bright as everything else", one.name, hint)
         brightness = np.maximum(brightness, np.minimum(gray / bright, 1.0))
     for other in avoid:
         brightness[covers(other, camera, margin=1.1)] = 0.0
@@ -129,16 +129,16 @@ def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid
     parts, count = ndimage.label(ndimage.binary_opening(brightness > level, iterations=2))
     names = shots[0].name if len(shots) == 1 else f"{shots[0].name} and {len(shots) - 1} more"
     if count == 0:
-        raise InputError("no ball in it: nothing stands out from the ground", names, hint)
+        raise InputError("no ball found: nothing stands out from the background", names, hint)
     largest = int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
     rows, columns = np.nonzero(parts == largest)
     x, y = float(columns.mean()) + 0.5, float(rows.mean()) + 0.5
     edge = _edge(brightness, x, y, ground, level)
     if len(edge) < MIN_VISIBLE * ANGLES:
-        raise InputError("no ball in it: no sharp outline stands out from the ground", names, hint)
+        raise InputError("no ball found: no sharp outline stands out from the background", names, hint)
     m, residual = _agreed(rays(camera, edge[:, 0], edge[:, 1]), camera)
     if m is None or len(residual) < max(MIN_VISIBLE * ANGLES, ROUND * len(edge)):
-        raise InputError("no ball in it: what stands out is not round", names, hint)
+        raise InputError("no ball found: the shape that stands out is not round", names, hint)
     noise = float(np.sqrt(np.mean(residual**2) / len(residual))) + SYSTEMATIC
     estimate = _of_cone(m, ball, camera)
     return _of_cone(m, ball, camera, (noise, noise * estimate.pixel / estimate.radius))
@@ -177,7 +177,7 @@ def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -
 
 
 def _agreed(directions: Floats, camera: Camera) -> tuple[Floats | None, Floats]:
-    """The cone through most directions within a pixel, and their residuals, pixels (RANSAC, Fischler1981)."""
+    """The cone that contains most directions to within a pixel, and their residuals, pixels (RANSAC, Fischler1981)."""
     rng = np.random.default_rng(7)
     best = np.zeros(len(directions), bool)
     for _ in range(200):
@@ -222,8 +222,8 @@ def grid_rays(camera: Camera) -> Floats:
 def lamp_in_mirrors(
     photograph: Photograph, mirrors: Sequence[Placed], camera: Camera, about: Floats, distance: float | None
 ) -> Floats:
-    """The place of a lamp whose highlights mirror balls show: where the reflected rays meet best, or at a distance from
-    a point. Raises InputError where a mirror shows none, and where one alone is not enough."""
+    """The position of a lamp from its highlights in mirror balls: where the reflected rays meet best, or at a distance
+    from a point. Raises InputError if a mirror shows no highlight, or if a single mirror is not enough."""
     origins, directions = [], []
     for mirror in mirrors:
         x, y = _highlight(photograph, covers(mirror, camera, margin=0.98))
@@ -241,7 +241,7 @@ def lamp_in_mirrors(
             system, wanted = system + across, wanted + across @ origin
         return np.asarray(np.linalg.solve(system, wanted))
     if distance is None:
-        what = f"one mirror ball tells the direction of the light '{photograph.shot.light}' alone"
+        what = f"one mirror ball gives only the direction of the light '{photograph.shot.light}'"
         raise InputError(what, "lights", 'give its "distance", or describe a second mirror ball')
     away = origins[0] - about
     along = float(away @ directions[0])
@@ -257,7 +257,7 @@ def _highlight(photograph: Photograph, where: NDArray[np.bool_]) -> tuple[float,
     clipped = where & np.isnan(gray)
     rest = gray[where & ~np.isnan(gray)]
     if not clipped.any() and (not len(rest) or top <= 4.0 * max(float(np.median(rest)), 0.0) or top <= 0.0):
-        hint = "the mirror ball must show the lamp brighter than all else; is its outline right?"
+        hint = "the mirror ball must show the lamp brighter than everything else; is its outline right?"
         raise InputError("no highlight in the mirror ball", photograph.name, hint)
     weight = np.where(clipped, 1.0, 0.0) if clipped.any() else np.where(where & (gray > 0.5 * top), gray, 0.0)
     rows, columns = np.nonzero(weight)
@@ -277,12 +277,12 @@ class Seen(NamedTuple):
 
 
 def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
-    """What rays see on a ball; those that miss it, its limb. The frame: z the normal, x and y by Duff2017."""
+    """Where rays hit a ball, or its limb if they miss it. The frame: z the normal, x and y as in Duff2017."""
     along = ops.dot(ray, center)
     root = ops.sqr(along) - ops.dot(center, center) + ops.sqr(radius)
     point = ray * (along - ops.safe_sqrt(root))
     normal = (point - center) / radius
-    # the normal faces the camera, so that its z, which is forward, is always negative: a frame without a seam
+    # the normal faces the camera, so that its z, which points forward, is always negative: a frame without a seam
     a = -1.0 / (normal.z - 1.0)
     b = normal.x * normal.y * a
     x = ops.vec3(1.0 - ops.sqr(normal.x) * a, -b, normal.x)
@@ -291,7 +291,7 @@ def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
 
 
 def on_plane(ray: Array, base: Array, frame: tuple[Array, Array, Array], lamp: Array) -> Seen:
-    """What rays see on a plane through a point, with its frame's axes, z the normal."""
+    """Where rays hit a plane through a point, in the frame of its axes, z the normal."""
     x, y, normal = frame
     point = ray * (ops.dot(base, normal) / ops.dot(ray, normal))
     return _local(ray, point, x, y, normal, lamp)

@@ -30,11 +30,11 @@ class Photograph:
     radiance     (H, W, 3); nan where every exposure was saturated
     step         (H, W, 3), standard deviation from quantization, in a series also from photon and read noise
     photon       (H, W, 3), derivative of the square of `step` with respect to the radiance; 0 for unknown noise
-    noise        of the camera, estimated from a series of exposures
-    scale_error  relative, of all radiance, from errors of exposure times
+    noise        noise of the camera, estimated from a series of exposures
+    scale_error  relative error of all radiance, from errors of exposure times
     ratios       measured ratios of exposure times
     seconds      stated exposure times
-    cut          whether noise below 0 was stored as 0, of a known standard deviation
+    cut          whether noise below 0 was stored as 0, with a known standard deviation
     """
 
     name: str
@@ -179,7 +179,7 @@ def _own_seconds(content: bytes) -> float | None:
 
 
 def _exif_seconds(content: bytes) -> float | None:
-    """ExposureTime, tag 0x829A of the EXIF directory, tag 0x8769 of the first one (CIPA DC-008, 4.6)."""
+    """ExposureTime, tag 0x829A of the EXIF directory, which is tag 0x8769 of the first directory (CIPA DC-008, 4.6)."""
     at = content.find(b"Exif\0\0", 0, 1 << 16)
     if at < 0:
         return None

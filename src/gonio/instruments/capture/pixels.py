@@ -21,16 +21,16 @@ from .geometry import Array, Placed, Seen
 from .photographs import Photograph
 
 GRAZING = 80.0  # degrees: beyond, errors of the outline shift the angles too far, and papers exclude them (Ngan2005)
-EDGE = 0.02  # share of a flat sample's edges excluded on all sides
-NEAR = 5.0  # standard deviations above 0 up to which values that are cut off there matter
+EDGE = 0.02  # fraction of a flat sample excluded at each edge
+NEAR = 5.0  # standard deviations above 0 within which the clipping of values at 0 matters
 TILE = 8  # pixels: errors within a tile are correlated
-MIN_PIXELS = 50  # lit pixels of a sample
+MIN_PIXELS = 50  # minimum number of lit pixels of a sample
 CONTRAST = 3.0  # minimum brightness ratio of the lit sample to the background
 GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: two-point Gauss quadrature
 CELLS = (60, 60, 36)  # cells of sqrt(theta_h), theta_d and phi_d
 
 Kind = Literal["ball", "flat"]
-FATES = ("used", "saturated", "shadowed", "grazing")  # of the sample's pixels
+FATES = ("used", "saturated", "shadowed", "grazing")  # categories of the sample's pixels
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Scene:
 
     @cached_property
     def plane(self) -> tuple[Floats, Floats]:
-        """A point of the flat sample, and its axes (3, 3): x along edge0, z the normal that faces the camera."""
+        """A point of the flat sample, and its axes (3, 3): x along edge0, z the normal on the camera's side."""
         assert self.flat is not None, "a photograph shows it"
         return plane_of(self.flat)
 
@@ -100,8 +100,8 @@ class Pixels:
     def expected(self, radiance: Floats) -> tuple[Floats, Floats]:
         """(mean of the stored values (N, 3), its derivative with respect to the radiance) at a given radiance.
 
-        Where noise below 0 is stored as 0, the mean of a normal variable of mean m and standard deviation s that is cut
-        off at 0 is m P(m / s) + s p(m / s), with the normal distribution P and its density p (Tobin1958).
+        Where noise below 0 is stored as 0, the mean of a normal variable of mean m and standard deviation s that is
+        clipped at 0 is m P(m / s) + s p(m / s), with the normal distribution P and its density p (Tobin1958).
         """
         mean, slope = radiance.copy(), np.ones_like(radiance)
         spread = np.sqrt(self.variance(radiance))
@@ -228,8 +228,8 @@ def choose(
 
 
 def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:
-    """Whether a pixel is or may be viewed or lit beyond `grazing` degrees. A relative error s of the outline tilts the
-    normal such that sin theta_o becomes (1 + s) sin theta_o."""
+    """Whether a pixel is, or may be, viewed or lit beyond `grazing` degrees. A relative error s of the outline tilts
+    the normal such that sin theta_o becomes (1 + s) sin theta_o."""
     outline, lamp = slack
     theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
     moved = (1.0 + outline) * np.sin(theta_o)
@@ -289,9 +289,7 @@ def _check_sample(
 ) -> None:
     """Raise InputError if a photograph does not show the lit sample at its position."""
     if int(lit.sum()) < MIN_PIXELS:
-        what = (
-            f"the light '{shot.shot.light}' reaches {int(lit.sum())} pixels of the {kind} at less than grazing angles"
-        )
+        what = f"the light '{shot.shot.light}' reaches {int(lit.sum())} pixels of the {kind} at non-grazing angles"
         raise InputError(what, shot.name, "check the positions of lamp and sample")
     gray = np.where(shot.saturated, np.inf, np.nan_to_num(shot.radiance).mean(axis=-1))
     inside = np.zeros(gray.shape, bool)
@@ -299,7 +297,7 @@ def _check_sample(
     bright = float(np.median(gray[own][lit]))
     ground = float(np.median(gray[~inside])) if kind == "ball" and not inside.all() else 0.0
     if not bright > CONTRAST * max(ground, 0.0):
-        what = f"no {kind} in it: where it should be lit, it is not brighter than the background"
+        what = f"no {kind} found: where it should be lit, it is not brighter than the background"
         raise InputError(what, shot.name, "check that the lamp was on and the background dark")
 
 
@@ -321,7 +319,7 @@ class Gathered:
 
     def confidence(self) -> Floats:
         """Relative standard error of f over (sqrt(theta_h), theta_d); nan in cells without samples, where the table
-        uses the nearest ones."""
+        uses the nearest samples."""
         theta_h, theta_d, _ = half_difference(*self.table.pairs())
         at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
         inverse, spread = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)

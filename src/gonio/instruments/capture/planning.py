@@ -3,8 +3,8 @@
 A photograph adds J^T J to the information on the material, where J holds the derivatives of its pixels from Dr.Jit,
 minus the information needed for the errors of its own lamp. The chosen position minimizes the sum of the squared
 relative errors of the material's parameters. The determinant (D-optimal design) would minimize the volume of the
-confidence region and may improve parameters that are already well known. According to this information, four planned
-positions leave 0.77 of the error of eight random ones (median of 15 materials). Positions are chosen greedily.
+confidence region, and may improve parameters that are already well known. According to this information, four planned
+positions leave 0.77 times the error of eight random ones (median of 15 materials). Positions are chosen greedily.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from .fitting import Faults, Problem, inverse_of, middle_of
 from .pixels import GRAZING, Kind, Pixels, Scene
 
 PLACES = 96  # candidate positions
-ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: closer, the lamp blocks the view; farther, only a crescent is lit
+ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: below, the lamp blocks the view; above, only a crescent is lit
 STEEP = 75.0  # degrees from a flat sample's normal
 SEEN = 1500  # pixels that represent a photograph
-LITTLE = 0.01  # of a parameter's range: lower bound of the size in relative errors
+LITTLE = 0.01  # fraction of a parameter's range: lower bound of the size in relative errors
 NOTHING = 1.0  # prior standard deviation of each parameter of the material
 
 
@@ -34,9 +34,9 @@ NOTHING = 1.0  # prior standard deviation of each parameter of the material
 class Proposal:
     """A photograph to take.
 
-    position  of the lamp, in the camera's frame
-    angle     between lamp and camera as seen from the sample, degrees
-    names     of the material's numbers
+    position  position of the lamp, in the camera's frame
+    angle     angle between lamp and camera at the sample, degrees
+    names     names of the material's numbers
     errors    expected standard errors with this and all earlier photographs, (K,)
     """
 
@@ -61,12 +61,13 @@ class Setting:
     """Sample, camera and lamp of the planned photographs.
 
     scene      camera and sample
-    kind       of the sample
+    kind       kind of the sample
     material   current estimate or guess
     moving     its free parameters
     faults     uncertainties of lamps and ball
-    intensity  (3,), of the lamp
-    noise      relative, of a pixel; alike: by how many pixels one counts; step: standard deviation of quantisation
+    intensity  (3,), intensity of the lamp
+    noise      relative noise of a pixel; alike: number of pixels that count as one; step: standard deviation of
+               quantization
     """
 
     scene: Scene

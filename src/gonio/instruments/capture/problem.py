@@ -41,7 +41,7 @@ class Faults:
     """Uncertainties of the calibration; the corresponding parameters are in units of these standard deviations.
 
     ball       pixels to the right and down, and relative radius
-    scale      relative, of all intensities
+    scale      relative, of all intensities together
     direction  radians, of each lamp, to the right and down as seen from the sample
     intensity  relative, of each lamp
     """
@@ -113,7 +113,7 @@ class Problem:
 
     @cached_property
     def columns(self) -> list[list[int]]:
-        """Groups of material parameters that share one derivative: each by itself, or the three channels of a color."""
+        """Groups of material parameters that share one derivative: a single one, or the three channels of a color."""
         return columns_of(self.material, self.moving)
 
     def of_row(self, lamp: int, channel: int) -> list[int]:
@@ -202,7 +202,7 @@ class Problem:
             center = center + constant(axis * placed.pixel * amount, types) * one
         larger = 1.0 + backend.float_of(sd[2], types) * off[2]
         radius = backend.float_of(placed.radius, types)
-        # an outline that is too large is that of a ball that was taken as too near
+        # an outline that is too large belongs to a ball that is assumed too near
         return (center, radius * larger) if placed.given else (center / larger, radius)
 
     def _lamps(self, turns: list[Array], types: backend.Types) -> Array:
@@ -250,15 +250,15 @@ class Problem:
         return np.asarray(1.0 / (self._spread(part, predicted) * np.sqrt(self.alike)))
 
     def _spread(self, part: Pixels, predicted: Floats) -> Floats:
-        """Standard deviation of pixels, (N, 3). It follows the prediction: measured values that are low by
-        chance would get more weight."""
+        """Standard deviation of pixels, (N, 3). It follows the prediction, since measured values that are low by chance
+        would otherwise get more weight."""
         floor = 1e-6 * float(np.abs(part.value).max())
         # lower bound for pixels that a calibration error moves into the dark
         size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
         return np.asarray(np.sqrt((self.noise * size) ** 2 + part.variance(size) + floor**2))
 
     def relative_spread(self, numbers: Floats) -> float:
-        """Mean standard deviation of pixels over their mean."""
+        """Mean standard deviation of pixels divided by their mean."""
         predicted = [(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
         total = sum(float(np.abs(values).sum()) for _, values in predicted)
         return sum(float(self._spread(part, values).sum()) for part, values in predicted) / max(total, 1e-300)

@@ -42,11 +42,11 @@ def take(
 ) -> Path:
     """Render the photographs of a calibration into a folder, write a calibration file, and return the folder.
 
-    calibration  what a calibration file holds; ball and lamps with their places, no lens distortion
-    material     of the sample
+    calibration  contents of a calibration file; ball and lamps with their positions, no lens distortion
+    material     material of the sample
     noise        relative standard deviation of each value; or a camera's read noise, photons and relative noise
-    bits         8 or 16 writes .png files of whole numbers by the calibration's response (linear or srgb; of 16 bits
-                 linear), and it must name them so; None keeps radiance, in .exr, .hdr or .npz
+    bits         8 or 16 to write integer .png files by the calibration's response (linear or srgb; for 16 bits linear),
+                 which must name them so; None to keep radiance, in .exr, .hdr or .npz
     spp          samples per pixel
     stated       the calibration to write if it differs, to simulate calibration errors
     """

@@ -41,7 +41,7 @@ class Capture:
     counts    pixels of the sample: used, saturated, shadowed, grazing
     fitted    the material fitted to the pixels; None without a model
     warnings  defects of the pictures, and parameters that they do not determine
-    others    the other models that were fitted, by their criterion, best first
+    others    the other fitted models, by their criterion, best first
     """
 
     scene: Scene
@@ -172,10 +172,10 @@ def capture(
     calibration  the calibration file; None: calibration.json in the folder of the photographs
     grazing      degrees; pixels viewed or lit beyond this angle are excluded
     param        path -> value of parameters that stay fixed
-    free         paths of additional parameters to fit that stay fixed by default
+    free         paths of additional parameters to fit that are fixed by default
     progress     called before each step, with its name
-    Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
-    throughout, or that show no sample.
+    Raises InputError, with the file's name, for photographs without exposure data, of another size, completely
+    saturated, or without a visible sample.
     """
     if not 10.0 <= grazing < 90.0:
         raise InputError(f"{grazing:g} degrees given, 10 to less than 90 expected", "grazing")
@@ -219,7 +219,7 @@ def plan(
     calibration  a calibration file with a ball and its position, or a flat sample, and a lamp with its position and
                  intensity
     model        the model to fit, with values close to those of the material
-    places       possible positions of the lamp; None: anywhere at the distance of the calibration's lamps
+    places       possible positions of the lamp; None: anywhere at the distance of the calibration's lamp
     """
     path = Path(os.path.expanduser(calibration))
     stated = calibrations.read(path)
@@ -244,7 +244,7 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
     except (TypeError, ValueError):
         points = np.zeros(0)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InputError("places of the lamp are not (N, 3) numbers", "places", "such as [[0, -300, 200]]")
+        raise InputError("lamp positions are not (N, 3) numbers", "places", "such as [[0, -300, 200]]")
     return points
 
 
@@ -282,7 +282,7 @@ def _calibration(named: str | Path | Sequence[str], calibration: str | Path | No
         for name in sorted(wanted - known):
             what = "the calibration lists neither its exposure nor its light"
             raise InputError(what, str(folder / name), f"add it under photographs in {path}")
-        # references are always read, since lamps may need them for their intensity
+        # references are always read, since the intensities of lamps may depend on them
         selected = [
             shot
             for shot in full.photographs
@@ -301,7 +301,7 @@ def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
     mirrors = []
     for mirror in stated.mirrors:
         if mirror.center is None and mirror.outline is None:
-            raise InputError("a mirror ball needs its center or its outline", "mirrors", "read it off the picture")
+            raise InputError("a mirror ball needs its center or its outline", "mirrors", "measure it in the picture")
         mirrors.append(geometry.placed(mirror, camera, shots))
     ball = None
     if stated.ball is not None and any(shot.shot.sample == "ball" for shot in shots):

@@ -5,18 +5,19 @@ A linear camera stores y_i = L t_i + noise of light L exposed for t_i seconds, w
     Var(y_i) = read + gain L t_i + (relative L t_i)^2 + q_i^2
 
 (EMVA standard 1288, plus a relative part proportional to the signal, such as a flickering lamp; q_i is the known
-quantization error of the file). The unbiased mean of x_i = y_i / t_i with the least variance has the weights
-1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 weighs by the value alone), and its variance is
+quantization error of the file). The unbiased mean of x_i = y_i / t_i with the smallest variance has the weights
+1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 weights by the value alone), and its variance is
 1 / sum(1 / v_i).
 
 v_i depends on L. Evaluated at the exposure's own value, it gives more weight to values that are low by chance, which
-biases the mean by about -gain / t. Evaluated at the merged value it does not: with these weights the merged value is
+biases the mean by about -gain / t. Evaluated at the merged value, it does not: with these weights, the merged value is
 uncorrelated with every difference x_i - x_j (independent of it for Gaussian noise), so weights that depend on it are
 unbiased to first order. So v_i is iterated on the merged value, starting with weights proportional to the seconds,
-which are those of photon noise. For the same reason, the tests for saturation and clipping at 0 ask merged values: an
+which are those of photon noise. For the same reason, the tests for saturation and clipping at 0 use merged values: an
 exposure counts if its mean with the shorter ones is three standard deviations below saturation, and if it is three
-above 0 or the longest that counts. A test of the shorter ones alone would keep the long exposure where they are low by
-chance, and lose it where they are high: 0.5 % of the light of a sensor of 1,000 electrons, and of its exposure times.
+above 0 or the longest that counts. A test of the shorter ones alone would include the long exposure where they are low
+by chance, and exclude it where they are high: an error of 0.5 % of the light for a sensor of 1,000 electrons, and of
+its exposure times.
 
 The difference of two exposures at pixels of similar L has the variance v_i + v_j, independent of the picture. It is
 linear in (read, gain, relative^2), which are fitted over bins of L by non-negative least squares, per channel. The
@@ -38,16 +39,16 @@ from .calibration import Floats
 from .shutter import Ratio, Shutter, estimated
 
 SIGMAS = 3.0  # standard deviations from saturation or 0 within which an exposure is ignored
-UNKNOWN = 0.8  # of saturation, up to which exposures count before their noise is known
+UNKNOWN = 0.8  # fraction of saturation up to which exposures count before their noise is known
 ROUNDS = 4  # iterations of merged value and noise; the fourth changes either by less than a thousandth
 BINS = 48  # bins of light for estimating variances
-MIN_PIXELS = 30  # per bin
-NEIGHBORS = 2  # exposures further apart hardly have pixels in common
-BLACK = 0.003  # share of a bin's pixels at 0 from which clipping affects its variance
+MIN_PIXELS = 30  # minimum number of pixels per bin
+NEIGHBORS = 2  # exposures further apart have hardly any usable pixels in common
+BLACK = 0.003  # fraction of a bin's pixels at 0 above which clipping affects its variance
 MIN_GAIN = 10.0  # gain in chi-square for an additional parameter: the BIC for some hundred bins; also 3 sigma
-NOISELESS = 1e-9  # of the brightest light
-TINY = 1e-120  # a variance of 0, whose inverse can still be squared
-CUT = 4.0  # standard deviations beyond which a difference indicates motion rather than noise
+NOISELESS = 1e-9  # relative to the brightest light
+TINY = 1e-120  # stands for a variance of 0; its inverse can still be squared
+CUT = 4.0  # standard deviations above which a difference indicates motion rather than noise
 
 
 class Exposed(NamedTuple):
@@ -95,10 +96,10 @@ class Merged:
     light     (H, W, 3), signal per second; nan where every exposure is saturated
     spread    (H, W, 3), standard deviation from read noise, photons and quantization
     photon    (H, W, 3), derivative of that variance with respect to the light
-    noise     of the camera; zeros for a single exposure
-    times     estimated over stated exposure times, shortest first
+    noise     noise of the camera; zeros for a single exposure
+    times     estimated divided by stated exposure times, shortest first
     ratios    measured ratios of exposure times
-    shares    share of each exposure in all light, by stated seconds
+    shares    fraction of all light from each exposure, by stated seconds
     shutter   the errors of exposure times that were corrected
     """
 
@@ -135,7 +136,7 @@ def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | Non
         for _ in range(ROUNDS):
             noise = _noise(ordered, times, all_light, below)
             below = _below(ordered, times, light, noise)
-            # what is uncorrelated with every difference contains every exposure
+            # a mean of every exposure, which is uncorrelated with every difference
             all_light = _mean(ordered, times, light, below, noise)
             used = _above(ordered, times, light, below, noise)
             light = _mean(ordered, times, light, used, noise)
@@ -215,7 +216,7 @@ def _mean(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDAr
 def _shares(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> dict[float, float]:
-    """Share of each exposure in the light of all pixels, by its stated seconds."""
+    """Fraction of the light of all pixels from each exposure, by its stated seconds."""
     weights = []
     for one, factor, fine in zip(exposures, times, used, strict=True):
         variance = np.maximum(noise.variance(light, one.seconds * factor, one.step), TINY)
@@ -232,8 +233,8 @@ def _shares(
 def _spread(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> tuple[Floats, Floats]:
-    """(standard deviation of the merged light, derivative of its variance along the light): V = 1 / sum(1 / v_i),
-    dV/dL = V^2 sum(v_i' / v_i^2)."""
+    """(standard deviation of the merged light, derivative of its variance with respect to the light):
+    V = 1 / sum(1 / v_i), dV/dL = V^2 sum(v_i' / v_i^2)."""
     inverse, slope = np.zeros_like(light), np.zeros_like(light)
     for one, factor, fine in zip(exposures, times, used, strict=True):
         seconds = one.seconds * factor
@@ -259,15 +260,15 @@ def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
     told = coefficients.any(axis=1)
     if told.any():  # dark channels get the median noise of the others: the sensor is the same
         coefficients[~told] = np.median(coefficients[told], axis=0)
-    else:  # noise-free, such as renders: any weights are valid, photon-noise weights are used
+    else:  # noise-free, such as renders: any weights are valid; those of photon noise are used
         coefficients[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
     read, gain, relative = coefficients.T
     return Noise(read, gain, relative, known)
 
 
 def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
-    """(read, gain, relative^2), not negative, that fit variances (B,) with relative errors (B,) best. The last is
-    hard to separate from photon noise, so it is 0 unless it reduces chi-square by `MIN_GAIN`."""
+    """Non-negative (read, gain, relative^2) that fit variances (B,) with relative errors (B,) best. The last is hard to
+    separate from photon noise, so it is 0 unless it reduces chi-square by `MIN_GAIN`."""
     if not variance.any():
         return np.zeros(3)
     scale = np.maximum(columns.max(axis=0), 1e-300)
@@ -291,8 +292,8 @@ def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
 def _variances(
     short: Exposed, long: Exposed, factors: Floats, light: Floats, both: NDArray[np.bool_], channel: int
 ) -> tuple[Floats, Floats, Floats]:
-    """(derivatives (B, 3) along read noise, gain and relative variance; variance (B,) of the difference of two
-    exposures; relative error of each (B,)), over bins of light, without quantization noise."""
+    """(derivatives (B, 3) with respect to read noise, gain and relative variance; variance (B,) of the difference of
+    two exposures; relative error of each (B,)), over bins of light, without quantization noise."""
     fine = both[..., channel] & (light[..., channel] > 0.0) if short.clips else both[..., channel]
     level = light[..., channel][fine]
     if len(level) < MIN_PIXELS:
@@ -331,8 +332,8 @@ def _variances(
 def _ratios(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> list[Ratio]:
-    """Ratios of the times of neighboring exposures. Pixels are weighted by their light over the variance of the
-    difference: the least variance, and the light is uncorrelated with that difference."""
+    """Ratios of the times of neighboring exposures. Pixels are weighted by their light divided by the variance of the
+    difference: this gives the smallest variance, and the light is uncorrelated with that difference."""
     ratios: list[Ratio] = []
     if not noise.known:
         return ratios

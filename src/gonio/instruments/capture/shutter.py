@@ -1,12 +1,12 @@
 """Errors of exposure times, from the ratios of exposures in all series of a camera.
 
-A camera exposes for t exp(e) seconds where t is stated. The error e belongs to a setting of the shutter, so that it is
-the same in every series, and is a normal variable of standard deviation s. Pixels of a series measure differences
+A camera exposes for t exp(e) seconds where t is stated. The error e belongs to a setting of the shutter, so it is the
+same in every series, and is a normal variable of standard deviation s. The pixels of a series measure differences
 e_b - e_a of two settings, never their mean. With the matrix A of these differences and their variances V, the errors
-given the pixels have the covariance C = (1 / s^2 + A' V^-1 A)^-1 and the mean C A' V^-1 r (Gauss-Markov). What C
-leaves open of the settings that a picture uses is an error of all its light.
+given the pixels have the covariance C = (1 / s^2 + A' V^-1 A)^-1 and the mean C A' V^-1 r (Gauss-Markov). The
+uncertainty that C leaves in the settings of a picture is a relative error of all its light.
 
-Where the calibration does not state s, it is estimated from the scatter of the n settings, and the 95 % quantile of
+If the calibration does not state s, it is estimated from the scatter of the n settings, and the 95 % quantile of
 Student's t distribution with n - 1 degrees of freedom replaces the normal one: three settings determine s to 50 %.
 """
 
@@ -22,17 +22,17 @@ from ...errors import InputError
 from .calibration import Floats
 
 SIGNIFICANT = 0.0027  # probability of a normal variable beyond three standard deviations
-WRONG = 0.1  # relative error of an exposure time from which it is rejected
-SIGMAS = 4.0  # standard deviations beyond that
+WRONG = 0.1  # relative error of an exposure time above which it is rejected
+SIGMAS = 4.0  # standard deviations by which the error must exceed that
 NORMAL_95 = 1.96
 
 
 class Ratio(NamedTuple):
-    """A measured ratio of two exposure times, each over its stated one.
+    """A measured ratio of two exposure times, each divided by its stated value.
 
     short, long  stated seconds
     log          e_long - e_short
-    variance     of `log`
+    variance     variance of `log`
     file         name of the file of the long exposure
     """
 
@@ -54,11 +54,11 @@ class Shutter(NamedTuple):
     covariance: Floats
 
     def factor(self, seconds: float) -> float:
-        """True over stated exposure time."""
+        """True exposure time divided by the stated one."""
         return float(np.exp(self.errors.get(seconds, 0.0)))
 
     def scale_error(self, shares: Mapping[float, float]) -> float:
-        """Relative standard error of light to which exposures contribute these shares, by stated seconds."""
+        """Relative standard error of light to which exposures contribute these fractions, by stated seconds."""
         weights = np.array([shares.get(seconds, 0.0) for seconds in self.errors])
         return float(np.sqrt(max(weights @ self.covariance @ weights, 0.0)))
 
@@ -77,13 +77,13 @@ def estimated(ratios: Sequence[Ratio], seconds: Sequence[float], stated: float) 
         row[settings.index(ratio.short)], row[settings.index(ratio.long)] = -1.0, 1.0
     weighted = differences.T / np.array([max(ratio.variance, 1e-300) for ratio in ratios])
     information, gradient = weighted @ differences, weighted @ np.array([ratio.log for ratio in ratios])
-    errors = np.linalg.pinv(information, rcond=1e-12, hermitian=True) @ gradient  # of mean 0 in each connected group
+    errors = np.linalg.pinv(information, rcond=1e-12, hermitian=True) @ gradient  # with mean 0 in each connected group
     if len(ratios):
         _check(ratios, settings, errors, information)
     spread, inflation = stated, 1.0
     if stated <= 0.0:
         degrees = int(np.linalg.matrix_rank(differences)) if len(ratios) else 0
-        told = float(gradient @ errors)  # chi-square of all errors being 0
+        told = float(gradient @ errors)  # chi-square of the hypothesis that all errors are 0
         if not degrees or special.chdtrc(degrees, told) > SIGNIFICANT:
             return Shutter(dict.fromkeys(settings, 0.0), np.zeros((count, count)))
         # noise of the ratios adds to the scatter of the settings

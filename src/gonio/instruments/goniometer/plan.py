@@ -25,7 +25,7 @@ MAX_CELLS = 1 << 24
 class Plan:
     """A file format and the directions at which it stores values.
 
-    file  the format; .gonio if nothing is written
+    file  the format; .gonio if no file is written
     kind  kind of the table
     """
 
@@ -46,7 +46,7 @@ class Plan:
         self._grid = grid
         if grid is not None and (own not in ("any", "samples") or self.kind not in ("angles", "samples")):
             hint = "omit --theta-i, --theta-r and --phi, or use .gonio, .astm or .brdf"
-            raise InputError(f"a {self.kind} table has directions of its own", where, hint)
+            raise InputError(f"a {self.kind} table has its own directions", where, hint)
 
     def table(self, source: Measurement) -> Measurement:
         """A table of the values of `source.rgb` at the planned directions."""
@@ -124,8 +124,8 @@ def grid_of(
 def without(table: Measurement, blocked: float) -> tuple[Measurement, float, bool]:
     """Remove the cells whose two directions are closer than `blocked` [rad].
 
-    Returns the table, the share of removed cells, and whether removal is possible: cells of MERL tables can be invalid
-    and samples can be missing, but other tables have a value everywhere.
+    Returns the table, the fraction of removed cells, and whether removal is possible: cells of MERL tables can be
+    invalid and samples can be missing, but other tables have a value everywhere.
     """
     if blocked <= 0.0:
         return table, 0.0, True

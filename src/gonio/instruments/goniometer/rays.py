@@ -19,8 +19,8 @@ Kernel: TypeAlias = Any  # a value inside a kernel
 
 MAX_BOUNCES = 256
 MAX_STEPS = 4096  # bounces plus crossings of a periodic boundary
-OFFSET = 1e-6  # of the period's extent: offset of a ray's origin from its facet, a few float32 roundings
-UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # a ray's state: DARK is absorbed, LOST below the surface by rounding
+OFFSET = 1e-6  # distance of a ray's origin from its facet, relative to the period's extent: a few float32 ulps
+UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # states of a ray; DARK: absorbed, LOST: below the surface due to rounding
 LANES = 1 << 21  # rays per launch, to bound memory
 
 
@@ -82,7 +82,7 @@ class Box(NamedTuple):
 
 
 class State(NamedTuple):
-    """A ray on its way: position, direction, throughput, facets hit, steps taken, one of the states above."""
+    """A ray in flight: position, direction, throughput, facets hit, steps taken, one of the states above."""
 
     place: Kernel
     along: Kernel
@@ -99,7 +99,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     facet    material of the facets, bound to the variant's types
     cosines  cosines of the angles of incidence; azimuths and positions are uniformly distributed
     each     rays per angle; all rays are numbered angle by angle
-    first    number of the first of `count` rays
+    first    index of the first of `count` rays
     """
     mi = engine.load()
     number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)
@@ -129,7 +129,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
 
 
 def _step(scene: Scene, facet: BSDF, box: Box, now: State) -> State:
-    """The ray at the next facet, on the opposite side of the period, or above the top."""
+    """Advance a ray to the next facet, to the opposite side of the period, or above the top."""
     mi = engine.load()
     place, along, weight, bounces, steps, state, rng = now
     # before a facet, a ray may reach a boundary of the period or the top
@@ -164,7 +164,8 @@ def _step(scene: Scene, facet: BSDF, box: Box, now: State) -> State:
 
 
 def _positions(number: Kernel, each: int, rng: Kernel) -> tuple[Kernel, Kernel]:
-    """Positions in the unit square along a Z-order curve: neighboring rays hit the same facets, 3 times as fast."""
+    """Positions in the unit square along a Z-order curve: neighboring rays hit the same facets, which is 3 times as
+    fast."""
     mi = engine.load()
     along_curve = mi.Float64(number % dr.opaque(mi.UInt32, each)) + mi.Float64(rng.next_float32())
     index = mi.UInt32(dr.minimum(along_curve * dr.opaque(mi.Float64, 2.0**32 / each), 2.0**32 - 1.0))
@@ -185,7 +186,7 @@ def _wrapped(place: Kernel, along: Kernel, is_x: Kernel, half_x: Kernel, half_y:
 
 
 def _every_other(bits: Kernel) -> Kernel:
-    """Bits 0, 2, 4, ... as a number of 16 bits: one coordinate of a point on the Z-order curve."""
+    """Bits 0, 2, 4, ... as a 16-bit number: one coordinate of a point on the Z-order curve."""
     for shift, mask in ((0, 0x55555555), (1, 0x33333333), (2, 0x0F0F0F0F), (4, 0x00FF00FF), (8, 0x0000FFFF)):
         bits = (bits | (bits >> shift)) & mask
     return bits

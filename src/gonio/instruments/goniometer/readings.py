@@ -1,8 +1,8 @@
 """Detector readings of a rough surface, from rays: one map of outgoing light per angle of incidence.
 
-A map is a grid over the equal-area disk, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), with the light above x. The
+A map is a grid on the equal-area disk, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), with the light above x. The
 surface rotates under the light, so y and -y are equivalent and only half of the disk is stored. The opening of the
-detector is a cone; in the maps it consists of the squares whose centers it contains, interpolated between the four
+detector is a cone; in the maps, it consists of the squares whose centers it contains, interpolated between the four
 centers around its axis. The collected light is divided by the projected solid angle of the same squares above the
 horizon, so f is an average over them.
 """
@@ -27,8 +27,8 @@ from .specimen import GROUPS, Floats, Specimen, half_angle
 SQUARES = 2.5  # squares of the map per half angle of the detector
 SMALLEST = 0.25  # degrees, the smallest half angle of a detector
 MAX_LIGHTS = 64  # angles of incidence measured individually; more are interpolated linearly from a grid
-STEEPEST = 89.0  # degrees of incidence; values beyond are those at this angle
-PARTS = 8  # subdivisions per side of a square to integrate its part above the horizon
+STEEPEST = 89.0  # degrees of incidence; beyond, values are those at this angle
+PARTS = 8  # subdivisions per side of a square, to integrate its part above the horizon
 MAX_RAYS = 1 << 24  # rays per patch and angle that a float32 sum can hold
 MAX_BYTES = 4 << 30  # memory limit of the maps
 
@@ -54,15 +54,15 @@ class Rough(Specimen):
     """A surface of facets, measured with rays. The attributes are set by `prepare`.
 
     lights  angles of incidence [rad], (N,)
-    first   share of the light that leaves after one facet, (N, 3)
-    later   share of the light that leaves after two facets or more, (N, 3)
-    lost    share of the rays lost to rounding, (N,)
+    first   fraction of the light that leaves after one facet, (N, 3)
+    later   fraction of the light that leaves after two facets or more, (N, 3)
+    lost    fraction of the rays lost to rounding, (N,)
     """
 
     def __init__(
         self, surface: Surface, facet: BSDF, solid_angle: float, tracing: Tracing, facet_name: str = ""
     ) -> None:
-        """solid_angle: of the detector, sr; facet_name: of the facets' material in the title."""
+        """solid_angle: that of the detector, sr; facet_name: name of the facets' material in the title."""
         check_facet(facet)
         self.surface, self.facet, self.seed, self.device = surface, facet, tracing.seed, tracing.device
         self.half_angle = half_angle(solid_angle)

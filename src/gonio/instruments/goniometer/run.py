@@ -32,12 +32,12 @@ Floats = NDArray[np.float64]
 DETECTOR = 0.006  # sr, a cone with a half angle of 2.5 degrees: the default for surfaces
 MAX_BLOCKED = 60.0  # degrees
 EXCHANGED = 1 << 12  # pairs of directions at which reciprocity is tested
-SAME = 1e-6  # relative change by the exchange of both directions that roundings explain
+SAME = 1e-6  # relative change by swapping the two directions that rounding errors explain
 
 
 @dataclass(frozen=True)
 class Detector:
-    """What a detector reads, by the arguments of `measure`.
+    """Properties of a detector, from the arguments of `measure`.
 
     solid_angle  its opening, sr; None for the default of the specimen
     noise        relative standard deviation of a reading
@@ -60,7 +60,7 @@ class Detector:
 class Readout:
     """Result of a measurement.
 
-    f is the light that arrives in the cone of the detector, over the projected solid angle of the cone above the
+    f is the light that arrives in the cone of the detector divided by the projected solid angle of the cone above the
     horizon. If a format has few angles of incidence, each is measured; otherwise a grid with the spacing of the
     detector's half angle, up to 89 degrees, is measured and interpolated linearly. The sample rotates, so the result is
     isotropic.
@@ -70,12 +70,12 @@ class Readout:
     path       the file; None if none was written
     format     format of the file
     cells      number of values in the table
-    blocked    share of the cells that could not be measured
+    blocked    fraction of the cells that could not be measured
     error      median relative standard error; None if values are exact
     incidence  angles of incidence of the rays, degrees; empty for a material, as are the next three
-    first      share of the light that leaves after one facet, luminance
-    later      share of the light that leaves after two facets or more, luminance
-    lost       share of the rays lost to rounding
+    first      fraction of the light that leaves after one facet, luminance
+    later      fraction of the light that leaves after two facets or more, luminance
+    lost       fraction of the rays lost to rounding
     rays       number of rays
     seconds    duration of the measurement
     notes      remarks
@@ -113,14 +113,14 @@ class _Pass(Measurement):
         part: int | None = None,
         known: dict[int, Floats] | None = None,
     ) -> None:
-        """known: noise-free f by number of the query, for queries whose results are the same in all parts."""
+        """known: noise-free f by index of the query, for queries whose results are the same in all parts."""
         super().__init__(specimen.title, specimen.about)
         self._specimen, self._detector, self._seed = specimen, detector, seed
         self._part, self._known = part, {} if known is None else known
         self._asked = 0
 
     def part(self, part: int) -> _Pass:
-        """The same queries, to one part of the measurement."""
+        """The same queries, for one part of the measurement."""
         return _Pass(self._specimen, self._detector, self._seed, part, self._known)
 
     def first(self) -> _Pass:
@@ -185,13 +185,13 @@ def measure(
         go.measure(surface="gaussian:alpha=0.3", facet="mirror", output="rough.gonio")
 
     material     the material to evaluate, as `go.material` takes it; None to measure a surface
-    output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
+    output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None for no file
     surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
-    facet        material of the facets, as text or object: "mirror", "lambert:albedo=0.8", "conductor:Au"; given as
+    facet        material of the facets, as text or object: "mirror", "lambert:albedo=0.8", "conductor:Au"; if given as
                  text, facets are smooth (alpha = 0) unless it sets alpha
     table        in .gonio files: angles, half-difference, adaptive, specular, samples
     theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  of the detector, sr, over which values are averaged; None: 0.006 for surfaces, a point for materials
+    solid_angle  solid angle of the detector, sr, over which f is averaged; None: 0.006 for surfaces, 0 for materials
     noise        relative standard deviation of a reading
     blocked      degrees about the lamp where the detector cannot be placed. There, cells of MERL files are invalid and
                  samples are omitted; other tables hold the value at the rim
@@ -261,7 +261,7 @@ def _model(material: MaterialLike | None, detector: Detector) -> Model:
 
 
 def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
-    """A note on a material that is not reciprocal, in a table of one value for both orders of a pair of directions."""
+    """A note if a material is not reciprocal, but its table has one value for both orders of a pair of directions."""
     if not (measured.reciprocal and isinstance(specimen, Model)):
         return []
     change = asymmetry(_Pass(Model(specimen.material, None), Detector(None, 0.0, 0.0, "all"), 0), EXCHANGED)
@@ -274,7 +274,7 @@ def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
 
 
 def _written(measured: Measurement, plan: Plan, target: Path) -> list[str]:
-    """Write the table; notes on what its format cannot store."""
+    """Write the table; returns notes on what its format cannot store."""
     files.write_whole(target, plan.file.write(measured))
     if "error" in measured.beside and plan.file.writes != "any":
         return [f"{plan.file.name} files have no place for standard errors; .gonio files store them"]
@@ -313,7 +313,7 @@ def _readout(
 
 
 def _filled(plan: Plan, specimen: Specimen, detector: Detector, seed: int) -> tuple[Measurement, float, list[str]]:
-    """The table with its standard errors and first-bounce part, the share of blocked cells, and notes."""
+    """The table with its standard errors and first-bounce part, the fraction of blocked cells, and notes."""
     asked = _Pass(specimen, detector, seed)
     table = plan.table(asked)
     values = vars(table)["values"]
@@ -366,6 +366,6 @@ def facet_of(text: str) -> BSDF:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """("gaussian", "alpha=0.3") of "gaussian:alpha=0.3" and of "gaussian(alpha=0.3)"."""
+    """("gaussian", "alpha=0.3") from "gaussian:alpha=0.3" or from "gaussian(alpha=0.3)"."""
     match = re.fullmatch(r"([\w-]+)\s*(?::(.*)|\((.*)\))?", text.strip(), re.DOTALL)
     return (text.strip(), "") if match is None else (match[1], match[2] or match[3] or "")

@@ -22,7 +22,7 @@ class Specimen:
     """A scatterer on the goniometer.
 
     title  title for the file
-    about  settings of the measurement for the file
+    about  settings of the measurement, for the file
     exact  whether readings have no statistical error and no separate bounces
     """
 
@@ -70,7 +70,7 @@ class Model(Specimen):
 
 
 def half_angle(solid_angle: float) -> float:
-    """Half angle of a cone of a solid angle [sr], rad."""
+    """Half angle of a cone with a given solid angle [sr], rad."""
     return float(np.arccos(1.0 - solid_angle / (2.0 * np.pi)))
 
 

@@ -23,9 +23,9 @@ T = TypeVar("T")
 class Patch:
     """One period of a surface, as triangles that face upward.
 
-    vertices  (N, 3); the period spans -size / 2 to size / 2, and geometry that crosses a boundary exists on both sides
+    vertices  (N, 3); the period spans -size / 2 to size / 2; geometry that crosses a boundary exists on both sides
     faces     (M, 3), counterclockwise as seen from above
-    size      (x, y) of the period
+    size      extent of the period, (x, y)
     top       upper bound of the heights
     """
 
@@ -81,7 +81,7 @@ Surface.family = Family(
 
 
 def parameter(default: T, doc: str, low: float, high: float, unit: str = "") -> T:
-    """Declare a numeric parameter of a surface, an integer if the default is one; the value None stays None."""
+    """Declare a numeric parameter of a surface, an integer if the default is one; a value of None is preserved."""
     about = {"doc": doc, "low": low, "high": high, "unit": unit, "whole": isinstance(default, int)}
     declared: T = dataclasses.field(default=default, metadata=about)
     return declared
@@ -122,8 +122,8 @@ def named(text: str, settings: dict[str, str]) -> Surface:
 
 
 def of_heights(heights: Floats, spacing: float = 1.0) -> Patch:
-    """The periodic surface through heights (y, x) on a square grid, with one more square on each side. Each square has
-    two triangles; the diagonals alternate between neighboring squares, so no direction is preferred."""
+    """The periodic surface through heights (y, x) on a square grid, with one additional square on each side. Each
+    square has two triangles; the diagonals alternate between neighboring squares, so no direction is preferred."""
     rows, columns = heights.shape
     y, x = np.arange(-1, rows + 2), np.arange(-1, columns + 2)
     z = heights[np.ix_(y % rows, x % columns)]

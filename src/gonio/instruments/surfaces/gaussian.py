@@ -15,8 +15,8 @@ class Gaussian(Surface):
     """Gaussian heights, correlated by exp(-(d / length)^2): Beckmann's distribution of slopes.
 
     The slope of a triangle is a difference of heights and therefore Gaussian on any grid. The heights are scaled to a
-    mean square slope of alpha^2 / 2 along each axis, so alpha is that of Beckmann (Walter2007). The correlation only
-    affects masking: Smith's G assumes independent heights and slopes. The periodic heights are white noise filtered by
+    mean square slope of alpha^2 / 2 along each axis, so alpha is that of Beckmann (Walter2007). The correlation affects
+    only masking: Smith's G assumes independent heights and slopes. The periodic heights are white noise filtered by
     FFT.
     """
 

@@ -13,14 +13,14 @@ from ...pictures import images
 from .base import Floats, Patch, Surface, of_heights, parameter
 
 MIN_PIXELS, MAX_PIXELS = 4, 1024  # pixels along a side
-SEAM = 2.0  # a map counts as periodic if it jumps from its last row to its first by at most this many rms steps
+SEAM = 2.0  # a map counts as periodic if the step from its last row to its first is at most this many RMS steps
 
 
 @dataclass(frozen=True)
 class Heightfield(Surface):
     """A map of heights, one value per pixel (.exr, .hdr, .npz): a measured surface, or one that you made.
 
-    A map that is not periodic, since its last row or column does not join its first, is extended by its mirror image.
+    A map that is not periodic, in that its last row or column does not join its first, is extended by its mirror image.
     """
 
     name: ClassVar[str] = "heightfield"
@@ -52,12 +52,12 @@ def read(file: str) -> Floats:
     if bad:
         raise InputError(f"{bad} of {rows * columns} heights are not finite", file, "fill the gaps in the map")
     if not np.array_equal(pixels[..., :1].repeat(3, axis=2), pixels):
-        raise InputError("three channels that differ, one height per pixel expected", file, "keep one channel only")
+        raise InputError("the three channels differ, one height per pixel expected", file, "keep one channel only")
     return pixels[..., 0]
 
 
 def _jump(heights: Floats, axis: int) -> float:
-    """Ratio of the rms step from the last row to the first to the rms step between adjacent rows."""
+    """Ratio of the RMS step from the last row to the first to the RMS step between adjacent rows."""
     usual = float(np.sqrt(np.mean(np.square(np.diff(heights, axis=axis)))))
     seam = float(np.sqrt(np.mean(np.square(np.take(heights, 0, axis) - np.take(heights, -1, axis)))))
     return seam / usual if usual > 0.0 else float(seam > 0.0) * 2.0 * SEAM

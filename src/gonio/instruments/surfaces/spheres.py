@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from ...errors import InputError
 from .base import Floats, Patch, Surface, parameter
 
-SIDE = 16.0  # of the period, in radii
-SPLITS = 4  # subdivisions of an icosahedron, each splits a facet into four
+SIDE = 16.0  # side length of the period, in radii
+SPLITS = 4  # subdivisions of an icosahedron, each of which splits a facet into four
 TRIES = 200_000
 
 
@@ -23,7 +23,7 @@ TRIES = 200_000
 class Spheres(Surface):
     """Hemispheres of one size, scattered over a plane without touching: beads half sunk into their binder.
 
-    Each ball is a subdivided icosahedron with a random rotation, so that all of them together have every normal.
+    Each ball is a subdivided icosahedron with a random rotation, so that together they have every normal.
     """
 
     name: ClassVar[str] = "spheres"
@@ -66,12 +66,12 @@ _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0,
 
 @functools.cache
 def _ball() -> tuple[Floats, NDArray[np.int64]]:
-    """A unit sphere's vertices and triangles; the part below the plane stays hidden."""
+    """Vertices and triangles of a unit sphere; the part below the plane stays hidden."""
     hull = ConvexHull(_icosahedron())
     points, faces = hull.points, hull.simplices
     for _ in range(SPLITS):
         corners = points[faces]
-        middles = corners + np.roll(corners, -1, axis=1)  # of a b, b c, c a
+        middles = corners + np.roll(corners, -1, axis=1)  # midpoints of a b, b c, c a
         middles /= np.linalg.norm(middles, axis=-1, keepdims=True)
         (a, b, c), (ab, bc, ca) = corners.swapaxes(0, 1), middles.swapaxes(0, 1)
         parts = [np.stack(part, 1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]

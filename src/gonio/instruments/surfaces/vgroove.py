@@ -17,9 +17,9 @@ STEEPEST = np.radians(89.0)
 class VGroove(Surface):
     """Long symmetric V-grooves whose upper edges lie in one plane (Torrance1967, OrenNayar1994).
 
-    Both sides of a groove slope by the same angle theta_a. Grooves of every slope take up the share of the surface that
-    Oren and Nayar's slope-area distribution gives them, exp(-theta_a^2 / (2 sigma^2)) sin theta_a; with `slope` all
-    have that slope. The sample rotates during the measurement, so grooves run in all directions.
+    The two sides of a groove slope by the same angle theta_a. Grooves of each slope take up the fraction of the surface
+    given by Oren and Nayar's slope-area distribution, exp(-theta_a^2 / (2 sigma^2)) sin theta_a; with `slope`, all have
+    that slope. The sample rotates during the measurement, so grooves run in all directions.
     """
 
     name: ClassVar[str] = "vgroove"
@@ -41,7 +41,7 @@ class VGroove(Surface):
         return Patch(vertices, faces, (float(GROOVES), float(GROOVES)), 0.0)
 
     def slopes(self, count: int) -> Floats:
-        """Slope angles that divide the distribution into equal shares."""
+        """Slope angles that divide the distribution into equal fractions."""
         theta = np.linspace(0.0, STEEPEST, 1 << 14)
         density = np.exp(-0.5 * np.square(theta / max(self.sigma, 1e-9))) * np.sin(theta)
         total = np.cumsum(density)

@@ -1,1 +1,1 @@
-"""Combinations of materials: mix, sum, two-sided, normal-mapped and partly transparent ones."""
+"""Combinations of materials: mixtures, sums, and two-sided, normal-mapped or partly transparent materials."""

@@ -16,11 +16,11 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, safe_div, vec3, wher
 
 
 class Mix(BSDF):
-    """(1 - weight) a + weight b: the average of two materials' values, as for a surface finely patched with both."""
+    """(1 - weight) a + weight b: the weighted average of two materials, as for a fine patchwork of the two."""
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
-    weight: Number = number(default=0.5, doc="share of b", low=0.0, high=1.0)
+    weight: Number = number(default=0.5, doc="fraction of b", low=0.0, high=1.0)
 
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"weight": 0.0}, equals=lambda one: one.a),
@@ -39,7 +39,7 @@ class Mix(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects a material and is rescaled for it; a density sample is weighted against both."""
+        """u1 selects a material and is rescaled; unless the sample is from a delta lobe, its pdf is the mixture's."""
         w = self.weight
         pick_b = u.x < w
         u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
@@ -56,12 +56,12 @@ class Mix(BSDF):
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The polarized parts of both materials, each times its weight."""
+        """The polarized parts of the two materials, each times its weight."""
         a, b = self.a.polarized(wo, wi, delta, mode), self.b.polarized(wo, wi, delta, mode)
         return (*(part.times(1.0 - self.weight) for part in a), *(part.times(self.weight) for part in b))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The average of both tints, by weight."""
+        """The weighted average of the two tints."""
         return self.a.tint(wo) * (1.0 - self.weight) + self.b.tint(wo) * self.weight
 
     @property
@@ -78,7 +78,7 @@ class Mix(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The average of both factors, by weight."""
+        """The weighted average of the two ambient reflectances."""
         a, b = self.a.ambient, self.b.ambient
         if a is None:
             return None if b is None else b * self.weight
@@ -87,10 +87,10 @@ class Mix(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The average of both albedos, by weight."""
+        """The weighted average of the two albedos."""
         a, b = inner(self.a, mu, phi), inner(self.b, mu, phi)
         weight = float(self.weight)  # type: ignore[arg-type]
         return None if a is None or b is None else a * (1.0 - weight) + b * weight
 
 
-ALMOST_ONE = 0.99999994  # the largest float32 under 1
+ALMOST_ONE = 0.99999994  # the largest float32 below 1

@@ -1,4 +1,4 @@
-"""Surface details too small for the geometry, as tilted normals."""
+"""Surface detail too fine for the geometry, represented by tilted normals."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
 
-STEEPEST = 20.0  # maximum tangent of a map's tilt, 87 degrees
-MIN_COSINE = 0.01  # minimum cosine to the tilted normal for a visible surface, unless that to the surface's is smaller
+STEEPEST = 20.0  # maximum slope of a map, the tangent of 87 degrees
+MIN_COSINE = 0.01  # minimum cosine of a view to the bent normal, unless that to the surface normal is smaller
 
 
 class _Frame(NamedTuple):
@@ -26,38 +26,38 @@ class _Frame(NamedTuple):
     n: Direction
 
     def local(self, w: Direction) -> Direction:
-        """A direction in the base's frame."""
+        """Transform w from the surface's frame to this frame."""
         return vec3(dot(w, self.x), dot(w, self.y), dot(w, self.n))
 
     def back(self, w: Direction) -> Direction:
-        """A direction of the base's frame in the surface's."""
+        """Transform w from this frame to the surface's frame."""
         return self.x * w.x + self.y * w.y + self.n * w.z
 
 
 class NormalMap(BSDF):
-    """A base with a tilted normal: n' = (lean_x, lean_y, 1), normalized. In scenes an image of normals, `"normalmap"`.
+    """A base with a tilted normal, n' = (lean_x, lean_y, 1), normalized; in scenes an image of normals, `"normalmap"`.
 
-    f cos theta_i = b(o, i) + b(o, -i), b the base's value in the tilted frame, -i the direction below i
+    f cos theta_i = b(o, i) + b(o, i*), with b the base's value in the tilted frame, i* the mirror image of i below
 
-    Tilted normals turn black at grazing angles for two reasons; both are corrected. A view that would see the base from
-    behind bends n' toward itself, as little as necessary (Keller2017 does so for the mirrored view). Light that the
-    base sends below the surface, half of 1 - n'.n for matte white, is reflected up again, as neighboring facets would:
-    a white base remains white at any tilt, and no light is created. For a base that transmits only the bending applies;
-    light that leaves it on the wrong side is lost. Not reciprocal, since the view bends the normal. Light becomes
-    unpolarized.
+    Surfaces with tilted normals usually turn black at grazing angles, for two reasons, and both are corrected here.
+    First, a view may lie behind the base: n' is then bent toward the view, as little as necessary (Keller2017 does this
+    for the mirrored view). Second, the base scatters light below the surface, (1 - n'.n) / 2 of it if it is white and
+    diffuse: this light is reflected upward again, as by neighboring facets. A white base thus remains white at any
+    tilt, and no light is created. If the base transmits, n' is bent, but light that leaves on the wrong side is lost.
+    Not reciprocal, because n' depends on the view. Scattered light is unpolarized.
 
-    A surface of two facets (Schuessler2017) conserves energy too, but with a mirror as the second facet matte bumps
-    vanish: seen from above, their brightness is n'.n cos theta_i for every tilt.
+    A surface of two facets (Schuessler2017) conserves energy as well. If the second facet is a mirror, however, diffuse
+    bumps become invisible: viewed from above, their brightness is n'.n cos theta_i for every direction of the tilt.
     """
 
-    base: BSDF = bsdf("the material")
-    lean_x: Number = number(default=0.0, doc="tilt of the normal along x", low=-STEEPEST, high=STEEPEST)
-    lean_y: Number = number(default=0.0, doc="tilt of the normal along y", low=-STEEPEST, high=STEEPEST)
+    base: BSDF = bsdf("the material whose normal is tilted")
+    lean_x: Number = number(default=0.0, doc="tilt of the normal along x, n'_x / n'_z", low=-STEEPEST, high=STEEPEST)
+    lean_y: Number = number(default=0.0, doc="tilt of the normal along y, n'_y / n'_z", low=-STEEPEST, high=STEEPEST)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"lean_x": 0.0, "lean_y": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the view bends the normal, and light sent below the surface is reflected up again",
+            "the normal is bent toward the view, and light scattered below the surface is reflected upward",
             lambda model: 2.0 if model.perturbs_normal else 0.0,
             certain=False,
         ),
@@ -75,7 +75,7 @@ class NormalMap(BSDF):
         return vec3(n_x, n_y, over)
 
     def _frame(self, n: Direction) -> _Frame:
-        """The frame of n from its slopes, x' as close to x as possible; 1 - n.x^2 would cancel for low normals."""
+        """The frame of n, with x' as close to x as possible; from its slopes, as 1 - n.x^2 would cancel if steep."""
         a, b = n.x / n.z, n.y / n.z
         x = vec3(1.0 + sqr(b), -(a * b), -a)
         x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
@@ -85,7 +85,7 @@ class NormalMap(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base in the bent frame, plus the light that it sends below the surface."""
+        """The base in the bent frame, plus the light that it scatters below the surface."""
         frame, valid = self._bent(wo)
         o, i = frame.local(wo), frame.local(wi)
         value = self.base.eval(o, i, mode)
@@ -123,7 +123,7 @@ class NormalMap(BSDF):
         return Sample(wi, weight, where(drawn, where(s.delta, s.pdf, density), 0.0), s.delta & drawn, s.eta)
 
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
-        """The tilted frame, bent until wo lies on its upper side; whether wo does."""
+        """(the tilted frame, bent until wo lies on its upper side; whether wo then lies there)."""
         n = self._normal()
         side = where(wo.z < 0.0, -1.0, ops.ones_like(wo.z))
         lacking = maximum(minimum(wo.z * side, MIN_COSINE) - dot(wo, n) * side, 0.0)
@@ -140,7 +140,7 @@ class NormalMap(BSDF):
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal differs from the surface's, as far as plain numbers tell."""
+        """Whether its normal may differ from the surface's: False only if the tilts are the plain number 0."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
         return self.base.perturbs_normal or not all(isinstance(value, int | float) and value == 0 for value in values)
 
@@ -164,25 +164,25 @@ class NormalMap(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The base's factor of ambient light."""
+        """The ambient reflectance of the base."""
         return self.base.ambient
 
 
 def _flipped(w: Direction) -> Direction:
-    """w with its z mirrored if it points downward."""
+    """w mirrored at the surface."""
     return vec3(w.x, w.y, -w.z)
 
 
 class Bump(NormalMap):
-    """A base with the normal of a surface of varying height (Blinn1978). In scenes an image, `"bump"`.
+    """A base with the normal of a height field (Blinn1978); in scenes an image of heights, `"bump"`.
 
-    The height h is in units of the scene, over the surface's coordinates u and v: with dp/du = (l, 0) and dp/dv =
-    (s, m) in the surface's plane its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized.
-    If dp/du and dp/dv are unknown, outside scenes, they are x and y. Otherwise as `normal-map`.
+    The height h(u, v) is in units of the scene. With dp/du = (l, 0) and dp/dv = (s, m) in the tangent plane, its
+    gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside scenes, where dp/du and
+    dp/dv are unknown, they are x and y. In all other respects, this is `normal-map`.
     """
 
-    lean_x: Number = number(default=0.0, doc="h_u, change of height along u", low=-1e6, high=1e6)
-    lean_y: Number = number(default=0.0, doc="h_v, change of height along v", low=-1e6, high=1e6)
+    lean_x: Number = number(default=0.0, doc="h_u, derivative of the height with respect to u", low=-1e6, high=1e6)
+    lean_y: Number = number(default=0.0, doc="h_v, derivative of the height with respect to v", low=-1e6, high=1e6)
 
     reads_surface: ClassVar[bool] = True
 
@@ -192,10 +192,10 @@ class Bump(NormalMap):
         length, sheared, across = self.surface
         x = safe_div(self.lean_x, length)
         y = safe_div(self.lean_y - sheared * x, across)
-        # steeper ones are artifacts: dp/dv vanishes at a sphere's poles
+        # steeper slopes are artifacts: dp/dv vanishes at the poles of a sphere
         return ops.clamp(-x, -STEEPEST, STEEPEST), ops.clamp(-y, -STEEPEST, STEEPEST)
 
 
 def slopes(normals: np.ndarray, scale: float = 1.0) -> np.ndarray:
-    """x / z and y / z of normals (..., 3), the parameters of `normal-map`, times `scale`."""
+    """x / z and y / z of normals (..., 3), times `scale`: the parameters of `normal-map`, (..., 2)."""
     return np.clip(scale * normals[..., :2] / np.maximum(normals[..., 2:], 1.0 / STEEPEST), -STEEPEST, STEEPEST)

@@ -17,12 +17,12 @@ from .mix import ALMOST_ONE
 
 class Opacity(BSDF):
     """The base on a fraction `opacity` of the surface, and holes elsewhere: the rest of the light passes straight
-    through, as a delta lobe, unchanged, from either side. Represents cutouts such as leaves and fences by a texture of
-    0 and 1, and fabrics with unresolved holes by values between. A base that only reflects is black from below: wrap it
-    in `two-sided`.
+    through, unchanged, as a delta lobe, from either side. A texture of zeros and ones represents cutouts such as leaves
+    and fences; values in between represent fabrics with unresolved holes. A base that only reflects is black from
+    below: wrap it in `two-sided`.
     """
 
-    base: BSDF = bsdf("the material where there is one")
+    base: BSDF = bsdf("the material between the holes")
     opacity: Number = number(default=0.5, doc="fraction of the surface that the base covers", low=0.0, high=1.0)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"opacity": 1.0}, equals=lambda one: one.base),)
@@ -49,7 +49,7 @@ class Opacity(BSDF):
         return Sample(where(covered, s.wi, -wo), weight, pdf, s.delta | ~covered, eta)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's tint, and white for the holes."""
+        """The average of the base's tint and white for the holes, by opacity."""
         return self.base.tint(wo) * self.opacity + (1.0 - self.opacity)
 
     @property
@@ -66,6 +66,6 @@ class Opacity(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's albedo times opacity, and the holes."""
+        """The base's albedo times opacity, plus 1 - opacity for the holes."""
         of_base, opacity = inner(self.base, mu, phi), float(self.opacity)  # type: ignore[arg-type]
         return None if of_base is None else of_base * opacity + (1.0 - opacity)

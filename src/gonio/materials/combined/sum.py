@@ -14,17 +14,17 @@ from ...ops import Direction, Mask, Mode, Spectrum
 
 
 class Sum(BSDF):
-    """a + b: the light of both materials added, as in fits to measurements: "lambert+conductor" (Ngan2005).
+    """a + b: the sum of two materials, as in fits to measurements, such as "lambert+conductor" (Ngan2005).
 
-    Energy is not balanced: together the two may reflect more than they receive. It is sampled by a guide. A delta lobe
-    has no value to add, and is rejected.
+    Energy may not be conserved: together, the two can reflect more light than they receive. Sampled by a guide. A
+    material that is a delta lobe has no value to add and is rejected.
     """
 
-    a: BSDF = bsdf("the one material")
-    b: BSDF = bsdf("the other")
+    a: BSDF = bsdf("the first material")
+    b: BSDF = bsdf("the second material")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": KnownViolation("together the two materials may reflect more than they receive", 1e3, certain=False)
+        "energy": KnownViolation("together, the two materials may reflect more than they receive", 1e3, certain=False)
     }
 
     def __post_init__(self) -> None:
@@ -36,15 +36,15 @@ class Sum(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The sum of both values."""
+        """The sum of the two values."""
         return self.a.eval(wo, wi, mode) + self.b.eval(wo, wi, mode)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The polarized parts of both materials."""
+        """The polarized parts of the two materials."""
         return (*self.a.polarized(wo, wi, delta, mode), *self.b.polarized(wo, wi, delta, mode))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The sum of both tints."""
+        """The sum of the two tints."""
         return self.a.tint(wo) + self.b.tint(wo)
 
     @property

@@ -35,7 +35,7 @@ class TwoSided(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density, likewise."""
+        """The base's density, with the same mirroring."""
         return self.base.pdf(_toward_front(wo, wo), _toward_front(wi, wo))
 
     @method
@@ -67,13 +67,13 @@ class TwoSided(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The base's factor of ambient light."""
+        """The ambient reflectance of the base."""
         return self.base.ambient
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's albedo, from both sides."""
+        """The base's albedo, which is the same from both sides."""
         return inner(self.base, np.abs(mu), phi)
 
 

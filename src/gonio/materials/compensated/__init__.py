@@ -1,1 +1,1 @@
-"""Materials with compensation of the energy lost by single scattering."""
+"""Materials that compensate for the energy lost by single scattering."""

@@ -1,4 +1,4 @@
-"""The base of the compensated materials: a base material plus a broad lobe that returns the energy it loses."""
+"""Base classes of the compensated materials: a base material plus a broad lobe that returns the energy it loses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ALMOST_ONE = 0.99999994  # the largest float32 below 1
 
 
 class Parts(NamedTuple):
-    """The two parts of a compensated material, both times |cos theta_i|.
+    """The two terms of a compensated material, times |cos theta_i|.
 
     single  the base: light scattered once
     multi   the compensation: light scattered more than once
@@ -33,7 +33,7 @@ class Parts(NamedTuple):
 
 
 class AllParts(NamedTuple):
-    """`Parts`, after the microfacet `Terms` of the base."""
+    """The microfacet `Terms` of the base, followed by `Parts`."""
 
     D: Scalar
     G: Scalar
@@ -43,7 +43,7 @@ class AllParts(NamedTuple):
 
 
 class _OnBase(BSDF):
-    """A material that compensates another and otherwise shares its properties."""
+    """A material that compensates for the loss of another and otherwise shares its properties."""
 
     base: BSDF = bsdf("the material to be compensated")
     _takes_glass: ClassVar[bool] = True  # whether the base may transmit
@@ -69,7 +69,7 @@ class _OnBase(BSDF):
         return self.base.delta
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The parts of the base: light scattered once. Compensation is unpolarized."""
+        """The polarized parts of the base, which are scattered once; the compensation is unpolarized."""
         return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -78,9 +78,9 @@ class _OnBase(BSDF):
 
 
 class _Compensated(_OnBase):
-    """base + its lost energy, sampled by a mixture of the base and of a lobe proportional to that energy.
+    """A base plus its lost energy, sampled by a mixture of the base and a lobe proportional to that energy.
 
-    A subclass defines `derive`, with fields `missing` and `ratio` among others, `compensation`, and `eval` with it.
+    A subclass defines `compensation`, an `eval` that adds it, and `derive`, whose fields include `missing` and `ratio`.
     """
 
     def known_albedo(
@@ -109,7 +109,7 @@ class _Compensated(_OnBase):
 
     @function
     def M(self, w: Direction) -> Scalar:
-        """1 - E(mu), the energy lost by single scattering at a direction, from its own side; E of the base at F = 1."""
+        """1 - E(mu), the energy lost by single scattering for w on either side; E is the base's albedo at F = 1."""
         return self.derived.missing.at(w)
 
     @method
@@ -133,7 +133,7 @@ class _Compensated(_OnBase):
         s = self.base.sample(wo, u, mode)
         wi = where(broad, self._lobe_sample(wo, u), s.wi)
         delta = s.delta & ~broad
-        # the base knows the pdf of its own sample more precisely than its rounded direction determines it
+        # the pdf of the base's own sample is more precise than one computed from the rounded direction
         base_pdf = where(broad, self.base.pdf(wo, wi), s.pdf)
         base_value = where(broad, self.base.eval(wo, wi, mode), s.weight * s.pdf)
         density = base_pdf * (1.0 - share) + self._lobe_pdf(wo, wi) * share
@@ -151,19 +151,19 @@ class _Compensated(_OnBase):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with the density `_lobe_pdf`: mu^2 from the table of its inverse, a uniform azimuth."""
         return self.derived.missing.sample(wo, u)
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the broad lobe: its power over the total power, for the mean color."""
+        """Probability of the broad lobe: its fraction of the total power, for the mean color."""
         lost = self.derived.missing.given(wo)
         given = lost * self.derived.ratio
         return safe_div(given, given + maximum(1.0 - lost, 0.0))
 
 
 def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi: Spectrum) -> Parts | AllParts:
-    """The parts, with D, G and F if the base has them."""
+    """The two terms, with D, G and F if the base has them."""
     if not base.has_terms:
         return Parts(single, multi)
     d, g, f = base.terms(wo, wi)
@@ -172,7 +172,7 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
 
 @function
 def lobe_ratio(f_add: Spectrum, lost: MissingEnergy) -> Scalar:
-    """Mean color of the compensation over that of single scattering."""
+    """Mean color of the compensation, divided by that of single scattering."""
     return safe_div(mean(f_add), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 

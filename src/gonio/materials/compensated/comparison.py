@@ -21,12 +21,12 @@ from .kulla_conty import KullaConty
 from .random_walk import RandomWalk
 from .turquin import Turquin
 
-Method = Callable[[BSDF], "BSDF | None"]  # the compensated base, None if the method does not support the base
-Base = Callable[[float], BSDF]  # from a width alpha
+Method = Callable[[BSDF], "BSDF | None"]  # base -> the compensated base, None if the method does not support it
+Base = Callable[[float], BSDF]  # width alpha -> the base
 
 
 def _for_metals(compensate: Callable[[BSDF], BSDF]) -> Method:
-    """A method that does not support glass, or is redundant for it: glass has one color, and albedo 1."""
+    """The method for bases that only reflect: it does not support glass, or is redundant, as glass has albedo 1."""
     return lambda base: None if base.transmits else compensate(base)
 
 
@@ -47,7 +47,7 @@ BASES: dict[str, Base] = {
 
 
 def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
-    """The methods and bases with the user's own: a material with a base is a method, any other is a base."""
+    """The methods and bases, with the user's own: a material with a base is a method, any other is a base."""
     methods, bases = dict(METHODS), dict(BASES)
     for material in own:
         if "base" in tree.children(material):
@@ -83,14 +83,18 @@ def compare(
     seed: int = 0,
     own: Sequence[BSDF] = (),
 ) -> dict[str, Any]:
-    """Albedos of every base with every method over roughness x mu, and derived figures.
+    """Albedos of every base with every method on a grid of roughness and mu, and measures derived from them.
 
-    own  user materials: one with a base is compared as a method, another as a base; without microfacets it has no
-         random walk for reference
+    roughness, mu  the axes; alpha = roughness^2
+    walks          random walks per albedo, 1000 or more
+    pairs          pairs of directions that are evaluated for `cost`, 1024 or more
+    own            user materials: one with a base is compared as a method, any other as a base; a base without
+                   microfacets has no random walk as a reference
 
-    Returns a dict that can be stored as JSON: axes; `albedo` [material][method] (roughness, mu, 3); `rms` relative to
-    the walk; `furnace`, the largest |1 - albedo| where 1 is exact; `reciprocity`, the largest relative violation on
-    gold; `cost`, time of one evaluation over that of the uncompensated metal.
+    Returns a dict that can be stored as JSON: the axes; `albedo` [material][method] (roughness, mu, 3); `rms`, the RMS
+    difference from the random walk; `furnace`, the largest |1 - albedo| where 1 is exact; `reciprocity`, the largest
+    relative violation for gold; `cost`, the time of one evaluation divided by that of the uncompensated metal. Raises
+    InputError for fewer walks or pairs.
     """
     if walks < 1000 or pairs < 1024:
         raise InputError(f"{walks} walks, {pairs} pairs", "compensation", "give 1000 walks and 1024 pairs or more")
@@ -132,7 +136,7 @@ def compare(
 
 
 def breach(method: Method, seed: int) -> float:
-    """Largest |f(o, i) - f(i, o)| over the larger of the two, gold of roughness 0.7, 2000 pairs."""
+    """Largest |f(o, i) - f(i, o)|, relative to the larger of the two, of 2000 pairs for gold of roughness 0.7."""
     model = _on_gold(method, 0.49)
     rng = np.random.default_rng(seed)
     o, i = (direction(rng.uniform(0.02, 1.0, 2000), rng.uniform(0, 2 * np.pi, 2000)) for _ in range(2))
@@ -148,8 +152,8 @@ def _on_gold(method: Method, alpha: float) -> BSDF:
 
 
 def _costs(methods: Mapping[str, Method], pairs: int) -> dict[str, float]:
-    """Time of `eval` over that of the uncompensated metal: gold of alpha 0.36, pairs above the surface, best of
-    many."""
+    """Time of `eval` divided by that of the uncompensated metal: gold with alpha = 0.36, pairs above the surface, the
+    best of 24 runs."""
     dr = backend.drjit()
     kind = backend.types("float32")
     rng = np.random.default_rng(1)

@@ -24,7 +24,7 @@ class Derived(NamedTuple):
     missing  1 - Ess
     f0       reflectance at normal incidence
     f_avg    F_avg of Schlick's curve
-    ratio    mean color of the compensation over that of single scattering, for sampling
+    ratio    mean color of the compensation divided by that of single scattering, for sampling
     """
 
     missing: Reflecting
@@ -38,12 +38,12 @@ class FdezAguera(_Compensated):
 
     With the split sum FssEss = F0 A(mu_o) + B(mu_o), Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
     F_ms = FssEss F_avg / (1 - E_ms F_avg). Designed for prefiltered lighting, FssEss * radiance + F_ms E_ms *
-    irradiance; as a BSDF the second term is a diffuse lobe that depends on wo only: not reciprocal. It assumes
-    Schlick's Fresnel.
+    irradiance. As a BSDF, the second term is a diffuse lobe that depends on wo only, so it is not reciprocal. The
+    method assumes Schlick's approximation of F.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the diffuse part depends on the viewer's direction only", 4.0, certain=False)
+        "reciprocity": KnownViolation("the diffuse term depends on the view direction only", 4.0, certain=False)
     }
     lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False

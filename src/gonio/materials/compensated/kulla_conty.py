@@ -25,7 +25,7 @@ class Derived(NamedTuple):
 
     missing  1 - E and 1 - E_avg of the base at F = 1
     f_add    color of the compensation
-    ratio    its mean over that of single scattering, for sampling
+    ratio    its mean divided by that of single scattering, for sampling
     """
 
     missing: MissingEnergy
@@ -35,7 +35,7 @@ class Derived(NamedTuple):
 
 @function
 def f_add(lost: MissingEnergy, color: str) -> Spectrum:
-    """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times that, by `color`."""
+    """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times this, by `color`."""
     F_avg, E_avg = lost.F_avg, 1.0 - lost.average
     sheet = F_avg * E_avg / (1.0 - F_avg * (1.0 - E_avg))
     return (sheet * F_avg if color == "bounce" else sheet) * lost.factor
@@ -44,25 +44,26 @@ def f_add(lost: MissingEnergy, color: str) -> Spectrum:
 class KullaConty(_Compensated):
     """f_base + f_add f_ms: the light lost by single scattering, returned as a broad lobe (Kulla2017).
 
-    With E(mu) the albedo of the base at F = 1, E_avg = 2 int E mu dmu and F_avg likewise:
-    f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o), and f_add by `color`. At F = 1
-    nothing is lost. Reciprocal. As alpha -> 0 the term vanishes, (1 - E)^2 faster than 1 - E_avg.
+    With E(mu) the albedo of the base at F = 1, E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu:
+    f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o); f_add depends on `color`. At
+    F = 1, no light is lost. Reciprocal. As alpha -> 0, the term vanishes: (1 - E)^2 tends to 0 faster than 1 - E_avg.
 
-    For a conductor or a dielectric E is a short polynomial accurate to 1e-4 (`compensation.curves`), valid at any
-    alpha, including textures and gradients. A dielectric that transmits gets a reflected and a transmitted lobe on each
-    side, of 1 - E with E the power reflected and transmitted; their ratio follows from reciprocity (Kulla2017, p. 30).
+    For a conductor or a dielectric, E is a short polynomial accurate to 1e-4 (`compensation.curves`), valid for any
+    alpha, including textures and gradients. A dielectric that transmits has a reflected and a transmitted lobe on each
+    side, whose albedos sum to 1 - E, where E includes the reflected and the transmitted power; the ratio of the two
+    lobes follows from reciprocity (Kulla2017, p. 30).
 
     Any other base that only reflects, by a finite isotropic lobe, is measured once (`compensation.measured`): E is its
-    albedo with F = 1 and every color that is a fraction of the light set to 1, F_avg the ratio of its own albedo to
-    that. Lambert loses nothing; Oren-Nayar the interreflections; a material without such colors (Phong) all light that
-    its brightest channel does not return. A gain of the base is not corrected. Its values must not vary over the
-    surface, and it has no shader code.
+    albedo with F = 1 and with every color that is a fraction of the light set to 1; F_avg is the ratio of its actual
+    albedo to E. Lambert loses nothing; Oren-Nayar loses the interreflections; a material without such colors, such as
+    Phong, loses all light that its brightest channel does not reflect. A gain of energy by the base is not corrected.
+    The parameters of such a base must not vary over the surface, and there is no shader code.
 
-    With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05):
-    compensation then adds a false bright rim to smooth surfaces.
+    With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05), so the
+    compensation adds a spurious bright rim to smooth surfaces.
     """
 
-    color: str = choice(default="bounce", doc="color of the light that is given back", choices=COLORS)
+    color: str = choice(default="bounce", doc="color of the compensation", choices=COLORS)
     average: str = choice(default="exact", doc="how F_avg of a conductor or dielectric is computed", choices=AVERAGES)
     _takes_any = True
 
@@ -74,8 +75,8 @@ class KullaConty(_Compensated):
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017).
 
-        M is 1 - E, computed without that difference, and `over_average` 1 / (pi (1 - E_avg)). For glass `share` splits
-        the lobe between both sides (p. 30).
+        M is 1 - E, computed without this difference, and `over_average` is 1 / (pi (1 - E_avg)). For glass, `share`
+        splits the lobe between the two sides (p. 30).
         """
         lost = self.derived.missing
         f_ms = self.M(wo) * self.M(wi) * lost.over_average(wi) * lost.share(wo, wi)
@@ -89,24 +90,24 @@ class KullaConty(_Compensated):
 
     @property
     def needs_uniform(self) -> bool:
-        """Whether the base has no tables and is measured, once for all rays."""
+        """Whether the base has no tables, so that it is measured once for all rays."""
         return self.base.microsurface is None
 
     # ------------------------------------------------------------------ measured error bounds
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "a measured base is sampled again for each value, and samples that change lobes shift E by 1e-4",
+            "a measured base is sampled anew for each value, and samples that switch lobes change E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "a measured base is sampled again in each precision",
+            "a measured base is sampled anew in each precision",
             lambda model: 0.01 if model.needs_uniform else 0.0,
             certain=False,
         ),
         "energy": KnownViolation(
-            "tables of rough glass, and of anisotropic bases, are interpolated (benchmarks/energy.py)",
+            "tables for rough glass and for anisotropic bases are interpolated (benchmarks/energy.py)",
             lambda model: _furnace_error(model),
             certain=False,
         ),
@@ -114,7 +115,7 @@ class KullaConty(_Compensated):
 
     @property
     def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """The allowed loss in a white furnace: the error of polynomials or of the measurement, see docs/energy.md."""
+        """The allowed loss in a white furnace: the error of the polynomials or the measurement, see docs/energy.md."""
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:
@@ -123,9 +124,9 @@ class KullaConty(_Compensated):
 
 
 def _furnace_error(model: KullaConty) -> float:
-    """The largest error of a white furnace, measured over 21 indices from 0.2 to 5, eight widths and 18 views. Where
-    the indices of both sides differ by less than 6 %, the lobe is narrower than the table's steps. Anisotropic glass is
-    approximated by isotropic tables (`curves.widths_along`)."""
+    """The largest error in a white furnace, measured for 21 indices from 0.2 to 5, eight widths and 18 views. If the
+    indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table. Anisotropic
+    glass is approximated by isotropic tables (`curves.widths_along`)."""
     if not model.base.transmits:
         return 0.008 if model.anisotropic else 0.0
     if model.anisotropic:

@@ -19,14 +19,15 @@ from .kulla_conty import Derived, f_add
 class RandomWalk(_Compensated):
     """f_base + the light of two or more bounces, estimated by one walk per call (Heitz2016).
 
-    The expectation is the exact multiple scattering of a Smith microsurface: `eval` and the weight are random numbers,
-    generated from a hash of both directions and `seed`. A renderer uses new directions for each sample and needs no
-    seed; repeated calls for one pair of directions need an array as `seed`. Requires ndf "ggx" and masking
-    "smith-correlated". Slow and noisy: intended as a reference. It cannot be recorded, so there is no shader code.
+    The expectation is the exact multiple scattering of a Smith microsurface: `eval` and the weight are random
+    estimates, generated from a hash of the two directions and `seed`. A renderer uses new directions for each sample
+    and needs no seed; for independent estimates at one pair of directions, pass an array as `seed`. Requires the ndf
+    "ggx" and the masking term "smith-correlated". Slow and noisy; intended as a reference. The walk cannot be recorded,
+    so there is no shader code.
     """
 
     stochastic: ClassVar[bool] = True
-    seed: Number = number(default=0.0, doc="shifts the random numbers")
+    seed: Number = number(default=0.0, doc="selects other random numbers")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -52,7 +53,7 @@ class RandomWalk(_Compensated):
         return where(live & ~smooth, value, 0.0)
 
     def derive(self) -> Derived:
-        """Kulla-Conty's lobe, by which it is sampled."""
+        """The Kulla-Conty lobe, which is used for sampling."""
         lost = missing_energy(self.base)
         color = f_add(lost, "bounce")
         return Derived(lost, color, lobe_ratio(color, lost))

@@ -28,13 +28,14 @@ class Derived(NamedTuple):
 class Turquin(_OnBase):
     """f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the lobe of single scattering, scaled up (Turquin2019, eq. 16).
 
-    E(mu) is the albedo of the base at F = 1 and F0 the reflectance at normal incidence. At F = 1 nothing is lost; the
-    compensation has the lobe's shape, so sampling is unchanged. The factor depends on wo only: not reciprocal.
+    E(mu) is the albedo of the base at F = 1, and F0 is the reflectance at normal incidence. At F = 1, no light is lost.
+    The compensation has the shape of the lobe, so sampling is unchanged. The factor depends on wo only, so the model is
+    not reciprocal.
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the factor depends on the viewer's direction only", 4.0, certain=False)
+        "reciprocity": KnownViolation("the factor depends on the view direction only", 4.0, certain=False)
     }
     lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
@@ -58,7 +59,7 @@ class Turquin(_OnBase):
         return Derived(missing_energy(self.base), f0)
 
     def _factor(self, wo: Direction) -> Spectrum:
-        """1 + F0 (1 - E(mu_o)) / E(mu_o), E clamped to >= 0.05."""
+        """1 + F0 (1 - E(mu_o)) / E(mu_o), with E clamped to >= 0.05."""
         lost, F0 = self.derived
         one_minus_E = ops.minimum(lost.at(wo), 0.95)
         return 1.0 + F0 * (one_minus_E / maximum(1.0 - one_minus_E, 0.05))
@@ -70,7 +71,7 @@ class Turquin(_OnBase):
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
-        """The base, and the increase by the factor; D, G and F of the base."""
+        """The base and the increase by the factor, with D, G and F if the base has them."""
         single = self.base.eval(wo, wi)
         return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
 

@@ -18,7 +18,8 @@ from ...optics import frame
 from ...optics.frame import rotate, rotate_back, sin2
 from .lambert import Lambert
 
-# FON's albedo is A (1 + r G / pi): G(0) / pi, and the mean of G / pi with the cosine (Portsmouth2025, eq. 17 and 21)
+# The albedo of FON (Fujii's Oren-Nayar) is A (1 + r G / pi). GRAZING is G(0) / pi, and AVERAGE the cosine-weighted mean
+# of G / pi (Portsmouth2025, eq. 17 and 21).
 GRAZING = 0.5 - 2.0 / (3.0 * math.pi)
 AVERAGE = 2.0 / 3.0 - 28.0 / (15.0 * math.pi)
 FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # of G / pi in powers of 1 - mu (eq. 64)
@@ -34,17 +35,17 @@ class Eon(BSDF):
 
     f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg)
     s = wo.wi - mu_o mu_i,  t = max(mu_o, mu_i) where s > 0, else 1,  A = 1 / (1 + (1/2 - 2 / (3 pi)) r)
-    E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1, in closed form, E_avg its mean with the cosine
+    E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1, in closed form; E_avg is its cosine-weighted mean
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
-    Unlike `oren-nayar` it conserves all light at rho = 1, at any roughness and angle, has no dark ring at grazing
-    angles, and its color becomes more saturated with roughness. Reciprocal. Sampled by a clipped linearly transformed
-    cosine and a fraction of uniform directions (their sec. 4).
+    Unlike `oren-nayar`, it conserves all light at rho = 1 for any roughness and angle, has no dark ring at grazing
+    angles, and becomes more saturated as roughness increases. Reciprocal. Sampled by a clipped linearly transformed
+    cosine, with a fraction of uniform directions (sec. 4 of the paper).
     """
 
-    albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light that a bounce preserves", low=0.0, high=1.0)
+    albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light reflected per bounce", low=0.0, high=1.0)
     roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
-    energy: str = choice("exact", "how E is found", FORMS)
+    energy: str = choice("exact", "how E is computed", FORMS)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"roughness": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     lossless_tolerance: ClassVar[float | None] = 1e-3  # the error of the fit; "exact" has none
@@ -53,7 +54,7 @@ class Eon(BSDF):
     def _lost(self, w: Direction) -> Scalar:
         """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi, without a difference of albedos; 0 at grazing angles.
 
-        G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin); 1 - sin^3 over cos is computed with
+        G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin), where (1 - sin^3) / cos is computed with
         1 - sin = cos^2 / (1 + sin).
         """
         mu = w.z
@@ -80,7 +81,7 @@ class Eon(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """f cos theta_i above the surface; (1 - E)^2 / (1 - E_avg) is A r times a ratio of numbers."""
+        """f cos theta_i above the surface; (1 - E)^2 / (1 - E_avg) is A r times a ratio that is independent of r."""
         A, r = self._single(), self.roughness
         s = wo.x * wi.x + wo.y * wi.y
         t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both are 0 only where the result is masked
@@ -90,7 +91,7 @@ class Eon(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The mixture of the transformed cosine's density and the uniform one."""
+        """The mixture of the density of the transformed cosine and the uniform density."""
         even = _uniform_share(wo.z, self.roughness)
         cosine = _Clipped(*_coefficients(wo, self.roughness)).pdf(rotate(wi, frame.azimuth(wo)))
         density = (1.0 - even) * cosine + even * (0.5 * inv_pi)
@@ -117,7 +118,7 @@ class Eon(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """rho E + rho_ms (1 - E), from above; approximate for the fit."""
+        """rho E + rho_ms (1 - E), from above; None for the fit, which is approximate."""
         if self.energy != "exact":
             return None
         r, rho = float(self.roughness), np.asarray(self.albedo, float)  # type: ignore[arg-type]
@@ -135,16 +136,16 @@ class Eon(BSDF):
 
 @function
 def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
-    """Probability of a uniform direction: the fit of their eq. 39."""
+    """Probability of a uniform direction, by the fit in eq. 39."""
     return ops.pow(r, 0.1) * (0.162925 + mu * (-0.372058 + (0.538233 - 0.290822 * mu) * mu))
 
 
 @function
 def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that maps a cosine to the lobe: their fit.
+    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that maps a cosine to the lobe, fitted.
 
-    The published fit is in mu; near the normal b and d are differences of nearly equal numbers, so here it is in 1 -
-    mu.
+    The published fit is in powers of mu. Near the normal, b and d are then differences of nearly equal numbers, so here
+    they are in powers of 1 - mu.
     """
     mu = wo.z
     low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu
@@ -157,10 +158,11 @@ def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Sca
 
 
 class _Clipped:
-    """The cosine transformed by that matrix, restricted to directions that end above the surface.
+    """The cosine lobe transformed by that matrix, restricted to directions that are then above the surface.
 
-    A direction h ends above where d h_x + h_z > 0: half an ellipse is cut from the disk of (h_x, h_y), and the
-    remainder is v / 2 + 1/2 of it with v = 1 / sqrt(1 + d^2). x is compressed accordingly, so that no sample is lost.
+    A direction h of the cosine lobe is mapped above the surface if d h_x + h_z > 0. This condition cuts half an ellipse
+    from the disk of (h_x, h_y) and leaves the fraction (1 + v) / 2, with v = 1 / sqrt(1 + d^2). x is compressed
+    accordingly, so that no sample is lost.
     """
 
     def __init__(self, a: Scalar, b: Scalar, c: Scalar, d: Scalar) -> None:
@@ -171,7 +173,7 @@ class _Clipped:
         return 0.5 * (1.0 + ops.rsqrt(self.d * self.d + 1.0))
 
     def draw(self, u1: Scalar, u2: Scalar) -> Direction:
-        """A direction of the lobe about a wo in the x-z plane."""
+        """A direction of the lobe, for wo in the x-z plane."""
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
@@ -181,7 +183,7 @@ class _Clipped:
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
 
     def pdf(self, w: Direction) -> Scalar:
-        """cos(h) / (pi acceptance) |det| / |adj(M) w|^4, with h along the adjugate's adj(M) w."""
+        """Density of `draw`, 1/sr: h_z det(M)^2 / (pi acceptance |h|^4), with h = adj(M) w and the adjugate adj(M)."""
         across = self.a - self.b * self.d
         height = self.c * (self.a * w.z - self.d * w.x)
         h = vec3(self.c * (w.x - self.b * w.z), across * w.y, height)

@@ -15,10 +15,10 @@ from ...ops import Direction, Mode, Scalar, Spectrum, abs, inv_pi, where
 class Lambert(BSDF):
     """Ideal diffuse reflection: f = albedo / pi, the same in every direction (course notes, part B).
 
-    Energy conserving for albedo <= 1, reciprocal. Sampled by the cosine.
+    Reciprocal, and energy-conserving for albedo <= 1. Sampled by the cosine.
     """
 
-    albedo: Colour = spectrum(default=0.5, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=0.5, doc="fraction of light that is reflected", low=0.0, high=1.0, soft_high=True)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -39,5 +39,5 @@ class Lambert(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """albedo, from above."""
+        """`albedo` from above, 0 from below."""
         return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))

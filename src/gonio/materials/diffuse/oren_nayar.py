@@ -21,21 +21,22 @@ class OrenNayar(BSDF):
     f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a, b = max, min of theta_o, theta_i
     A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
 
-    No trigonometry: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and the sines times the
-    cosine of the azimuth are the dot product of the tangential parts. Not valid beyond small sigma (about 0.5 rad); the
-    formula is used unchanged. It loses energy as sigma grows; interreflections are omitted. At grazing angles its
-    albedo tends to albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
+    No trigonometric function is evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and
+    the product of the two sines and the cosine of the azimuth is the dot product of the tangential components. The
+    model is valid for small sigma only (up to about 0.5 rad); beyond, the formula is used unchanged. It omits
+    interreflections, so it loses more energy as sigma grows. At grazing angles, the directional albedo tends to
+    albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
     """
 
     albedo: Colour = spectrum(
-        default=0.5, doc="share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True
+        default=0.5, doc="fraction of light that the sides of the grooves reflect", low=0.0, high=1.0, soft_high=True
     )
-    sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
+    sigma: Number = number(default=0.3, doc="standard deviation of the slope angle of the grooves", low=0.0, unit="rad")
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"sigma": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
+            "at grazing angles, the albedo A + B / 2 of the qualitative form is up to 1.015 (sigma = 0.2, albedo = 1)",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
             certain=False,  # below sigma = 0.04 the violation is under a thousandth
         )
@@ -59,7 +60,7 @@ class OrenNayar(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """cos theta_i / pi above the surface: B's part is small and equally smooth."""
+        """cos theta_i / pi above the surface; the term of B is small and equally smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method

@@ -19,22 +19,22 @@ class BlinnPhong(_Empirical):
     """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
 
     n.h is never negative for light and viewer above the surface, so the highlight has no cut-off edge. A highlight as
-    wide as Phong's needs about four times the exponent. Neither reciprocal nor energy conserving.
+    wide as Phong's needs about four times the exponent. Neither reciprocal nor energy-conserving.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         **_Empirical.known_violations,
-        # the bound below is not tight: just below it there need be no violation
+        # the bound of `_highlight_power` is not tight, so a small size need not mean a violation
         "energy": _Empirical.known_violations["energy"]._replace(certain=False),
     }
 
     def _highlight_power(self) -> np.ndarray:
-        """At most int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and at most the hemisphere's 2 pi."""
+        """An upper bound: int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and at most the 2 pi of the hemisphere."""
         return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
 
     @function
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """n.h: cosine between the normal and the half vector."""
+        """n.h: cosine of the angle between the normal and the half vector."""
         return half_vector(wo, wi).z
 
     @function
@@ -45,11 +45,11 @@ class BlinnPhong(_Empirical):
 
     @function
     def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of wi when h has density (p + 1) / (2 pi) cos^p: over 4 (v.h) (Walter2007, eq. 14)."""
+        """Density of wi, 1/sr: that of h, (p + 1) / (2 pi) (n.h)^p, divided by 4 (v.h) (Walter2007, eq. 14)."""
         lobe = (self._exponent + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
         return safe_div(lobe, 4.0 * dot(wo, half_vector(wo, wi)))
 
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """The viewer mirrored at a sampled half vector."""
+        """wo reflected about a sampled half vector."""
         return reflect(wo, square_to_power_lobe(u1, u2, self._exponent))

@@ -21,31 +21,32 @@ from ..diffuse.lambert import Lambert
 class ModifiedPhong(BSDF):
     """Phong's lobe as a reciprocal, energy-conserving BRDF: f = kd / pi + ks (p + 2) / (2 pi) (v.r)^p.
 
-    r is the light mirrored at the normal, the base of the power is clamped at 0 (Lafortune1994). The factor makes ks
-    the lobe's albedo at normal incidence; toward grazing views a part of the lobe lies below the surface and is lost.
-    Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, `lafortune` the successor of this one.
+    r is the light direction mirrored about the normal; the base of the power is clamped to 0 (Lafortune1994). With the
+    normalization factor, ks is the albedo of the lobe at normal incidence; toward grazing angles, part of the lobe lies
+    below the surface and is lost. Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, and
+    `lafortune` generalizes this one.
     """
 
-    kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse part", low=0.0, high=1.0, soft_high=True)
-    ks: Colour = spectrum(
-        default=0.3, doc="albedo of the lobe, seen from the normal", low=0.0, high=1.0, soft_high=True
-    )
-    p: Number = number(default=32.0, doc="falloff of the lobe", low=0.0)
+    kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse component", low=0.0, high=1.0, soft_high=True)
+    ks: Colour = spectrum(default=0.3, doc="albedo of the lobe at normal incidence", low=0.0, high=1.0, soft_high=True)
+    p: Number = number(default=32.0, doc="exponent of the lobe", low=0.0)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, equals=lambda one: Lambert(one.kd)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "kd + ks is over 1",
+            "kd + ks exceeds 1",
             lambda model: max(float(np.max(np.asarray(model.kd) + np.asarray(model.ks))) - 1.0, 0.0),
-            certain=False,  # reached at the normal only, which not every check includes
+            certain=False,  # reached only at normal incidence, which not every test includes
         )
     }
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the lobe: ks against kd, reduced for a lobe as wide as the cosine or cut by the horizon.
+        """Probability of sampling the lobe: ks relative to ks + kd, where ks is reduced if the lobe is wide or partly
+        below the horizon.
 
-        With r = (p + 1) / 2, the peak density of the lobe over the cosine's, the factor is ((r - 1/2) / (r + 1/2))^2.
+        With r = (p + 1) / 2 the peak density of the lobe divided by that of the cosine, a wide lobe is reduced by the
+        factor ((r - 1/2) / (r + 1/2))^2.
         """
         lobe = mean(self.ks) * sqr(self.p / (self.p + 2.0)) * clamp(wo.z, 0.1, 1.0)
         return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MAX_LOBE_SHARE)
@@ -59,7 +60,7 @@ class ModifiedPhong(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the cosine and of (p + 1) / (2 pi) (v.r)^p."""
+        """Mixture of the cosine density and (p + 1) / (2 pi) (v.r)^p."""
         above, o, i = lit(wo, wi)
         share = self._share(o)
         lobe = (self.p + 1.0) * (0.5 * inv_pi) * power_about(mirror(o), i, self.p)
@@ -75,12 +76,12 @@ class ModifiedPhong(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: no two albedos with the sum 1 return all light."""
+        """Itself: no kd and ks with kd + ks = 1 return all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The two albedos."""
+        """The sum of the two albedos."""
         return self.kd + self.ks
 
 
-MAX_LOBE_SHARE = 0.95  # of samples: the cosine keeps weights bounded
+MAX_LOBE_SHARE = 0.95  # largest probability of the lobe: cosine samples keep the weights bounded

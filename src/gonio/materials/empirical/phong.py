@@ -19,26 +19,26 @@ from ...optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, sq
 
 
 class _Empirical(BSDF):
-    """Ambient, diffuse and specular part: kd (n.l) + ks (highlight)^p, as published (Phong1975).
+    """Base of Phong's and Blinn's models: ambient, diffuse and specular terms, as published (Phong1975).
 
-    Without 1/pi, normalization, or a cosine in the specular term, so f = eval / cos theta_i grows without bound at
-    grazing light. Base of both highlights.
+    `eval` is kd (n.l) + ks (highlight)^p, without the factor 1/pi, a normalization, or a cosine in the specular term,
+    so f = eval / cos theta_i is unbounded at grazing incidence.
     """
 
     kd: Colour = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
     ks: Colour = spectrum(default=0.3, doc="specular coefficient", low=0.0)
-    p: Number = number(default=32.0, doc="falloff of the highlight", low=0.0)
+    p: Number = number(default=32.0, doc="exponent of the highlight", low=0.0)
     ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, mutes=("p", "ka")), Limit({"kd": 0.0}, mutes=("ka",)))
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the specular term has no cosine, so f divides it by cos theta_i",
+            "the specular term has no factor cos theta_i, so f contains it divided by cos theta_i",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
         "energy": KnownViolation(
-            "neither term is normalized: kd = 1 reflects pi times what it receives",
+            "neither term is normalized: kd = 1 reflects pi times the light that it receives",
             lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
         ),
     }
@@ -60,11 +60,11 @@ class _Empirical(BSDF):
         return self.p
 
     def _highlight_power(self) -> np.ndarray:
-        """The maximum of int (highlight)^p dwi."""
+        """The maximum of int (highlight)^p dwi over all wo."""
         raise NotImplementedError
 
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """Base of the power: the cosine that is largest in the highlight."""
+        """Base of the power: a cosine that is largest at the center of the highlight."""
         raise NotImplementedError
 
     def _peak(self, wo: Direction, wi: Direction) -> Scalar:
@@ -79,7 +79,7 @@ class _Empirical(BSDF):
 
     @function
     def _specular_share(self, wo: Direction) -> Scalar:
-        """Probability of the specular lobe: its power over the total, ks 2 pi / (p + 1) : kd pi."""
+        """Probability of the specular lobe: its fraction of the total power, with ks 2 pi / (p + 1) and kd pi."""
         specular = mean(self.ks) * 2.0 / (self.p + 1.0)
         both = specular + mean(self.kd)
         return ops.safe_div(specular, both)
@@ -92,7 +92,7 @@ class _Empirical(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the cosine and the highlight's lobe."""
+        """Mixture of the cosine density and the density of the highlight."""
         share = self._specular_share(wo)
         density = (1.0 - share) * wi.z * inv_pi + share * self._highlight_pdf(wo, wi)
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
@@ -108,7 +108,7 @@ class _Empirical(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The diffuse part's color."""
+        """The diffuse color kd."""
         return self.kd
 
     @property
@@ -120,9 +120,9 @@ class _Empirical(BSDF):
 class Phong(_Empirical):
     """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
 
-    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p; the light's 1 / r^2 is the renderer's task. The base of the power
-    is clamped at 0, since an even p would light the wrong side, and light below the surface contributes nothing.
-    Neither reciprocal nor energy conserving.
+    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. The
+    base of the power is clamped to 0, because an even p would otherwise cause a second highlight on the opposite side.
+    Light from below the surface contributes nothing. Neither reciprocal nor energy-conserving.
     """
 
     def _highlight_power(self) -> np.ndarray:
@@ -131,7 +131,7 @@ class Phong(_Empirical):
 
     @function
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """v.r: cosine between the viewer and the mirrored light."""
+        """v.r: cosine of the angle between the viewer and the mirrored light."""
         return dot(wo, mirror(wi))
 
     @function

@@ -1,1 +1,1 @@
-"""Published models of 1982 to 2012, used in fits to measured materials."""
+"""Models published from 1982 to 2012 and used in fits to measured materials."""

@@ -19,30 +19,32 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class AshikhminShirley(_Glossy):
-    """Anisotropic Phong: f = diffuse part + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
+    """Anisotropic Phong: f = diffuse term + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
     p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
-    F is Schlick's as in the paper, for an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or
-    coupled to the lobe as in the paper: it excludes the light that F0 reflects, and fades toward grazing light.
-    Reciprocal.
+    n_x and n_y are `exponent`. F is Schlick's approximation, as in the paper, with F0 = ((eta - 1) / (eta + 1))^2. The
+    diffuse term is Lambertian or, if `coupled`, that of the paper: it excludes the light that F0 reflects, and fades
+    toward grazing angles. Reciprocal.
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
-    exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=math.inf)
+    specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
+    exponent: Width = width(default=100.0, doc="exponent of the lobe; two for anisotropy", low=0.0, high=math.inf)
     rotation: Angle = microfacet.rotation_angle()
-    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
-    coupled: bool = flag(default=False, doc="the paper's diffuse part, which is reduced by the lobe")
+    coupled: bool = flag(default=False, doc="whether the diffuse term is that of the paper, reduced by the lobe")
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, mutes=("exponent", "rotation", "eta")),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:
-        """specular: F (n.i) / max((n.o), (n.i)) is the weight of a sample."""
+        """`specular`: the weight of a sample is specular F (n.i) / max((n.o), (n.i))."""
         return np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
-        """F, by name, at a facet seen at cos_theta."""
+        """F, by the name of its formula, at the cosine of incidence on a facet."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -55,7 +57,7 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(n / (n + 9))^2: 0 for the flat lobe n = 0; the density at the peak is (n + 1) / 8 of the cosine's."""
+        """(n / (n + 9))^2, 0 for the flat lobe n = 0; its peak density is (n + 1) / 8 times that of the cosine."""
         n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
         return sqr((n - 1.0) / (n + 8.0))
 
@@ -84,7 +86,7 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector with density p."""
+        """wo mirrored about a half vector with density p."""
         return frame.reflect(wo, frame.rotate_back(_half_vector(u.y, u.z, self.exponent), self.rotation))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:

@@ -19,26 +19,26 @@ from ...optics.frame import TINY, lit, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 from ..diffuse.lambert import Lambert
 
-# Maximum fraction of samples that follow the lobe: where the lobe exceeds its sampling density, as at grazing light,
-# the cosine keeps the weight bounded.
+# Maximum probability of sampling the lobe: where the lobe exceeds its sampling density, as at grazing incidence, cosine
+# samples keep the weights bounded.
 MAX_LOBE_SHARE = 0.95
 
 
 class _Glossy(BSDF):
-    """f = diffuse / pi + a lobe. A member defines the lobe, its density and sampling, and an estimate of its albedo.
+    """f = diffuse / pi + a lobe. A subclass defines the lobe, its density and sampling, and an estimate of its albedo.
 
-    The lobe is evaluated for two directions above the surface only; a direction below is replaced by the normal.
+    The lobe is evaluated only for directions above the surface; a direction below is replaced by the normal.
     """
 
     overridable: ClassVar[bool] = True
 
-    diffuse: Colour = spectrum(default=0.2, doc="albedo of Lambert's part", low=0.0, high=1.0, soft_high=True)
+    diffuse: Colour = spectrum(default=0.2, doc="albedo of the Lambertian term", low=0.0, high=1.0, soft_high=True)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, equals=lambda one: Lambert(one.diffuse)),)
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
-        """The published fits of the MERL materials by this model."""
+        """The published fits of this model to the MERL materials."""
         return library.presets(cls.name)
 
     @property
@@ -55,19 +55,19 @@ class _Glossy(BSDF):
         raise NotImplementedError
 
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of the lobe, on either side of the surface; u.x has been rescaled to [0, 1)."""
+        """A direction sampled from the lobe, on either side of the surface; u.x has been rescaled to [0, 1)."""
         raise NotImplementedError
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """The approximate albedo of the lobe, which determines the fraction of its samples."""
+        """The approximate albedo of the lobe, which determines the probability of sampling it."""
         raise NotImplementedError
 
     def _focus(self) -> Scalar | float:
-        """How much narrower than the cosine the lobe is, 0 to 1: a wide lobe is sampled better by the cosine."""
+        """How much narrower the lobe is than the cosine, 0 to 1: a wide lobe is sampled better by the cosine."""
         return 1.0
 
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f |cos theta_i| of the diffuse part."""
+        """f |cos theta_i| of the diffuse term."""
         return self._lambert * (wi.z * inv_pi)
 
     def _most(self) -> float | np.ndarray:
@@ -76,7 +76,7 @@ class _Glossy(BSDF):
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the lobe: its albedo over the total, reduced for a lobe as wide as the cosine."""
+        """Probability of the lobe: its fraction of the total albedo, reduced if it is about as wide as the cosine."""
         lobe = maximum(mean(self._lobe_albedo(wo)), 0.0)
         both = lobe + mean(self._lambert)
         return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MAX_LOBE_SHARE)
@@ -89,7 +89,7 @@ class _Glossy(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the cosine and the lobe's density, by their albedos."""
+        """Mixture of the cosine density and the density of the lobe, weighted by albedo."""
         above, o, i = lit(wo, wi)
         share = self._share(o)
         return where(above, (1.0 - share) * i.z * inv_pi + share * self._lobe_pdf(o, i), 0.0)
@@ -107,18 +107,18 @@ class _Glossy(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: the two parts are added, so no values of theirs return all light without loss."""
+        """Itself: the two terms are simply added, so no values of their parameters reflect exactly all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The two albedos."""
+        """The sum of the two albedos."""
         return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, normal_like(wo))), 0.0)
 
 
 def sum_breach(more: str = "") -> KnownViolation:
-    """The violation of energy conservation by a sum of two lobes, with the reason for a gain of the lobe itself."""
+    """The violation of energy conservation by a sum of two terms; `more` begins its reason with that of the lobe."""
     return KnownViolation(
-        f"{more}the two parts are added, and nothing keeps their sum below 1",
+        f"{more}the two terms are added, and nothing keeps their sum below 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be reached
     )
@@ -126,7 +126,7 @@ def sum_breach(more: str = "") -> KnownViolation:
 
 @function
 def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
-    """(half vector h, o.h): the cosine as half the length of o + i, which rounding makes neither 0 nor negative."""
+    """(half vector h, o.h). The cosine is half the length of o + i, which rounding never makes 0 or negative."""
     total = wo + wi
     size = sqrt(maximum(dot(total, total), TINY))
     return total * (1.0 / size), 0.5 * size

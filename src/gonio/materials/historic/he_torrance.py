@@ -34,39 +34,43 @@ from ...optics.special import exprel
 from ..microfacet import microfacet
 from .glossy import _Glossy, facet, sum_breach
 
-TERMS = 64  # of the series: its largest term is that of m = g, so they suffice up to g = 40
-ROUGH = 18.0  # g from which on, in all channels, the limit of the series is used, blended over 1 (Westin's program)
+TERMS = 64  # of the series; the largest term is that of m = g, so these suffice up to g = 40
+ROUGH = 18.0  # if all channels have a larger g, the limit of the series is used, blended over 1 (Westin's program)
 
 
 class HeTorrance(_Glossy):
-    """Wave optics of a Gaussian rough surface, the directional-diffuse part: f = diffuse / pi + specular F S G D / (pi
+    """Wave optics of a Gaussian rough surface, the directional-diffuse term: f = diffuse / pi + specular F S G D / (pi
     (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
 
-    D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), v = o + i along the surface,
-    g = (2 pi s / lambda (n.o + n.i))^2 with the roughness s = sigma / sqrt(1 + w) of the unshadowed part, where
-    w e^w = x^2, x = sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi). G, of the vectors of polarization, is
-    4 (o.h)^2 / (n.h)^2 for any pair: those of eq. 76 are orthonormal, and the rest cancels. S is Smith's masking of
-    Beckmann's slopes, of width 2 sigma / tau, times (1 + erf(cot / width)) / 2 for each direction, with the exponential
-    that is missing from the printed eq. 25 (Holzschuch2017).
+    D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), where v is the tangential
+    component of o + i and g = (2 pi s / lambda (n.o + n.i))^2. The roughness of the unshadowed part of the surface is
+    s = sigma / sqrt(1 + w), where w e^w = x^2 and x is the sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi) over the
+    two directions. G, the factor of the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair: the vectors of
+    eq. 76 are orthonormal, and the other factors cancel. S is Smith masking for Beckmann's slopes of width
+    2 sigma / tau, times (1 + erf(cot / width)) / 2 for each direction, with the exponential that is missing from the
+    printed eq. 25 (Holzschuch2017).
 
-    As used by Ngan2005: F of a real index, unpolarized; no coherent (mirror) part, which no measured table contains.
-    From g = 18 on D is the limit of the series, exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal.
-    Lengths are in nm; only their ratios matter. Sampled by visible normals of GGX, as wide as the series at its peak.
+    As in Ngan2005, F is that of a real index, for unpolarized light, and there is no coherent (mirror) term, since
+    measured tables do not contain it. Above g = 18, D is the limit of the series,
+    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal. Lengths are in nm; only their ratios matter.
+    Sampled by the visible normals of GGX, with the width of the series at its peak.
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
-    sigma: Number = number(default=180.0, doc="standard deviation of the surface's heights", low=1.0, unit="nm")
+    specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
+    sigma: Number = number(default=180.0, doc="standard deviation of the heights", low=1.0, unit="nm")
     tau: Number = number(default=3000.0, doc="correlation length of the heights", low=100.0, unit="nm")
-    eta: Number = number(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    eta: Number = number(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     wavelength: Colour = spectrum(default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm")
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("toward grazing light G D grows faster than S falls, "),
+        "energy": sum_breach("toward grazing angles G D grows faster than S falls, "),
     }
 
     def reflectance(self, cos_theta: Scalar) -> Scalar:
-        """F by name at a facet seen under cos_theta."""
+        """F, by the name of its formula, at the cosine of incidence on a facet."""
         return fresnel.kind(self.fresnel).dielectric(cos_theta, fresnel.cos_transmitted(cos_theta, self.eta), self.eta)
 
     @function
@@ -76,7 +80,7 @@ class HeTorrance(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2 of r = 1 / (4 width^2), the density at a rough surface's peak against the cosine's."""
+        """(r / (1 + r))^2, with r = 1 / (4 width^2) the peak density of a rough surface divided by the cosine's."""
         return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
 
     @function
@@ -87,14 +91,14 @@ class HeTorrance(_Glossy):
 
     @function
     def _shadowed(self, v: Direction) -> Scalar:
-        """tan erfc(cot / width) / sqrt(8 pi): the contribution of v to the equation for s."""
+        """tan erfc(cot / width) / sqrt(8 pi): the contribution of v to x in the equation for s."""
         cot = _cot(v)
         return (1.0 - erf(cot / self._width())) / cot * (8.0 * ops.pi) ** -0.5
 
     @function
     def _roughness2(self, x: Scalar) -> Scalar:
-        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82): a guess within a few percent, then Newton's
-        steps for w = x^2 e^-w, accurate to rounding."""
+        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82): an estimate within a few percent, then
+        Newton steps for w = x^2 e^-w, accurate to rounding errors."""
         x2 = sqr(x)
         log_x = log(1.0 + x2)
         w = log_x * (1.0 - log(1.0 + log_x) / (2.0 + log_x))
@@ -108,7 +112,7 @@ class HeTorrance(_Glossy):
         """sum_m g^m e^-g / (m m!) exp(-spread / m), and its limit exp(-spread / g) / g where all g are large."""
         limit = exp(-spread / maximum(g, 1.0)) / maximum(g, 1.0)
         blend = clamp(-max_component(-g) - ROUGH, 0.0, 1.0)
-        g = minimum(g, 60.0)  # beyond, only the limit counts, and the powers would overflow float32
+        g = minimum(g, 60.0)  # above, only the limit is used, and the powers would overflow float32
         term = g * exp(-g)
         total = term * exp(-spread)
         for m in range(2, TERMS + 1):
@@ -131,9 +135,9 @@ class HeTorrance(_Glossy):
 
     @function
     def _peak(self, wo: Direction) -> tuple[Pair, Scalar]:
-        """(width of the lobe in half vectors about the mirrored wo, g there), of the mean wavelength.
+        """(width of the lobe in half vectors about the mirror direction, g there), for the mean wavelength.
 
-        The terms about m = 1 + g dominate: exp(-(pi tau v / lambda)^2 / m), and v = 2 (n.o) tan h.
+        The terms near m = 1 + g dominate: exp(-(pi tau v / lambda)^2 / m), with v = 2 (n.o) tan h.
         """
         waves = 1.0 / mean(self.wavelength)
         g = sqr(4.0 * ops.pi * wo.z * waves) * self._roughness2(2.0 * self._shadowed(wo))
@@ -143,25 +147,25 @@ class HeTorrance(_Glossy):
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of visible normals over 4 (o.h) (Walter2007, eq. 14)."""
+        """Density of visible normals divided by 4 (o.h) (Walter2007, eq. 14)."""
         alpha, _ = self._peak(wo)
         h, _ = facet(wo, wi)
         return 0.25 * distribution("ggx").visible_per_cosine(wo, h, alpha)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a visible normal."""
+        """wo mirrored about a visible normal."""
         alpha, _ = self._peak(wo)
         return frame.reflect(wo, distribution("ggx").sample_visible(wo, u.y, u.z, alpha))
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F (1 - e^-g): excludes the mirror part."""
+        """specular F (1 - e^-g), which excludes the mirror term."""
         _, g = self._peak(wo)
         return self.specular * (self.reflectance(wo.z) * g * exprel(-g))
 
 
 @function
 def _cot(v: Direction) -> Scalar:
-    """cos over sin, clamped so that both remain within float32."""
+    """cos / sin, both clamped so that powers of the quotient remain within float32."""
     return clamp(v.z, 1e-6, 1.0) / sqrt(maximum(frame.sin2(v), 1e-12))

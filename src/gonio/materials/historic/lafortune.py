@@ -22,18 +22,20 @@ SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which the lobe 
 class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
-    The three C are cx, cy, cz, n is `exponent`, the base is clamped at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is
-    Phong's lobe about the mirror direction, normalized (Lafortune1994), called Blinn-Phong in Ngan2005; a smaller cz
-    tilts it toward the horizon, and positive cx and cy cause retro-reflection. The largest C should have size 1, as in
-    Ngan2005's normalization: a smaller one reduces the lobe's strength, to the n-th power. Reciprocal. Sampled by a
-    power lobe about (C o_x, C o_y, C o_z).
+    The three factors C are cx, cy and cz, n is `exponent`, and the base of the power is clamped to 0 (Lafortune1997,
+    eq. 4). C = (-1, -1, 1) is Phong's lobe about the mirror direction, normalized (Lafortune1994), which Ngan2005 calls
+    Blinn-Phong. A smaller cz tilts the lobe toward the horizon, and positive cx and cy cause retro-reflection. The
+    largest |C| should be 1, as in the normalization of Ngan2005: a smaller one scales the lobe by its n-th power.
+    Reciprocal. Sampled by a power lobe about (C o_x, C o_y, C o_z).
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at C = (-1, -1, 1), seen from the normal", low=0.0)
-    cx: Number = number(default=-1.0, doc="factor of o_x i_x: negative mirrors", low=-1.0, high=1.0)
-    cy: Number = number(default=-1.0, doc="factor of o_y i_y: negative mirrors", low=-1.0, high=1.0)
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe for C = (-1, -1, 1), at normal incidence", low=0.0)
+    cx: Number = number(default=-1.0, doc="factor of o_x i_x; negative for mirror reflection", low=-1.0, high=1.0)
+    cy: Number = number(default=-1.0, doc="factor of o_y i_y; negative for mirror reflection", low=-1.0, high=1.0)
     cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
-    exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
+    exponent: Number = number(default=50.0, doc="exponent of the lobe", low=0.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
@@ -45,14 +47,14 @@ class Lafortune(_Glossy):
         return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
 
     def _most(self) -> np.ndarray:
-        """(n + 2) / (n + 1): the lobe's integral without the cosine."""
+        """specular (n + 2) / (n + 1): the integral of the lobe without the cosine."""
         n = np.asarray(self.exponent, float)
         return np.max(np.asarray(self.specular)) * np.max((n + 2.0) / (n + 1.0))
 
     @function
     def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
-        """(unit axis of the lobe, its length to the n-th power): the length is computed from its difference to 1, since
-        a length close to 1 has no digits left for a large n."""
+        """(unit axis of the lobe, n-th power of its length before normalization). The power is computed from
+        1 - length^2, since for a large n a rounded length close to 1 has too few digits."""
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)
@@ -61,7 +63,7 @@ class Lafortune(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the peak density of the lobe over the cosine's."""
+        """((r - 1/2) / (r + 1/2))^2, with r = (n + 1) / 2 the peak density of the lobe divided by the cosine's."""
         return sqr(self.exponent / (self.exponent + 2.0))
 
     @function
@@ -85,12 +87,12 @@ class Lafortune(_Glossy):
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular |C o|^n times the axis's cosine: the albedo of a narrow lobe."""
+        """specular |C o|^n times the cosine of the axis: the albedo of a narrow lobe."""
         axis, strength = self._axis(wo)
         return self.specular * (strength * ops.clamp(axis.z, 0.1, 1.0))
 
 
 @function
 def _less(c: Scalar) -> Scalar:
-    """1 - c^2, a squared sine."""
+    """1 - c^2, without cancellation."""
     return (1.0 - c) * (1.0 + c)

@@ -21,31 +21,34 @@ from .glossy import _Glossy, facet, sum_breach
 class LowMicrofacet(_Glossy):
     """Microfacets with a power-law distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
-    D = (1 + b (1 - n.h))^-c, not normalized, so that `specular` is the height of the distribution; G is that of
-    V-grooves, and the 1 / pi that of Cook1982. Reciprocal. Sampled by D's own power law.
+    D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of its peak. G is that of V-grooves,
+    and the factor 1 / pi is that of Cook1982. Reciprocal. Sampled by the power law of D.
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=3.0, doc="height of D", low=0.0)
-    b: Number = number(default=300.0, doc="how narrow the peak is: it ends at 1 - n.h = 1 / b", low=1e-3)
-    c: Number = number(default=1.5, doc="falloff beyond the peak: as (1 - n.h)^-c", low=0.0)
-    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    specular: Colour = spectrum(default=3.0, doc="scale factor of the lobe: the height of D", low=0.0)
+    b: Number = number(default=300.0, doc="narrowness of the peak, which ends at 1 - n.h = 1 / b", low=1e-3)
+    c: Number = number(default=1.5, doc="falloff beyond the peak, as (1 - n.h)^-c", low=0.0)
+    eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """16 specular int D d(n.h): the weight of a sample is 8 specular F G (o.h) / (n.o), and G (o.h) <= 2 (n.o)."""
+        """16 specular m, with m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and
+        G (o.h) <= 2 (n.o)."""
         b, c = np.asarray(self.b, float), np.asarray(self.c, float)
         log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
         return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F by name at a facet seen under cos_theta."""
+        """F, by the name of its formula, at the cosine of incidence on a facet."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _fall(self, h: Direction) -> Scalar:
-        """(1 + b (1 - n.h))^-c; 1 - n.h from the sine, as it cancels at the peak."""
+        """(1 + b (1 - n.h))^-c, with 1 - n.h from the sine, since the difference cancels at the peak."""
         return exp(-self.c * log(1.0 + self.b * frame.sin2(h) / (1.0 + h.z)))
 
     @function
@@ -60,7 +63,7 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^3 of r = 1 / (8 int D), the peak density of the lobe over the cosine's."""
+        """(r / (1 + r))^3, with r = 1 / (8 int D) the peak density of the lobe divided by the cosine's."""
         narrower = 1.0 / (1.0 + 8.0 * self._mass())
         return narrower * sqr(narrower)
 
@@ -73,13 +76,13 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """D over its integral over the hemisphere, over 4 (o.h)."""
+        """D, divided by its integral over the hemisphere and by 4 (o.h)."""
         h, cos = facet(wo, wi)
         return self._fall(h) * (0.5 * inv_pi) / (self._mass() * 4.0 * cos)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector with density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
+        """wo mirrored about a half vector with density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
         q = 1.0 - self.c
         log_t = power_quantile(u.y * power_integral(self._log_end(), q), q)
         versine = log_t * exprel(log_t) / self.b

@@ -30,24 +30,27 @@ from ...optics.special import exprel, logrel, power_integral, power_quantile
 from ..microfacet import microfacet
 from .glossy import _Glossy, sum_breach
 
-# Minimum length of the largest step: at grazing views half of the azimuths have their rim so close that all their steps
-# would end in a sliver along the horizon, whose density no float32 direction resolves.
+# Minimum radius at which the power law is truncated. At grazing angles, the rim is so close in half of the azimuths
+# that all samples there would lie in a sliver along the horizon, whose density float32 directions cannot resolve.
 RIM = 0.25
 
 
 class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
-    Dp = o + i along the surface is the deviation of the pair from mirror reflection; the lobe follows the power
-    spectrum of polished surfaces (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the
-    surface: the facet's angle for a mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, not an
-    albedo. Sampled by its own power law, truncated near the rim of the disk of directions.
+    Dp, the tangential component of o + i, is the deviation of the pair from mirror reflection; the lobe follows the
+    power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |o - i|^2 / 4),
+    where o - i is the tangential component, too: for a mirrored pair, this is the cosine of incidence. Reciprocal.
+    `specular` is the height of the peak divided by F, 1/sr, not an albedo. Sampled by the lobe's power law, truncated
+    near the rim of the disk of directions.
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=10.0, doc="height of the peak over F, 1/sr", low=0.0)
-    b: Number = number(default=300.0, doc="how narrow the peak is: it ends at |Dp| = 1 / sqrt(b)", low=1e-3)
-    c: Number = number(default=1.0, doc="falloff beyond the peak: as |Dp|^(-2 c)", low=0.0)
-    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    specular: Colour = spectrum(default=10.0, doc="height of the peak divided by F, 1/sr", low=0.0)
+    b: Number = number(default=300.0, doc="narrowness of the peak, which ends at |Dp| = 1 / sqrt(b)", low=1e-3)
+    c: Number = number(default=1.0, doc="falloff beyond the peak, as |Dp|^(-2 c)", low=0.0)
+    eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("the lobe is not normalized, ")}
@@ -57,7 +60,7 @@ class LowSmooth(_Glossy):
         return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F at a cosine, by the name of its formula."""
+        """F, by the name of its formula, at the cosine of incidence on a facet."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -80,14 +83,14 @@ class LowSmooth(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(1 - 1 / r)^2, r = 1 / (2 mass) the peak density of the lobe over the cosine's, which is uniform on the
-        disk."""
+        """(1 - 1 / r)^2, with r = 1 / (2 mass) the peak density of the lobe divided by the cosine's, which is uniform
+        on the disk."""
         mass = self._mass(ops.ones_like(self.b))
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """(1 + b r^2)^-c / (2 pi mass up to the end) over the disk of directions, times d(disk)/dw = cos theta_i."""
+        """(1 + b r^2)^-c / (2 pi mass), the density on the disk of directions, times d(disk)/dw = cos theta_i."""
         r2 = _deviation2(wo, wi)
         r = sqrt(maximum(r2, 1e-30))
         rim = _rim(wo, (wo.x + wi.x) / r, (wo.y + wi.y) / r)
@@ -96,15 +99,15 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, up to the rim or to
-        `RIM`; a step beyond the rim is a failed sample."""
+        """A step of the power law from the mirrored wo on the disk of directions, in a uniform azimuth, truncated at
+        the rim or at `RIM`, whichever is farther; a step beyond the rim is a failed sample."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c
         end = maximum(rim.ahead, RIM)
         log_t = power_quantile(u.y * power_integral(self._log_fall(sqr(end)), q), q)
         r = sqrt(log_t * exprel(log_t) / self.b)
-        # 1 - x^2 - y^2 as a product: near the rim the difference has no digits left
+        # 1 - x^2 - y^2 as a product, since the difference cancels near the rim
         z2 = (rim.ahead - r) * (rim.behind + r)
         beyond = ops.rsqrt(1.0 + maximum(-z2, 0.0))
         return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
@@ -121,9 +124,9 @@ class Rim(NamedTuple):
 
 @function
 def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
-    """Distance of the rim of the unit disk from the mirrored wo, ahead in the azimuth (c, s) and behind.
+    """Distances from the mirrored wo to the rim of the unit disk, ahead in the azimuth (c, s) and behind.
 
-    The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2.
+    They are the roots of |p + r d|^2 = 1. One of them would cancel; it follows from their product, -(n.o)^2.
     """
     along = wo.x * c + wo.y * s
     root = sqrt(sqr(along) + sqr(wo.z))
@@ -134,7 +137,7 @@ def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
 
 @function
 def _deviation2(wo: Direction, wi: Direction) -> Scalar:
-    """|Dp|^2, the squared length of o + i along the surface."""
+    """|Dp|^2, the squared length of the tangential component of o + i."""
     return sqr(wo.x + wi.x) + sqr(wo.y + wi.y)
 
 

@@ -31,31 +31,35 @@ from ...optics.fresnel.schlick import schlick
 from ...optics.special import exprel, power_integral, power_quantile
 from .glossy import _Glossy, facet, sum_breach
 
-# Lower limit of G1. The paper's fits reach -0.002 at 90 degrees, which is preserved; with user-given parameters two
-# strongly negative G1 would multiply to a positive value without bound.
+# Lower limit of G1. The fits of the paper reach -0.002 at 90 degrees, which is preserved; with other parameters, the
+# product of two strongly negative G1 would be positive and unbounded.
 MIN_COSINE = -0.01
 
 
 class ShiftedGamma(_Glossy):
-    """Microfacets of a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
+    """Microfacets with a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
     (Bagher2012).
 
-    D = normalization e^-x / (x^p pi cos^4 h), x = alpha + tan^2 h / alpha; G = G1(o) G1(i), where
-    G1 = 1 + Lambda (1 - exp(t^k)) of t = (theta - theta0) / reach, 1 below theta0;
-    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. The paper's c = reach^-k exceeds 1e100 in its own fits, hence the angle
-    `reach`. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate to 1. All values are fitted: F can exceed
-    1 and, for f1 > f0, be negative; G1 can be negative at the horizon, and so can the lobe, as published. Reciprocal.
-    Sampled by a power law and an exponential that together approximate D within a factor e, with the smallest and
-    largest width of the channels.
+    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha
+    G = G1(o) G1(i) with G1 = 1 + Lambda (1 - exp(t^k)), t = (theta - theta0) / reach; G1 = 1 below theta0
+    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos
+
+    The angle `reach` replaces the paper's c = reach^-k, which exceeds 1e100 in its fits. D integrates to 1 if
+    normalization = 1 / (alpha Gamma(1 - p, alpha)). All values are fitted: F can exceed 1 and, for f1 > f0, be
+    negative; G1 and the lobe can be negative at the horizon, as published. Reciprocal. Sampled by a power law and an
+    exponential, which together approximate D within a factor of e, for the smallest and the largest width of the
+    channels.
+
+    The presets are the fits of Bagher2012 to the materials of the MERL database.
     """
 
-    specular: Colour = spectrum(default=0.3, doc="factor of the lobe", low=0.0)
-    alpha: Colour = spectrum(default=0.05, doc="width of the distribution: tan^2 h falls off over alpha", low=1e-5)
-    p: Colour = spectrum(default=0.5, doc="power of the distribution's peak", low=0.0, high=3.0)
-    f0: Colour = spectrum(default=0.05, doc="F at normal incidence, but for f1")
-    f1: Colour = spectrum(default=0.0, doc="decrease of F with the cosine")
-    normalization: Colour = spectrum(default=17.5, doc="factor of D (K in the paper)", low=0.0)
-    Lambda: Colour = spectrum(default=3.0, doc="depth of the masking", low=0.0)
+    specular: Colour = spectrum(default=0.3, doc="scale factor of the lobe", low=0.0)
+    alpha: Colour = spectrum(default=0.05, doc="width of the distribution, as a scale of tan^2 h", low=1e-5)
+    p: Colour = spectrum(default=0.5, doc="exponent of x in D, which shapes the peak", low=0.0, high=3.0)
+    f0: Colour = spectrum(default=0.05, doc="F at normal incidence, before f1 is subtracted")
+    f1: Colour = spectrum(default=0.0, doc="factor of the cosine that is subtracted from F")
+    normalization: Colour = spectrum(default=17.5, doc="scale factor of D (K in the paper)", low=0.0)
+    Lambda: Colour = spectrum(default=3.0, doc="strength of the masking", low=0.0)
     reach: Colour = spectrum(default=1.64, doc="angle beyond theta0 at which masking is strong", low=0.05, unit="rad")
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
@@ -104,14 +108,14 @@ class ShiftedGamma(_Glossy):
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture for the two widths, over 4 (o.h)."""
+        """Mixture of the densities for the two widths, divided by 4 (o.h)."""
         h, cos = facet(wo, wi)
         narrow, wide, p = self._widths()
         return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / cos
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a half vector for one of the two widths."""
+        """wo mirrored about a half vector for one of the two widths."""
         narrow, wide, p = self._widths()
         return frame.reflect(wo, _gamma_sample(u.y, u.z, where(u.x < 0.5, narrow, wide), p))
 
@@ -122,8 +126,11 @@ class ShiftedGamma(_Glossy):
 
 @function
 def _parts(alpha: Scalar, p: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """Of int x^-p dx from alpha to s = max(1, alpha) and int s^-p e^-x dx beyond: s, log(s / alpha), and the first over
-    alpha^(1 - p); the second is s^-p e^-s. Together they are D in x, to a factor between 1 / e and 1."""
+    """(s, log(s / alpha), int x^-p dx from alpha to s divided by alpha^(1 - p)), with s = max(1, alpha).
+
+    The sampling density in x is x^-p up to s and s^-p e^-x beyond, where its integral is s^-p e^-s. D in x is this
+    density times a factor between 1 / e and 1.
+    """
     s = maximum(alpha, 1.0)
     log_t = log(s / alpha)
     return s, log_t, power_integral(log_t, 1.0 - p)
@@ -143,7 +150,7 @@ def _gamma_pdf(h: Direction, alpha: Scalar, p: Scalar) -> Scalar:
 
 @function
 def _gamma_sample(u1: Scalar, u2: Scalar, alpha: Scalar, p: Scalar) -> Direction:
-    """A half vector: x by its power law up to s, by its exponential beyond."""
+    """A half vector, with x from the power law up to s and from the exponential beyond."""
     s, _, area = _parts(alpha, p)
     q = 1.0 - p
     below, beyond = exp(q * log(alpha)) * area, exp(-p * log(s) - s)

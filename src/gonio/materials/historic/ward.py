@@ -17,17 +17,20 @@ from .glossy import _Glossy, facet, sum_breach
 class Ward(_Glossy):
     """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
-    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. The albedo of
-    a narrow lobe is specular cos theta_o, so it loses energy toward grazing views; a wide lobe, spread toward the
-    normal, gains without bound there. Sampled by all half vectors, with density D (n.h) of Beckmann's D.
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), with the half vector h (Walter2005). Reciprocal. The
+    albedo of a narrow lobe is specular cos theta_o, so it loses energy toward grazing angles; a wide lobe, which
+    extends toward the normal, gains energy without bound there. Sampled by the distribution of all half vectors, with
+    density D (n.h), where D is Beckmann's.
+
+    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe, seen from the normal", low=0.0)
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at normal incidence", low=0.0)
     alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing, and "),
+        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing angles, "),
     }
 
     @property
@@ -37,7 +40,7 @@ class Ward(_Glossy):
 
     @function
     def _shape(self, wo: Direction, wi: Direction) -> Scalar:
-        """f of the lobe over D specular: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
+        """f of the lobe divided by specular D: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
         h, _ = facet(wo, wi)
         return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
 
@@ -48,7 +51,7 @@ class Ward(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the peak density of the lobe over the cosine's."""
+        """(r / (1 + r))^2, with r = 1 / (4 alpha_x alpha_y) the peak density of the lobe divided by the cosine's."""
         return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
 
     @function
@@ -65,7 +68,7 @@ class Ward(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored at a Gaussian half vector."""
+        """wo mirrored about a half vector with Beckmann's distribution."""
         h = distribution("beckmann").sample(u.y, u.z, self.alpha)
         return frame.reflect(wo, frame.rotate_back(h, self.rotation))
 

@@ -1,1 +1,1 @@
-"""Layers over a base: coat, OpenPBR and the two Disney models."""
+"""Layered materials: a coat over a base, OpenPBR and the two Disney models."""

@@ -1,4 +1,4 @@
-"""Values derived from the parameters of OpenPBR only: widths, indices, means over the hemisphere."""
+"""Values derived from the parameters of OpenPBR alone: widths, indices, means over the hemisphere."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from ._openpbr_formulas import averaged, colour_again, covered, over_pi, seen_by
 from ._openpbr_slabs import _OpenPBR
 from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, NODES, PLACES
 
-STEPS = 4  # of the iteration in `_balanced`
-WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
+STEPS = 4  # of the iteration in `balanced`
+WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of cosine-weighted means
 
 
 class Other(NamedTuple):
-    """Lost energy of glass facets whose reflectance differs from bare glass: under a film, or under a coat, whose index
-    determines reflection, while refraction depends on both. The loss is M + sum of less D (`spared`), M that of bare
-    glass.
+    """Energy lost by glass facets whose reflectance differs from that of bare glass: under a film, or under a coat,
+    where reflection follows the index relative to the coat, and refraction that relative to the outside. The loss is
+    M + sum of less D, where M is that of bare glass and D is `spared`.
 
-    less         decrease of F at `FEW_PLACES`
+    less         difference of F from that of bare glass, at `FEW_PLACES`
     thin, dense  mean of the loss, from outside and from inside
-    into, out    the fraction of it that passes to the other side (`compensation.glass`)
+    into, out    fraction of the lost light that passes to the other side (`compensation.glass`)
     """
 
     less: tuple[Spectrum, ...]
@@ -41,21 +41,21 @@ class Other(NamedTuple):
 
 
 class Between(NamedTuple):
-    """Values that follow from the parameters only.
+    """Values that follow from the parameters alone.
 
     alpha        widths of the base, roughened by the coat, along x and y
-    rough        its roughness; the root of alpha with one width
+    rough        roughness of the base; the square root of alpha if it is isotropic
     coat_alpha   widths of the coat
-    ratio        index for the base's reflection, over the medium above it, at least 1
-    eta          index for its refraction, over the outside's
-    medium       index of the medium above the base, over the outside's
+    ratio        index for the base's reflection, relative to the medium above it, at least 1
+    eta          index for the base's refraction, relative to the outside
+    medium       index of the medium above the base, relative to the outside
     sheer        fraction of diffuse light that the base's surface transmits: 1 minus its albedo, averaged
-    joint        the same for the base's and the coat's surface
-    bent         deviations from these means, by nodes of the cosine
+    joint        the same for the surfaces of base and coat together
+    bent         deviations from these two means, at nodes of the cosine
     filmed       change of F by the film at `PLACES`; empty without a film
     extra        the mean of `filmed`
-    facets       factor of facets under the coat, by nodes of the cosine; empty without a coat
-    returned     mean loss of a dielectric's facets relative to white ones; the body below receives it
+    facets       factor on facets under the coat, at nodes of the cosine; empty without a coat
+    returned     mean loss of a dielectric's facets relative to white ones, which the body below receives
     metal        energy lost by single scattering at F = 1
     metal_again  color of a metal's compensation
     sheet_again  colors of a thin sheet's compensation, reflected and transmitted
@@ -164,7 +164,7 @@ def colors_of_sheet(
 
 
 def missed_by_glass(model: _OpenPBR, eta: Scalar, alpha: Pair) -> Glass:
-    """The energy lost by single scattering in bare glass of that index."""
+    """The energy lost by single scattering in bare glass of index eta."""
     kind = Dielectric(alpha=(0.1, 0.2) if model.anisotropic else 0.1, masking=model.masking)
     zero, white = zeros_like(model.base_color), ones_like(model.base_color)
     values = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
@@ -188,7 +188,7 @@ def at_places(
 def misses_otherwise(
     model: _OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
 ) -> Other:
-    """The difference of that glass's lost energy from bare glass of index eta."""
+    """The energy lost by glass under a film or a coat, as a correction of that lost by bare glass of index eta."""
     white = ones_like(model.base_color)
     less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
     for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
@@ -208,7 +208,7 @@ def misses_otherwise(
 
 
 def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
-    """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
+    """1 - E of the base's dielectric surface at the cosines whose square roots are `NODES`."""
     kept_of = []
     E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[HATS:]
     faced = tables.faced_at_nodes(rough, model.masking) if filmed else [()] * len(E_of)
@@ -218,15 +218,15 @@ def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[S
 
 
 def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple[Scalar, ...]:
-    """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
+    """w at nodes of the cosine, from w(o) int w(i) P(o, i) di = 1 - E_coat(o), with P the scattering by white facets.
 
-    Some steps of Sinkhorn's iteration, damped. It starts at the solution for facets that scatter a fraction b of their
-    light uniformly and transmit the rest, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+    Computed by damped steps of Sinkhorn's iteration. It starts from the solution for facets that scatter a fraction b
+    of the light uniformly and mirror the rest, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing angles.
 
     transmitted  1 - E_coat at the nodes
     """
     rows, w = tables.scattered_at_nodes(rough, model.masking), []
-    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # at the cosine of most of the light
+    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # at the cosine at which most of the light is
     for n, one in enumerate(transmitted):
         cos = (n / (HATS - 1.0)) ** 2
         b = sqr(rough) / (sqr(rough) + cos + 1e-3)

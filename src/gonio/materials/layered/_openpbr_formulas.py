@@ -33,13 +33,13 @@ from ._openpbr_tables import HATS, MAX_ROOT_F0
 
 
 def mix(a: Array, b: Array, share: Scalar) -> Array:
-    """a at share 0, b at share 1."""
+    """Linear interpolation: a at share = 0, b at share = 1."""
     return a * (1.0 - share) + b * share
 
 
 @function
 def modulated(ratio: Scalar, weight: Scalar) -> Scalar:
-    """The index whose F0 is that of `ratio` times a weight, limited to index 5."""
+    """The index whose F0 is that of `ratio` times a weight, limited to 5."""
     root = (ratio - 1.0) / (ratio + 1.0)
     epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), MAX_ROOT_F0), root)
     return (1.0 + epsilon) / (1.0 - epsilon)
@@ -53,8 +53,8 @@ def total_of(terms: list[Array]) -> Array:
 
 
 def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
-    """<w>: the mean factor of facets over the light that a dielectric's facets scatter to a direction of a cosine. They
-    reflect most at grazing angles: the weights are white facets' times F of the facet half way between."""
+    """<w>: the mean of w over the light that a dielectric's facets scatter to a direction with the given cosine. They
+    reflect most at grazing angles, so the weights are those of white facets times F of the facet half way between."""
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
     weighted, total = ops.zeros_like(cos), ops.zeros_like(cos)
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
@@ -67,8 +67,9 @@ def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[S
 
 @function
 def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
-    """The width of an isotropic dielectric that reflects about as much as an anisotropic one, along a direction: the
-    root mean square at normal incidence, the width along the direction at grazing. Error 0.02 at a ratio of 3."""
+    """The roughness of an isotropic dielectric that reflects about as much as an anisotropic one along a direction. Its
+    alpha is the root mean square of the two widths at normal incidence, and the width along the direction at grazing
+    incidence. The error is 0.02 if the ratio of the widths is 3."""
     total, sin2 = 0.5 * (sqr(alpha.x) + sqr(alpha.y)), frame.sin2(w)
     seen2 = (sqr(alpha.x * w.x) + sqr(alpha.y * w.y) + 1e-6 * total) / (sin2 + 1e-6)
     share = (1.0 - w.z) * (1.2 - (index - 1.0) / (index + 1.0))
@@ -76,12 +77,12 @@ def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
 
 
 def covered_less(transmitted: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
-    """The light that a coat transmits from facets: its own fraction, and the loss of facets relative to white ones."""
+    """Transmittance of a coat for the body below, which also receives the loss of facets relative to white ones."""
     return transmitted + less * (1.0 - let_in) / maximum(let_in, 1e-3)
 
 
 def covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
-    """The albedo of facets under a film: the film's changes at `PLACES`, weighted by `shares`."""
+    """The albedo of facets under a film: E plus the film's changes at `PLACES`, weighted by `shares`."""
     if not filmed:
         return E
     return clamp(E + total_of([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
@@ -95,7 +96,7 @@ def averaged(values: list[Array]) -> Array:
 
 @function
 def over_pi(scale: Scalar) -> Scalar:
-    """The mean whose inverse over pi is `scale`; 0 for 0."""
+    """The mean m for which `scale` is 1 / (pi m); 0 for a scale of 0."""
     return safe_div(inv_pi, scale)
 
 
@@ -111,13 +112,13 @@ def power(colour: Spectrum, exponent: Scalar) -> Spectrum:
 
 
 def direction_at(cos: Scalar) -> Direction:
-    """A direction with a given cosine, half way between the axes of two widths."""
+    """A direction with a given cosine, half way between the x and y axes."""
     sin = math.sqrt(0.5) * safe_sqrt(1.0 - sqr(cos))
     return vec3(sin, sin, cos)
 
 
 def lobe_value(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
-    """A lobe's value; 0 for smooth facets, and for ideal pairs `mirror` for smooth facets only."""
+    """A lobe's value, 0 for smooth facets; for ideal pairs, `mirror` for smooth facets and 0 for others."""
     if ideal is None:
         return value if smooth is None else where(smooth, 0.0, value)
     rough = where(ideal, 0.0, value)

@@ -1,4 +1,4 @@
-"""Attenuation by OpenPBR's coat and fuzz of the light of the layers below."""
+"""Attenuation of the light of the layers below by OpenPBR's coat and fuzz."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from ._openpbr_tables import HATS, NODES
 class Sides(NamedTuple):
     """A pair of directions, both on the upper side.
 
-    wo, wi   above the surface; the normal in place of a pair that is not evaluated
+    wo, wi   the pair, above the surface; the normal in place of a pair that is not evaluated
     near     whether wi is on wo's side
     above    whether coat and fuzz are on that side
     """
@@ -51,7 +51,7 @@ class Sides(NamedTuple):
 
 
 def let_in(model: _OpenPBR, w: Direction) -> Spectrum:
-    """1 - E of the base's dielectric surface; for two widths by the equivalent width along w."""
+    """1 - E of the base's dielectric surface; if anisotropic, at the equivalent roughness along w."""
     b = model.derived
     rough = b.rough
     if model.anisotropic:
@@ -66,15 +66,15 @@ def kept_below(model: _OpenPBR, cos: Scalar, rough: Scalar, ratio: Scalar, filme
 
 
 def fuzz_lobe(model: _OpenPBR) -> Sheen:
-    """The fuzz as the `sheen` of its color and roughness."""
+    """The fuzz, as the `sheen` with its color and roughness."""
     return binding.bound_copy(Sheen(), {"albedo": model.fuzz_color, "roughness": model.fuzz_roughness})
 
 
 def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
-    """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
+    """Factor on the rough diffuse lobe for a direction, under the base's surface or, if `coated`, the coat's too.
 
-    The lobe scatters more light to some cosines than Lambert's, and those surfaces transmit less there. Its mean over
-    azimuth is known: the factor makes a white base lossless to second order.
+    The lobe scatters more light to some cosines than Lambert's, where those surfaces may transmit less. Its mean over
+    azimuth is known, and the factor makes a white base lossless to second order.
     """
     rough = model.base_diffuse_roughness
     lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
@@ -88,7 +88,7 @@ def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
 
 
 def coat_kept(model: _OpenPBR, w: Direction) -> Scalar:
-    """1 - E of the coat's surface; for two widths as in `let_in`."""
+    """1 - E of the coat's surface; if anisotropic, as in `let_in`."""
     rough = model.coat_roughness
     if model.may_be_anisotropic("coat_roughness_anisotropy"):
         rough = rough_along(w, model.derived.coat_alpha, model.coat_ior)
@@ -97,13 +97,13 @@ def coat_kept(model: _OpenPBR, w: Direction) -> Scalar:
 
 @function
 def inside(model: _OpenPBR, cos: Scalar) -> Scalar:
-    """The cosine in the coat."""
+    """The cosine of the refracted direction in the coat."""
     return maximum(safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(model.coat_ior)), 0.05)
 
 
 @function
 def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
-    """(1 - K) / (1 - E_b K), K the fraction that the coat reflects back down, E_b the base's albedo from above."""
+    """(1 - K) / (1 - E_b K), with K the fraction that the coat reflects back down, E_b the base's albedo from above."""
     b = model.derived
     outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, model.coat_ior), model.coat_ior)
     broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(model.coat_ior)) / sqr(model.coat_ior)
@@ -118,11 +118,12 @@ def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
 
 
 def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
-    """At a direction outside: the transmittance of the coat's surface; the coat's color for one crossing times the root
-    of the darkening; the factor of a lobe of facets; and the loss of a dielectric's facets relative to white ones: they
-    reflect most at grazing angles, where the coat transmits least.
+    """(transmittance of the coat's surface, the coat's color for one crossing times the square root of the darkening,
+    factor on a lobe of facets, loss of a dielectric's facets relative to white ones), for a direction outside. The loss
+    arises because the facets reflect most at grazing angles, where the coat transmits least.
 
-    Includes a last step of the iteration (`balanced`): for a mirror it is exactly the root of 1 - E.
+    The factor includes a last step of the iteration in `balanced`: for a mirror, it is exactly the square root of
+    1 - E.
     """
     b, cos = model.derived, w.z
     transmitted = coat_kept(model, w)
@@ -136,8 +137,8 @@ def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scal
 
 
 def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
-    """Factors of the base's facets and of its diffuse lobe, given the transmittance along both directions; 1 if there
-    is no coat on their side."""
+    """Factors on the base's facets and on its diffuse lobe, given the transmittances along the two directions; 1 where
+    no coat is on that side."""
     C = model.coat_weight
     kept_o, tint_o, facet_o, less_o = under(model, pair.wo)
     if model.layering == "albedo":

@@ -24,9 +24,9 @@ from ._openpbr_slabs import _OpenPBR
 class Facets(NamedTuple):
     """The facets that mirror one direction into the other.
 
-    cos     cosine of both directions to their normal
+    cos     cosine between their normal and either direction
     value   their lobe at F = 1
-    smooth  rays for which all facets are parallel; None if there are none
+    smooth  rays for which all facets are parallel; None if there are no such rays
     """
 
     cos: Scalar
@@ -37,7 +37,7 @@ class Facets(NamedTuple):
 def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Mask | None = None) -> Spectrum:
     """The sum of all lobes of the covered part of the surface, times |cos theta_i|.
 
-    ideal  rays whose two directions are joined by smooth facets: there the value is the facets' delta weight
+    ideal  rays whose two directions are joined by smooth facets: their value is the weight of the delta lobe
     """
     b = model.derived
     pair = sides(model, wo, wi)
@@ -122,11 +122,11 @@ def glass_lobes(
     crosses = joined if ideal is None else where(ideal, outside.z, joined)
     outer = where(pair.near, where(above, cos, maximum(cos_t, 1e-4)), crosses)
     f = model.glossy(outer, b.ratio, b.eta, b.medium)
-    # from inside, light that coat and fuzz would reflect is added to the base's reflection
+    # from inside, the light that coat and fuzz would reflect is added to the base's reflection
     inner = where(cos_t > 0.0, f, white)
     inner = 1.0 - (1.0 - inner) * layers.past_layers(model, direction_at(maximum(cos_t, 1e-4)))
     twice = lobe_value(scattered_twice(model, wo, wi, mode), None, ideal)
-    # the opaque part looks the same from below as from above
+    # the opaque fraction looks the same from below as from above
     opaque = model.glossy(cos, b.ratio, b.eta, b.medium)
     mirrored = where(above, f * model.specular_color, mix(opaque, inner, T))
     tint = where(above, model.specular_color, white)
@@ -204,7 +204,7 @@ def scattered_twice(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode) -
 
 
 def missed(model: _OpenPBR, w: Direction) -> Spectrum:
-    """Energy lost by glass at a direction, from its own side."""
+    """Energy lost by glass for a direction on either side."""
     b = model.derived
     assert b.glass is not None and b.other is not None, "derived if light is transmitted"
     shares = tables.spared(abs(w.z), b.rough, b.eta, model.masking)

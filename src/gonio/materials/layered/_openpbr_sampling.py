@@ -1,4 +1,4 @@
-"""Sampling of OpenPBR: a mixture of its lobes, by their approximate albedos."""
+"""Sampling of OpenPBR: a mixture of its lobes, weighted by their approximate albedos."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ._openpbr_slabs import _OpenPBR
 
 
 class Shares(NamedTuple):
-    """Probabilities of the lobes: fuzz, coat, reflecting and refracting facets, cosines on both sides."""
+    """Probabilities of the lobes: fuzz, coat, reflecting and refracting facets, and the cosine on each side."""
 
     fuzz: Scalar
     coat: Scalar
@@ -47,7 +47,7 @@ class Shares(NamedTuple):
 
 
 def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
-    """The approximate albedo of each lobe, plus a small probability for all, which bounds the weights."""
+    """Probabilities by the approximate albedo of each lobe, plus a small constant, which bounds the weights."""
     b = model.derived
     o = upper(wo)
     cos = maximum(o.z, 1e-4)
@@ -60,7 +60,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
     if model.has("coat_weight"):
         coat = where(above, model.coat_weight * (1.0 - layers.coat_kept(model, o)), 0.0) * left
         left = left - coat
-    # the film's effect by its mean: per channel it would double the work for probabilities
+    # the mean effect of the film: evaluating it per channel would double the cost of the probabilities
     glossy = clamp(exact.dielectric(cos, fresnel.cos_transmitted(cos, b.ratio), b.ratio) + b.extra, 0.0, 1.0)
     body = model.base_color * model.base_weight
     thin = model.geometry_thin_walled and model.has("subsurface_weight")
@@ -94,7 +94,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
     near, far = even + near + 0.01, far + passed
     if model.geometry_thin_walled:
         far = far + 0.01 * (1.0 - M)
-    elif model.refracts:  # a weight that is 0 in a shader has the probabilities of one that is left out
+    elif model.refracts:  # a weight of 0 gives the same probabilities as a shader without this lobe
         far = far + where(T > 0.0, 0.01 * (1.0 - M), 0.0)
     mirrored, refracted, near, far = (left * share for share in (mirrored, refracted, near, far))
     total = 1.0 / (fuzz + coat + mirrored + refracted + near + far)
@@ -102,7 +102,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
 
 
 def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
-    """The mixture of the lobes' densities, by their probabilities."""
+    """The mixture of the lobes' densities, weighted by their probabilities."""
     b = model.derived
     pair = lobes.sides(model, wo, wi)
     o, i = pair.wo, pair.wi
@@ -131,7 +131,7 @@ def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) ->
 
 
 def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
-    """A direction of the lobe that u.x selects."""
+    """A sample of the lobe that u.x selects."""
     b, shares = model.derived, shares_at(model, wo)
     pick = u.x
     if model.has_holes():

@@ -39,11 +39,11 @@ from ...optics.fresnel.schlick import schlick
 from ...optics.roughness import SMOOTH
 from ._openpbr_formulas import mix, modulated, power
 
-NARROWEST = 1e-3  # of two widths
-NEAREST = 1.001  # index of refraction over the outside's: closer to 1 no facet can be determined for refraction
+NARROWEST = 1e-3  # lower limit of the smaller of two widths
+NEAREST = 1.001  # smallest relative index: closer to 1, the facet of a refraction cannot be determined
 LAYERINGS = {
     "reciprocal": "a layer attenuates the light below along both directions, which is reciprocal",
-    "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
+    "albedo": "one minus the albedo at wo attenuates it, as in the reduction of the specification to a sum of lobes",
 }
 
 
@@ -52,75 +52,83 @@ class _OpenPBR(BSDF):
 
     masking: ClassVar[str] = "smith-correlated"
 
-    base_weight: Number = number(default=1.0, doc="factor on the base's color", low=0.0, high=1.0)
-    base_color: Colour = spectrum(default=0.8, doc="diffuse color; of metal, at normal incidence", low=0.0, high=1.0)
+    base_weight: Number = number(default=1.0, doc="factor on `base_color`", low=0.0, high=1.0)
+    base_color: Colour = spectrum(
+        default=0.8, doc="diffuse color; for metal, the color at normal incidence", low=0.0, high=1.0
+    )
     base_diffuse_roughness: Number = number(
-        default=0.0, doc="of the diffuse lobe, as `eon`", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="roughness of the diffuse lobe, as in `eon`", low=0.0, high=1.0, off=0.0
     )
-    base_metalness: Number = number(default=0.0, doc="metal fraction of the surface", low=0.0, high=1.0, off=0.0)
-    specular_weight: Number = number(default=1.0, doc="factor on F0 by the index, and on metal", low=0.0, high=4.0)
+    base_metalness: Number = number(
+        default=0.0, doc="fraction of the surface that is metal", low=0.0, high=1.0, off=0.0
+    )
+    specular_weight: Number = number(default=1.0, doc="factor on F0 of the dielectric, F of metal", low=0.0, high=4.0)
     specular_color: Colour = spectrum(
-        default=1.0, doc="tint of the outer reflection; of metal, at the edge", low=0.0, high=1.0
+        default=1.0, doc="tint of the outer reflection; for metal, the tint at the edge", low=0.0, high=1.0
     )
-    specular_roughness: Number = number(default=0.3, doc="root of alpha", low=0.0, high=1.0)
+    specular_roughness: Number = number(default=0.3, doc="square root of alpha", low=0.0, high=1.0)
     specular_roughness_anisotropy: Number = number(
         default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
     )
-    specular_ior: Number = number(default=1.5, doc="index of the base", low=1.0, high=5.0)
+    specular_ior: Number = number(default=1.5, doc="refractive index of the base", low=1.0, high=5.0)
     transmission_weight: Number = number(
         default=0.0, doc="fraction of the dielectric that transmits light", low=0.0, high=1.0, off=0.0
     )
     transmission_color: Colour = spectrum(
-        default=1.0, doc="color of white light after `transmission_depth`; at depth 0 a tint", low=0.0, high=1.0
+        default=1.0, doc="color of white light after `transmission_depth`; a tint if that is 0", low=0.0, high=1.0
     )
-    transmission_depth: Number = number(default=0.0, doc="0 tints at the surface", low=0.0, high=1e6)
+    transmission_depth: Number = number(
+        default=0.0, doc="distance after which light has `transmission_color`; 0 tints the surface", low=0.0, high=1e6
+    )
     transmission_scatter: Colour = spectrum(
-        default=0.0, doc="volume scattering, which no surface has: 0, or an error", low=0.0, inside=True
+        default=0.0, doc="volume scattering; must be 0, since no surface has it", low=0.0, inside=True
     )
     transmission_scatter_anisotropy: Number = number(
-        default=0.0, doc="of that scattering", low=-1.0, high=1.0, inside=True
+        default=0.0, doc="anisotropy of the volume scattering", low=-1.0, high=1.0, inside=True
     )
     transmission_dispersion_scale: Number = number(
-        default=0.0, doc="0, or an error: `dielectric` has substances that disperse", low=0.0, high=1.0, inside=True
+        default=0.0, doc="strength of dispersion; must be 0 (use `dielectric`)", low=0.0, high=1.0, inside=True
     )
-    transmission_dispersion_abbe_number: Number = number(default=20.0, doc="of that dispersion", low=0.0, inside=True)
+    transmission_dispersion_abbe_number: Number = number(
+        default=20.0, doc="Abbe number of the dispersion", low=0.0, inside=True
+    )
     subsurface_weight: Number = number(
         default=0.0, doc="fraction of the opaque dielectric with subsurface scattering", low=0.0, high=1.0, off=0.0
     )
-    subsurface_color: Colour = spectrum(default=0.8, doc="its color", low=0.0, high=1.0)
+    subsurface_color: Colour = spectrum(default=0.8, doc="color of the subsurface scattering", low=0.0, high=1.0)
     subsurface_radius: Number = number(
-        default=1.0, doc="mean free path; treated as 0, with a warning", low=0.0, inside=True
+        default=1.0, doc="mean free path; other values than 0 are treated as 0, with a warning", low=0.0, inside=True
     )
     subsurface_radius_scale: Colour = spectrum(
-        default=(1.0, 0.5, 0.25), doc="factor on it, per channel", low=0.0, inside=True
+        default=(1.0, 0.5, 0.25), doc="factor on `subsurface_radius`, per channel", low=0.0, inside=True
     )
     subsurface_scatter_anisotropy: Number = number(
-        default=0.0, doc="of a thin wall: 1 scatters all light forward, -1 all back", low=-1.0, high=1.0
+        default=0.0, doc="for a thin wall: 1 scatters all light forward, -1 all backward", low=-1.0, high=1.0
     )
     coat_weight: Number = number(default=0.0, doc="fraction of the surface under the coat", low=0.0, high=1.0, off=0.0)
     coat_color: Colour = spectrum(
         default=1.0, doc="transmittance of the coat for two crossings at normal incidence", low=0.0, high=1.0
     )
-    coat_roughness: Number = number(default=0.0, doc="root of alpha", low=0.0, high=1.0)
+    coat_roughness: Number = number(default=0.0, doc="square root of alpha", low=0.0, high=1.0)
     coat_roughness_anisotropy: Number = number(
         default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
     )
-    coat_ior: Number = number(default=1.6, doc="index of the coat", low=1.0, high=5.0)
+    coat_ior: Number = number(default=1.6, doc="refractive index of the coat", low=1.0, high=5.0)
     coat_darkening: Number = number(
         default=1.0, doc="darkening of the base by light reflected under the coat", low=0.0, high=1.0
     )
     fuzz_weight: Number = number(default=0.0, doc="fraction of the surface under fuzz", low=0.0, high=1.0, off=0.0)
     fuzz_color: Colour = spectrum(default=1.0, doc="factor on the light scattered by the fuzz", low=0.0, high=1.0)
-    fuzz_roughness: Number = number(default=0.5, doc="0 is fibers along the normal, 1 dust", low=0.0, high=1.0)
+    fuzz_roughness: Number = number(default=0.5, doc="0 for fibers along the normal, 1 for dust", low=0.0, high=1.0)
     thin_film_weight: Number = number(
         default=0.0, doc="fraction of the base under a thin film", low=0.0, high=1.0, off=0.0
     )
-    thin_film_thickness: Number = number(default=0.5, doc="of the film", low=0.0, high=3.0, unit="um")
-    thin_film_ior: Number = number(default=1.4, doc="index of the film", low=1.0, high=3.0)
+    thin_film_thickness: Number = number(default=0.5, doc="thickness of the film", low=0.0, high=3.0, unit="um")
+    thin_film_ior: Number = number(default=1.4, doc="refractive index of the film", low=1.0, high=3.0)
     emission_luminance: Number = number(
-        default=0.0, doc="0, or an error: emission belongs to a shape's emitter", low=0.0, unit="nit", inside=True
+        default=0.0, doc="luminance of emission; must be 0 (use an emitter)", low=0.0, unit="nit", inside=True
     )
-    emission_color: Colour = spectrum(default=1.0, doc="of that emission", low=0.0, inside=True)
+    emission_color: Colour = spectrum(default=1.0, doc="color of the emission", low=0.0, inside=True)
     geometry_opacity: Number = number(
         default=1.0,
         doc="fraction of the surface that is covered; light passes straight through elsewhere",
@@ -128,7 +136,7 @@ class _OpenPBR(BSDF):
         high=1.0,
         off=1.0,
     )
-    geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an interior")
+    geometry_thin_walled: bool = flag(default=False, doc="whether the surface is a sheet without an interior")
     layering: str = choice("reciprocal", "how a coat attenuates the layers below", LAYERINGS)
 
     limits: ClassVar[tuple[Limit, ...]] = (
@@ -141,7 +149,7 @@ class _OpenPBR(BSDF):
         Limit({"fuzz_weight": 0.0}, mutes=("fuzz_*",)),
         Limit({"thin_film_weight": 0.0}, mutes=("thin_film_*",)),
         Limit({"thin_film_thickness": 0.0}, mutes=("thin_film_*",)),
-        Limit({"thin_film_ior": 1.0, "coat_weight": 0.0}, mutes=("thin_film_*",)),  # a coat's index lies over the film
+        Limit({"thin_film_ior": 1.0, "coat_weight": 0.0}, mutes=("thin_film_*",)),  # a coat lies above the film
     )
 
     def __post_init__(self) -> None:
@@ -164,8 +172,8 @@ class _OpenPBR(BSDF):
             warnings.warn(f"OpenPBR: {text}", GonioWarning, stacklevel=3)
 
     def has(self, name: str) -> bool:
-        """Whether a weight may differ from 0, known statically: if so, the component's code is included. A recording
-        includes all components, as their weights are unknown."""
+        """Whether a weight may differ from 0, as known statically: if so, the component's code is included. A recording
+        includes all components, since their weights are unknown."""
         value = getattr(self.plain, name)
         if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
             return True
@@ -221,12 +229,12 @@ class _OpenPBR(BSDF):
         """alpha along x and y, with squares that add up to twice roughness^4, limited to 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
-        # for a rough lobe neither width may be tiny: a strip of 1e-4 is narrower than samples resolve
+        # in a rough lobe, neither width may be tiny: a strip of 1e-4 is narrower than samples can resolve
         across = maximum(along * low, minimum(along, NARROWEST))
         return vec2(clamp(along, SMOOTH, 1.0), clamp(across, SMOOTH, 1.0))
 
     def smooth(self, alpha: Pair, name: str) -> Mask | None:
-        """Where facets of these widths are a mirror; None if nowhere."""
+        """Rays for which facets of these widths are a mirror; None if there are no such rays."""
         return (alpha.x <= SMOOTH) & (alpha.y <= SMOOTH) if self.may_be_smooth(name) else None
 
     @function
@@ -240,8 +248,8 @@ class _OpenPBR(BSDF):
     def indices(self) -> tuple[Scalar, Scalar, Scalar]:
         """(index for the base's reflection, index for its refraction, index of the medium above it).
 
-        The coat refracts light before it reaches the base, so a coat of higher index causes no total reflection: as
-        specified, the ratio is inverted then.
+        The coat refracts light before it reaches the base, so a coat of higher index causes no total reflection; as
+        specified, the ratio is then inverted.
         """
         base, coat = self.specular_ior, self.coat_ior
         ratio = base / coat
@@ -254,7 +262,7 @@ class _OpenPBR(BSDF):
     # ------------------------------------------------------------------ reflectances
 
     def film_change(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
-        """Change of R by the film over a base of index eta + i k, both relative to the medium, at a cosine outside.
+        """Change of R by the film on a base of index eta + i k, relative to the medium, at a cosine outside.
 
         It is R with the film minus R with a film of thickness 0 by the same formula. The base without the film has its
         own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to Fresnel's
@@ -271,7 +279,7 @@ class _OpenPBR(BSDF):
 
     @function
     def clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """What the film adds to R of the dielectric."""
+        """Change of the dielectric's R by the film."""
         white = ops.ones_like(self.base_color)
         # the same value for all channels, so that compilers evaluate it once
         alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))
@@ -286,13 +294,13 @@ class _OpenPBR(BSDF):
 
     @function
     def bare_metal(self, cos: Scalar) -> Spectrum:
-        """F82 from its colors."""
+        """F of the metal without a film: F82 from its colors."""
         r0 = self.base_color * self.base_weight
         return f82(cos, r0, self.specular_color * schlick(GRAZING, r0)) * minimum(self.specular_weight, 1.0)
 
     @function
     def metal(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """F of the metal; under a film with the index that Gulbrandsen2014 assigns to its colors."""
+        """F of the metal; under a film, with the index that Gulbrandsen2014 assigns to its colors."""
         bare = self.bare_metal(cos)
         if not self.has("thin_film_weight"):
             return bare
@@ -348,7 +356,7 @@ class _OpenPBR(BSDF):
         return Interior(self.indices()[1], loss, ops.zeros_like(self.transmission_depth))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's colors at a cosine."""
+        """The color of the base at the cosine of wo."""
         b = self.derived
         cos = abs(wo.z)
         f = self.glossy(cos, b.ratio, b.eta, b.medium)

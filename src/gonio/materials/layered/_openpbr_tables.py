@@ -24,11 +24,11 @@ from ..compensated.kulla_conty import KullaConty
 from ..microfacet.conductor import Conductor
 
 SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror
-MAX_ROOT_F0 = 2.0 / 3.0  # root of F0 at index 5, where the tables end
+MAX_ROOT_F0 = 2.0 / 3.0  # square root of F0 at index 5, where the tables end
 INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # error of F: 2e-3 at grazing angles for any index, else 5e-4
 DRAWS = 1 << 12  # samples per direction
-HATS = 12  # nodes of the cosine, over its root: error 0.5 % for a white coated metal, with 8 nodes 1 %
-NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means through two layers: error 1e-3 at F0 = 0.05
+HATS = 12  # nodes of the cosine, at equal steps of its square root: error 0.5 % for a white coated metal, 1 % with 8
+NODES = [float(x) for x in gauss(6)[0]]  # square roots of cosines for means through two layers: error 1e-3 at F0 = 0.05
 
 
 def _row(roughness: Scalar) -> Scalar:
@@ -48,7 +48,7 @@ def _rows(count: int) -> np.ndarray:
 
 @function
 def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
-    """E of GGX facets of a dielectric of index 1 to 5: light reflected once."""
+    """E of GGX facets of a dielectric of index 1 to 5: the fraction of light that is reflected once."""
     table = _albedos(masking)
     places = _root_of(index), _row(roughness), sqrt(maximum(cos, 0.0))
     at = [inset(x, count) for x, count in zip(places, table.shape, strict=True)]
@@ -57,7 +57,7 @@ def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Sc
 
 @lru_cache
 def _albedos(masking: str) -> Table:
-    """E over (root of sqrt(F0), roughness, root of the cosine)."""
+    """E over (fourth root of F0, roughness, square root of the cosine)."""
 
     def build() -> np.ndarray:
         root = np.linspace(0.0, 1.0, INDICES)[:, None, None] ** 2 * MAX_ROOT_F0
@@ -98,7 +98,7 @@ class _AtNodes(NamedTuple):
 
 @lru_cache
 def _at_nodes(masking: str) -> _AtNodes:
-    """The tables at fixed cosines, interpolated by the common rule."""
+    """The tables at fixed cosines, interpolated as in `lookup`."""
     hats = np.linspace(0.0, 1.0, HATS)
 
     def at(table: Table, x: np.ndarray) -> np.ndarray:
@@ -115,7 +115,7 @@ def _at_nodes(masking: str) -> _AtNodes:
 
 
 def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Fractions of light that white facets, all bounces included, scatter to the neighborhoods of `HATS` cosines."""
+    """Fractions of the light that white facets scatter, by all bounces, to the neighborhoods of `HATS` cosines."""
     table = _scattering(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -123,7 +123,7 @@ def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...
 
 @lru_cache
 def _scattering(masking: str) -> Table:
-    """`scattered` over (roughness, root of the cosine)."""
+    """`scattered` over (roughness, square root of the cosine)."""
 
     def build() -> np.ndarray:
         cos = np.maximum(np.linspace(0.0, 1.0, COSINES) ** 2, 1e-4)
@@ -157,7 +157,7 @@ def _hats(x: np.ndarray) -> np.ndarray:
 
 @lru_cache
 def means() -> list[float]:
-    """The weights of cosine-weighted means of values at those nodes."""
+    """Weights of the `HATS` nodes in a cosine-weighted mean."""
     return _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
 
@@ -176,7 +176,7 @@ def prepare(masking: str) -> None:
 
 
 def shares_of(x: Array, places: list[float]) -> list[Array]:
-    """Lagrange polynomials: the weight of the value at each place at x."""
+    """Lagrange polynomials: the weight at x of the value at each place."""
     shares = []
     for n, here in enumerate(places):
         others = [one for m, one in enumerate(places) if m != n]
@@ -189,7 +189,7 @@ def shares_of(x: Array, places: list[float]) -> list[Array]:
 
 FROM_PLACES: list[list[float]] = np.array(
     shares_of(np.array(FEW_PLACES), PLACES)
-).T.tolist()  # a reflectance at the few places, from all
+).T.tolist()  # weights of the values at `PLACES`, for each of `FEW_PLACES`
 
 
 def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
@@ -201,7 +201,7 @@ def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
 
 @lru_cache
 def _faced(masking: str) -> Table:
-    """`faced` over (roughness, root of the cosine)."""
+    """`faced` over (roughness, square root of the cosine)."""
     rows, columns = ROUGHNESSES, 65
 
     def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, _: Scalar) -> tuple[Scalar, ...]:
@@ -217,8 +217,8 @@ def _faced(masking: str) -> Table:
 
 
 def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Excess of the transmitted over the reflected energy of glass facets per unit of reflectance at each of
-    `FEW_PLACES`, of cosines outside: from outside, then from inside."""
+    """Transmitted minus reflected energy of glass facets per unit of reflectance at each of `FEW_PLACES` (cosines
+    outside): for light from outside, then from inside."""
     table = _spared(masking)[0]
     at = [
         inset(x, count)
@@ -235,7 +235,7 @@ def spared_on_average(roughness: Scalar, eta: Scalar, masking: str) -> tuple[Sca
 
 @lru_cache
 def _spared(masking: str) -> tuple[Table, Table]:
-    """`spared` over (root of sqrt(F0), roughness, root of the cosine), for both sides."""
+    """`spared` over (fourth root of F0, roughness, square root of the cosine), and its cosine-weighted mean."""
 
     def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, eta: Scalar) -> tuple[Scalar, ...]:
         cos_t = fresnel.cos_transmitted(o_m, eta)

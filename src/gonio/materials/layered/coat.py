@@ -48,32 +48,32 @@ class Coat(BSDF):
 
     f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
-    T = 1 - R is the transmittance of the top, o' and i' the refracted directions, t = exp(-absorption depth / cos)
-    Beer's law along them, eta^2 the change of solid angle. Light that bounces more than once is represented by the
-    base's own lobe, by the factor g, and a separable rest (see `interior.py`): exact over Lambert, exact in albedo over
-    a metal, per channel. Reciprocal; a white coat on a white base conserves all light.
+    T = 1 - R is the transmittance of the top, o' and i' are the refracted directions, t = exp(-absorption depth / cos)
+    is Beer's law along them, and eta^2 is the change of solid angle. Light that bounces more than once is represented
+    by the base's own lobe, with the factor g, and by a separable rest (see `interior.py`). This is exact over Lambert;
+    over a metal, the albedo is exact, per channel. Reciprocal; a white coat on a white base conserves all light.
 
-    With `bounces="white"` g and rest are those of a white base: the coated material reflects R, plus 1 - R times the
-    base's color, neither darker nor more saturated.
+    With `bounces="white"`, g and rest are those of a white base: the coated material reflects R plus (1 - R) times
+    the color of the base, which becomes neither darker nor more saturated.
 
-    The base is embedded in the coat: its own index is relative to the coat's. A rough top reflects like rough glass,
-    with albedo R; refracted light is not blurred. g and the rest are tables computed on first use. Colors of the base
-    may vary over the surface, as may the coat's own color and depth, which are axes of the tables; no other value may,
-    and derivatives omit the change of the tables.
+    The base is embedded in the coat, so its own index is relative to the coat. A rough top reflects like rough glass,
+    with albedo R; refracted light is not blurred. g and rest are tables that are computed on first use. Colors of the
+    base may vary over the surface, as may the coat's own absorption and depth, which are axes of the tables; other
+    values may not, and derivatives omit the change of the tables.
     """
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"index": 1.0, "absorption": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "reflection and transmission of a rough top have this error, by sampling of rough glass",
+            "reflection and transmission by a rough top are sampled from rough glass, with this error",
             lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
             certain=False,
         ),
     }
     base: BSDF = bsdf("the material under the coat; it must not transmit")
-    index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
+    index: Number = number(default=1.5, doc="index of the coat, relative to the outside", low=1.0, high=3.0)
     alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
-    absorption: Colour = spectrum(default=0.0, doc="transmittance at normal incidence: exp(-absorption depth)", low=0.0)
+    absorption: Colour = spectrum(default=0.0, doc="absorption: exp(-absorption depth) per crossing", low=0.0)
     depth: Number = number(default=1.0, doc="thickness of the coat", low=0.0)
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
@@ -124,7 +124,7 @@ class Coat(BSDF):
 
     @function
     def _through(self, w: Direction) -> Scalar:
-        """Factor of the base's lobe at each end: T by Fresnel's equations; for a rough top from the table."""
+        """Factor on the base's lobe for each direction: T by Fresnel's equations; for a rough top from the table."""
         _, smooth = widths(self.alpha)
         return where(smooth, self._sharp(w), self._at(w)[2])
 
@@ -143,7 +143,7 @@ class Coat(BSDF):
 
     @function
     def _inside(self, w: Direction) -> Direction:
-        """The refracted direction, away from the base."""
+        """The refracted direction, pointing away from the base."""
         over = 1.0 / self.index
         return ops.vec3(w.x * over, w.y * over, ops.safe_sqrt(1.0 - frame.sin2(w) * sqr(over)))
 
@@ -164,7 +164,7 @@ class Coat(BSDF):
         return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
-        """(factor of the base's lobe, the separable lobe) for bounces between the coat and a base of color a."""
+        """(factor on the base's lobe, the separable lobe) for bounces between the coat and a base of color a."""
         bounce_color = ops.ones_like(a) if self.bounces == "white" else a
         u = self._crossed() + ops.zeros_like(a)
         tables, ends = self._tables, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
@@ -194,8 +194,8 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of light from below the top, that of a cosine among it): the cosine samples the separable lobe,
-        and replaces samples of the base that are totally reflected and fail."""
+        """(probability of light from below the top, probability of the cosine within it). The cosine samples the
+        separable lobe, and replaces samples of the base that would fail because of total reflection."""
         reflected, even, _, beyond = self._at(wo)
         _, smooth = widths(self.alpha)
         cos = ops.abs(wo.z)
@@ -272,7 +272,7 @@ class Coat(BSDF):
 
     @property
     def fixed(self) -> frozenset[str]:
-        """All parameters except colors of the base and the coat's own color and depth: tables depend on them."""
+        """All parameters except colors of the base and the coat's own absorption and depth: tables depend on them."""
         numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
         return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
 

@@ -36,14 +36,14 @@ from ...optics.warp import square_to_cosine_hemisphere
 from ..historic.glossy import facet
 from ..microfacet import microfacet
 
-SMALLEST = 0.001  # width: the limit in Burley2012's code
-COAT_WIDTH = 0.25  # of the coat's masking, for any gloss (Burley2012, 5.6)
+SMALLEST = 0.001  # smallest width, as in the code of Burley2012
+COAT_WIDTH = 0.25  # alpha of the coat's masking term, for any gloss (Burley2012, sec. 5.6)
 
 
 class Pieces(NamedTuple):
     """The terms of the model, times cos theta_i.
 
-    diffuse   retro-reflection at grazing angles, toward subsurface scattering
+    diffuse   with retro-reflection at grazing angles, blended toward subsurface scattering
     specular  GTR2 lobe
     sheen     Schlick's (1 - cos)^5 at the half vector
     coat      GTR1 lobe
@@ -60,28 +60,30 @@ class Disney(BSDF):
 
     f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
     f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
-    D is GTR2 (GGX) of alpha = roughness^2, stretched by 1 / aspect, aspect^2 = 1 - 0.9 anisotropic; G is Smith's; F is
-    Schlick's of 0.08 specular, tinted, or of the base color for metal. f_r is a second lobe, GTR1 of width 0.1 to
-    0.001, F0 = 0.04. Tints are the base color over the mean of its channels (in the paper over its luminance).
 
-    The lobes are simply added, as artists preferred: at grazing views, and with several large parameters, it reflects
-    more than it receives, and rough metal loses multiply scattered light. Reciprocal.
+    D is GTR2 (GGX) with alpha = roughness^2, stretched by 1 / aspect with aspect^2 = 1 - 0.9 anisotropic. G is Smith's,
+    and F is Schlick's with F0 = 0.08 specular, tinted, or with the base color for metal. f_r is a second lobe, GTR1
+    with a width from 0.1 to 0.001 and F0 = 0.04. Tints are the base color divided by the mean of its channels (in the
+    paper, by its luminance).
+
+    The lobes are simply added, as artists preferred: at grazing angles, or if several parameters are large, the model
+    reflects more light than it receives, while rough metal loses multiply scattered light. Reciprocal.
     """
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
     subsurface: Number = number(
-        default=0.0, doc="flattens the diffuse lobe, as subsurface scattering", low=0.0, high=1.0
+        default=0.0, doc="flattens the diffuse lobe, as subsurface scattering does", low=0.0, high=1.0
     )
     metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0)
-    specular: Number = number(default=0.5, doc="F0 over 0.08, of a dielectric", low=0.0, high=1.0)
+    specular: Number = number(default=0.5, doc="F0 of a dielectric, divided by 0.08", low=0.0, high=1.0)
     specular_tint: Number = number(default=0.0, doc="fraction of the base color in F0", low=0.0, high=1.0)
-    roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
+    roughness: Number = number(default=0.5, doc="square root of alpha", low=0.0, high=1.0)
     anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0)
     rotation: Angle = microfacet.rotation_angle()
-    sheen: Number = number(default=0.0, doc="an extra rim, for cloth", low=0.0, high=1.0)
+    sheen: Number = number(default=0.0, doc="strength of an additional rim, for cloth", low=0.0, high=1.0)
     sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
-    clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
-    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
+    clearcoat: Number = number(default=0.0, doc="strength of the clearcoat lobe", low=0.0, high=1.0)
+    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
 
     fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default, and no factor
     limits: ClassVar[tuple[Limit, ...]] = (
@@ -93,7 +95,7 @@ class Disney(BSDF):
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the lobes are added, and rough diffuse reflection gains at grazing angles: their sum has no bound",
+            "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
             2.5,
             certain=False,
         ),
@@ -124,7 +126,7 @@ class Disney(BSDF):
 
     @function
     def _tint(self) -> Spectrum:
-        """The base color over its mean, 1 for black."""
+        """The base color divided by its mean; 1 for black."""
         level = mean(self.base_color)
         some = level > 0.0
         return where(some, self.base_color / where(some, level, 1.0), ops.ones_like(self.base_color))
@@ -143,7 +145,7 @@ class Disney(BSDF):
         return (a2 - 1.0) * inv_pi / (log(a2) * (frame.sin2(h) + a2 * sqr(h.z)))
 
     def _pieces(self, wo: Direction, wi: Direction) -> Pieces:
-        """The four parts for two directions above the surface."""
+        """The four terms for two directions above the surface."""
         h, cos = facet(wo, wi)
         at_o, at_i, at_h = _schlick(wo.z), _schlick(wi.z), _schlick(cos)
         rough = self.roughness * sqr(cos)
@@ -160,7 +162,7 @@ class Disney(BSDF):
         specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / four)
         satin = vec2(COAT_WIDTH + ops.zeros_like(cos), COAT_WIDTH + ops.zeros_like(cos))
         coat_g = masking.masking_shadowing("smith-separable", ndf, wo, wi, h, satin)
-        strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of Fresnel's
+        strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of F
         coat = self._coat_density(h) * coat_g * strength / four
         tint = 1.0 + (self._tint() - 1.0) * self.sheen_tint
         return Pieces(
@@ -186,7 +188,7 @@ class Disney(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Direction:
-        """Probabilities of the specular lobe, of the coat, and of the cosine, by their approximate albedos."""
+        """Probabilities of the specular lobe, the coat and the cosine, by their approximate albedos."""
         at_o = _schlick(wo.z)
         f0 = mean(self._normal_reflectance())
         specular = _mix(f0, 1.0, at_o)
@@ -240,5 +242,5 @@ def _schlick(cos: Scalar) -> Scalar:
 
 @function
 def _mix(a: Scalar | float, b: Scalar | float, share: Scalar) -> Scalar:
-    """a at share 0, b at share 1."""
+    """Linear interpolation: a at share = 0, b at share = 1."""
     return a + (b - a) * share

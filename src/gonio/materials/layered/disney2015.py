@@ -18,10 +18,10 @@ from ..microfacet.microfacet import rotation_angle
 from ._openpbr_derived import Between
 from .openpbr import OpenPBR
 
-COAT_INDEX = 1.5  # of the clearcoat
-SATIN, GLOSS = 0.1, 0.001  # its widths at gloss 0 and 1
-STRENGTH = 0.25  # of a coat with `clearcoat` 1
-STRETCH = 0.9  # amount of stretch at `anisotropic` 1
+COAT_INDEX = 1.5  # refractive index of the clearcoat
+SATIN, GLOSS = 0.1, 0.001  # widths of the clearcoat at gloss 0 and 1
+STRENGTH = 0.25  # weight of the coat at `clearcoat` = 1
+STRETCH = 0.9  # amount of stretch at `anisotropic` = 1
 
 
 class _Slabs(OpenPBR):
@@ -54,17 +54,18 @@ class _Slabs(OpenPBR):
 class DisneyBSDF(BSDF):
     """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls by one parameter set.
 
-    The parameters are those of Burley2015: `disney` of 2012 with the index in place of `specular`, `spec_trans` for
-    glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the paper's lobes: GGX
-    of alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic), F by the index, for metal Schlick's of the base
-    color, glass tinted by the root of the base color at each crossing. Terms that the paper adds are layered here, so
-    no energy is gained, and multiple scattering between facets is included: the slabs are `openpbr`'s, and so are their
-    laws.
+    The parameters are those of Burley2015, which has those of `disney` with the index in place of `specular`, and
+    `spec_trans` for glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the
+    lobes of the paper: GGX with alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic). F follows from the index;
+    for metal, it is Schlick's approximation with the base color. Glass is tinted by the square root of the base color
+    at each crossing. Terms that the paper adds are layered here, so no energy is gained, and multiple scattering
+    between facets is included. The slabs are those of `openpbr` and obey the same laws.
 
-    Differences from the paper: the diffuse lobe is `eon` of that roughness under the dielectric (the paper's has its
-    own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert), sheen is the `sheen` of fibers, the
-    coat is GGX of the paper's GTR1 width, masking is height-correlated, tints are the base color over its largest
-    channel, and a thin sheet's transmission is as rough as its reflection. docs/openpbr.md has the differences in size.
+    Differences from the paper: the diffuse lobe is `eon` of the same roughness under the dielectric (the lobe of the
+    paper has its own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert); sheen is the `sheen` of
+    fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are the base color
+    divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection. docs/openpbr.md
+    states how large these differences are.
     """
 
     name: ClassVar[str] = "disney2015"
@@ -73,23 +74,23 @@ class DisneyBSDF(BSDF):
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
     metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
-    roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
+    roughness: Number = number(default=0.5, doc="square root of alpha", low=0.0, high=1.0)
     anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0)
     rotation: Angle = rotation_angle()
-    eta: Number = number(default=1.5, doc="index inside over index outside", low=1.0, high=3.0)
+    eta: Number = number(default=1.5, doc="index inside divided by index outside", low=1.0, high=3.0)
     specular_tint: Number = number(
         default=0.0, doc="fraction of the base color in a dielectric's reflection", low=0.0, high=1.0
     )
     spec_trans: Number = number(default=0.0, doc="fraction of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
-    sheen: Number = number(default=0.0, doc="fibers on a dielectric", low=0.0, high=1.0, off=0.0)
+    sheen: Number = number(default=0.0, doc="weight of fibers on a dielectric", low=0.0, high=1.0, off=0.0)
     sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
-    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
+    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
     diff_trans: Number = number(
-        default=0.0, doc="of a thin sheet: 0 is opaque, 1 even on both sides, 2 transmits all light", low=0.0, high=2.0
+        default=0.0, doc="for a thin sheet: 0 is opaque, 1 equal to both sides, 2 fully transmitted", low=0.0, high=2.0
     )
     flatness: Number = number(default=0.0, doc="1 removes the roughness of the diffuse lobe", low=0.0, high=1.0)
-    thin: bool = flag(default=False, doc="whether it is a sheet without an interior")
+    thin: bool = flag(default=False, doc="whether the surface is a sheet without an interior")
 
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
@@ -99,7 +100,7 @@ class DisneyBSDF(BSDF):
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the sheen's table of lobes depends on the viewer's direction only",
+            "the table of lobes for the sheen depends on the view direction only",
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
@@ -114,7 +115,7 @@ class DisneyBSDF(BSDF):
             certain=False,
         ),
         "linearity": KnownViolation(
-            "tints are ratios of the base color, and glass takes its root", 10.0, certain=False
+            "tints are ratios of the base color, and glass uses its square root", 10.0, certain=False
         ),
     }
 
@@ -152,7 +153,7 @@ class DisneyBSDF(BSDF):
         one, white = ops.ones_like(self.roughness), ops.ones_like(colour)
         most = max_component(colour)
         tint = where(most > 0.0, colour / where(most > 0.0, most, 1.0), white)
-        # alpha r^2 / a and r^2 a, a^2 = 1 - 0.9 anisotropic: the same ratio, and the roughness whose squares add up so
+        # widths r^2 / a and r^2 a, a^2 = 1 - 0.9 anisotropic: a roughness for the same ratio and sum of squares
         low = 1.0 - STRETCH * self.anisotropic
         wide = sqrt(sqrt(0.5 * (low + 1.0 / low)))
         rest = {

@@ -1,26 +1,27 @@
 """Light between a coat and the material below: the interreflections of base and coat.
 
-Light that the base scatters along w leaves the coat by the fraction T(w) t(w), and returns by k(w) = (1 - T(w)) t(w)^2,
-mirrored: T is the interface's transmittance from inside, t the transmittance of one crossing. With the base's operator
-B, all light that leaves is the series B + B k B + B k B k B + ...
+When the base scatters light along w, the fraction T(w) t(w) of it leaves the coat, and the fraction
+k(w) = (1 - T(w)) t(w)^2 returns to the base, mirrored. T is the transmittance of the interface from inside, and t is
+that of one crossing of the coat. With the scattering operator B of the base, all light that leaves is the series
+B + B k B + B k B k B + ...
 
-The sum is computed on 33 directions, averaged over azimuth: rows of a matrix P are sampled with the base's lossless
-variant (`BSDF.lossless`), k is inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being the light that leaves
-after the first bounce. A smooth interface transmits light along one direction; for a rough one, glass with Kulla-Conty
-compensation, samples determine where light enters and how much leaves.
+The sum is computed for 33 directions, averaged over azimuth: the rows of a matrix P, which includes k, are sampled with
+the lossless variant of the base (`BSDF.lossless`), and X = (1 - P)^-1 E1 solves the series, where E1 is the light that
+leaves after the first bounce. A smooth interface transmits light along one direction. A rough interface is glass with
+Kulla-Conty compensation, for which samples determine where light enters and how much of it leaves.
 
-A base's own Fresnel reflectance is known for its channels, from their values at the lossless variant's samples with
-every albedo 1; for any other color it is interpolated between them, black and white. The series therefore holds for
-every channel of a metal, with the rise of its reflectance at grazing angles, and for any color by which the rest of the
-base varies.
+The base's own Fresnel reflectance is known for its channels: their values, with every albedo set to 1, are computed at
+the samples of the lossless variant. For any other color, it is interpolated between these channels, black and white.
+The series is therefore valid for every channel of a metal, including the rise of its reflectance at grazing angles, and
+for any color by which the rest of the base varies.
 
-The light that leaves, B(o), is then divided into two terms whose sum is exact:
+The light that leaves toward o is then divided into two terms whose sum is exact:
 
-    lobe         the base's own, refracted, times a factor: as much of it as stays below B at every o. Over Lambert it
-                 is everything (Saunderson1942), and nearly everything for a narrow lobe under a smooth coat
-    rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, reciprocal like Kulla-Conty's
+    lobe         the base's own, refracted, times the largest factor for which it does not exceed this light at any o.
+                 Over Lambert it is all of the light (Saunderson1942), for a narrow lobe under a smooth coat nearly all
+    rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, which is reciprocal like Kulla-Conty's
 
-Both are tables over the color a and over u, the transmittance of one crossing at normal incidence.
+Both terms are tables over the color a and over u, the transmittance of one crossing at normal incidence.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ Floats: TypeAlias = "NDArray[np.floating]"
 
 HALF = 16  # steps of the directions that leave, and of those that are totally reflected
 POINTS = 1 << 13  # samples per node
-NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R behaves like it at grazing angles
+NODES = 97  # nodes of the tables, at equal steps of the square root of the cosine outside, like R at grazing angles
 ROUGH = 33  # nodes at which a rough interface is sampled
 COLOURS, LEFT = 13, 13  # steps of the color and of the transmittance u, see `colour_place` and `left_place`
 MIN_LEFT = 0.03  # the smallest u, the first step
@@ -61,11 +62,11 @@ EPSILON = 1e-9
 class LayerTables(NamedTuple):
     """The coat's interior as tables.
 
-    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the fraction of the base's samples to
-           be replaced by a cosine, the transmittance of a rough interface for the base's lobe, and R's part beyond one
-           bounce
-    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None if there is none
-    bounced  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
+    coat     over the square root of the cosine outside, 0 to 1: the albedo R of the interface, the fraction of the
+             base's samples to be replaced by a cosine, the transmittance of a rough interface for the base's lobe, and
+             `_Interface.beyond`
+    rest     over that root, `colour_place` and `left_place`: the separable lobe divided by a u^2; None if there is none
+    bounced  over the latter two: 1 / factor of the lobe, and the norm of the separable lobe divided by a u^2
     """
 
     coat: Table
@@ -74,19 +75,19 @@ class LayerTables(NamedTuple):
 
 
 def colour_place(a: Array) -> Array:
-    """The coordinate of a color in the tables: in a / (2 - a) a series 1 / (1 - a k) is nearly linear, for k = 1 / 2
-    exactly."""
+    """The coordinate of a color in the tables: a series 1 / (1 - a k) is nearly linear in a / (2 - a), and exactly
+    linear for k = 1 / 2."""
     return a / (2.0 - a)
 
 
 def left_place(u: Array) -> Array:
     """The coordinate of the transmittance u in the tables: denser near 1, where multiply reflected light decays slowly.
-    1 is the last node but one, so that a clear coat has a derivative with respect to its absorption."""
+    u = 1 is the last node but one, so that a clear coat has a derivative with respect to its absorption."""
     return u / (3.0 - 2.0 * u) * ((LEFT - 2.0) / (LEFT - 1.0))
 
 
 class Coated(Protocol):
-    """The interface of a coat in this module: plain values."""
+    """The attributes of a coat that this module reads: plain values."""
 
     base: BSDF
     index: object
@@ -116,8 +117,8 @@ def tables_of(coat: BSDF) -> LayerTables:
 
 
 def _bright(coat: BSDF) -> BSDF:
-    """The coat without parameters that do not affect the tables: its own color, and every albedo in the base, set to
-    1."""
+    """The coat with fixed values of all parameters that do not affect the tables: no absorption, and every albedo in
+    the base 1."""
     values: dict[str, object] = {"absorption": 0.0, "depth": 1.0, "bounces": "coloured"}
     for leaf in tree.leaves(coat):
         if leaf.parameter.numeric and leaf.parameter.white is not None and leaf.value is not None:
@@ -126,8 +127,8 @@ def _bright(coat: BSDF) -> BSDF:
 
 
 def colour_of(base: BSDF, up: Direction) -> Spectrum:
-    """a: the tint of a bound base at normal incidence, over that of its lossless variant; for a base that is its own
-    lossless variant, over its brightest channel."""
+    """a: the tint of a bound base at normal incidence, divided by that of its lossless variant; for a base that is its
+    own lossless variant, divided by its brightest channel."""
     tint = base.tint(up)
     white = base.lossless()
     if white is base:
@@ -143,7 +144,7 @@ def _colors(base: BSDF) -> Floats:
 
 
 def find(coat: Coated) -> LayerTables:
-    """The tables of a coat whose albedos are 1, with uniform values."""
+    """The tables of a coat with uniform values, all albedos of which are 1."""
     index = float(coat.index)  # type: ignore[arg-type]
     outside = np.linspace(0.0, 1.0, NODES) ** 2
     face = _interface(coat, index)
@@ -176,10 +177,9 @@ class _Interface(NamedTuple):
 
     reflected  R from outside, by the cosine outside
     out        T from inside, by the position (`_places`)
-    beyond     square root, normalized, of R's part beyond the facets' first reflection
-    entering   None for a smooth one; else, for `ROUGH` positions outside, weights, cosines and positions of samples
-               inside
-    returning  likewise for the positions inside: light that is reflected back
+    beyond     R without the facets' first reflection, scaled so that beyond(o) beyond(i) is the lobe of this light
+    entering   for `ROUGH` positions outside, weights, cosines and positions of samples inside; None if it is smooth
+    returning  the same for the positions inside, of light that is reflected back
     """
 
     reflected: _Curve
@@ -189,7 +189,7 @@ class _Interface(NamedTuple):
     returning: tuple[Floats, Floats, Floats] | None
 
     def lobe(self, x: Floats) -> Floats:
-        """The transmittance for the base's lobe at each end: for a narrow lobe T(o) inward and T(i) outward."""
+        """The transmittance for the base's lobe for each direction: the geometric mean of those inward and outward."""
         crossing: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, EPSILON))))
         return crossing
 
@@ -223,7 +223,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
     cosine = down.wi[:, 2].reshape(len(mu), POINTS)
     leaves = (weight * (cosine > 0.0)).sum(1)
     stays, returning_cosine = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
-    # R of one reflection, by quadrature, and the part beyond it
+    # R of one reflection, by quadrature, and the rest of R
     single = tree.replace(glass, {"transmission": False})
     angles = (0.0,) if x_width == y_width else (0.0, 0.25 * np.pi, 0.5 * np.pi)
     fine = np.linspace(0.0, 1.0, NODES)
@@ -247,8 +247,8 @@ def _directions(mu: Floats, lattice: Floats) -> Floats:
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
-    """(positions, cosines inside) of the nodes: 0 to 1 is the root of the cosine outside for light that can leave,
-    whose amount varies fast at grazing angles; -1 to 0 for totally reflected light."""
+    """(positions, cosines inside) of the nodes. Positions from 0 to 1 are the square root of the cosine outside, for
+    light that can leave, whose amount varies fast at grazing angles; those from -1 to 0 are for total reflection."""
     place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
@@ -267,10 +267,10 @@ def _place_of(cosine: Floats, index: float) -> Floats:
 class _Draws(NamedTuple):
     """Samples of the lossless base for light inside.
 
-    place, mu           of the nodes
+    place, mu           positions and cosines of the nodes
     weight              of each sample at each node (nodes, POINTS)
     cosine, position    of the sampled directions
-    colors, share      of black, the base's channels and white, ascending; the factor of each for samples of the others
+    colors, share       black, the base's channels and white, ascending; the factor on each sample's weight for each
     """
 
     place: Floats
@@ -310,7 +310,7 @@ def _drawn(base: BSDF, index: float) -> _Draws:
 
 
 class _Sum(NamedTuple):
-    """The series at one u, per color: see `LayerTables`; and the rest's fraction of the light leaving a white base."""
+    """The series at one u, per color (see `LayerTables`), and the fraction of `rest` in the light of a white base."""
 
     rest: Floats
     over_factor: Floats
@@ -372,12 +372,12 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: fl
 
 
 def _continued(values: list[Floats]) -> Floats:
-    """Values at each u, last, extended linearly by one more."""
+    """The values at each u, along the last axis, extended linearly by one node."""
     return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
 
 
 def _onto(weight: Floats, position: Floats, n: int) -> Floats:
-    """Samples of each row distributed to the nodes adjacent to their positions -1 to 1, (rows, n)."""
+    """The weights of each row, distributed to the nodes adjacent to their positions from -1 to 1, (rows, n)."""
     scaled = (position + 1.0) * (0.5 * (n - 1))
     cell = np.minimum(scaled, n - 1 - EPSILON).astype(int)
     part, row = scaled - cell, np.arange(len(weight))[:, None] * n

@@ -14,7 +14,7 @@ from . import _openpbr_tables as tables
 from ._openpbr_derived import Between
 from ._openpbr_slabs import _OpenPBR
 
-MAX_RAYS = 1 << 18  # for which derived values are stored, about a hundred numbers each: halves the compiled code
+MAX_RAYS = 1 << 18  # that store derived values, about a hundred numbers each, which halves the compiled code
 
 
 class OpenPBR(_OpenPBR):
@@ -23,16 +23,17 @@ class OpenPBR(_OpenPBR):
     f = opacity {F f_fuzz + (1 - F E_fuzz) [C f_coat + (1 - C + C T W D) f_base]} + the light passing straight through
     f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse}, where opaque
 
-    with the weights F, C, M of fuzz, coat and metal, E the albedo of a rough dielectric, T the coat's color on both
-    ways, D the darkening by interreflection under it. W is the transmittance of the coat's surface: by `layering`,
-    (1 - E_coat(wo)), as in the specification's reduction of layers to lobes, or a product of one factor per direction
-    that conserves all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz `sheen`, metals are F82 with
-    multiple scattering, glass refracts as `dielectric` and includes multiple scattering.
+    F, C and M are the weights of fuzz, coat and metal, E is the albedo of a rough dielectric, T the color of the coat
+    for the two crossings, and D the darkening by interreflection under the coat. W is the transmittance of the coat's
+    surface: depending on `layering`, 1 - E_coat(wo), as in the specification's reduction of layers to lobes, or a
+    product of one factor per direction that conserves all light of a white base (docs/openpbr.md). f_diffuse is `eon`,
+    f_fuzz is `sheen`, metal is F82 with multiple scattering, and glass is `dielectric` with multiple scattering.
 
-    The parameters are the specification's. Below a roughness of 0.01 base and coat are mirrors. Indices run from 1 to
-    5. Subsurface scattering is local: with `geometry_thin_walled` as specified, else a diffuse lobe of its color, the
-    limit of radius 0, with a warning. Volume scattering, dispersion and emission are errors, since they are not
-    properties of a surface. transmission_depth > 0 gives absorption inside, which Gonio's integrators apply.
+    The parameters are those of the specification. Below a roughness of 0.01, base and coat are mirrors. Indices range
+    from 1 to 5. Subsurface scattering is local: with `geometry_thin_walled` it is as specified; otherwise it is a
+    diffuse lobe of its color, the limit of radius 0, with a warning. Volume scattering, dispersion and emission raise
+    an InputError, since they are not properties of a surface. transmission_depth > 0 causes absorption inside, which
+    Gonio's integrators apply.
     """
 
     name: ClassVar[str] = "openpbr"
@@ -71,21 +72,21 @@ class OpenPBR(_OpenPBR):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "fuzz is a table of the viewer's direction only, and so is a coat with layering `albedo`",
+            "fuzz depends on the view direction only, and so does a coat with layering `albedo`",
             lambda model: 4.0 if model.has("fuzz_weight") or model.by_albedo() else 0.0,
             certain=False,
         ),
         "energy": KnownViolation(
-            "tables of the layers' transmittance are interpolated, and isotropic, which approximates two widths",
+            "the transmittance of layers is interpolated in isotropic tables, which approximate anisotropic layers",
             lambda model: 0.15 if model.any_anisotropic else 0.01,
             certain=False,
         ),
         "limits": KnownViolation(
-            "the table of a metal's multiple scattering is coarser for two widths, and for widths that vary",
+            "the table of multiple scattering in metal is coarser for two widths, and for widths that vary",
             0.02,
             certain=False,
         ),
         "linearity": KnownViolation(
-            "colors of layers multiply, and interreflected light applies them more than once", 10.0, certain=False
+            "the colors of layers are multiplied, for interreflected light more than once", 10.0, certain=False
         ),
     }

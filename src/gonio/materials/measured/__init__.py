@@ -1,1 +1,1 @@
-"""The material for a table of measured values."""
+"""The material that reads a table of measured values."""

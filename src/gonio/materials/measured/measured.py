@@ -16,20 +16,20 @@ from ...ops import Direction, Mode, Scalar, Spectrum, where
 class Measured(BSDF):
     """A table of measured values, interpolated in its own coordinates (course notes, part B).
 
-    Files: MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), networks (.npz, as
-    FILE.npz:NAME) and Gonio's .gonio; see docs/measured.md for each. Data are not corrected: negative values remain
-    negative, an albedo over 1 remains over 1, and a table that is not reciprocal is not made so. Reflection only, black
-    from below. A table is sampled by its own densities (RGL), or by a density computed from its values.
+    Reads MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), networks (.npz, as
+    FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not corrected: negative values
+    remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal is not made so. Reflection
+    only; black from below. A table is sampled by its own densities (RGL) or by a density computed from its values.
     """
 
     file: str = file(
         default=SAMPLE,
-        doc="file of measured values; after a colon the item, of files that hold several; `sample` comes with Gonio",
+        doc="file of measured values; `FILE:ITEM` selects one of several in a file; `sample` is included in Gonio",
     )
     only_rgb: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the measured albedo is over 1, and is not corrected",
+            "the measured albedo exceeds 1 and is not corrected",
             lambda model: max(1.05 * float(model.table.albedos().max()) - 1.0, 0.0),
             certain=False,
         ),
@@ -37,17 +37,17 @@ class Measured(BSDF):
             "measured values are not corrected", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
         ),
         "positivity": KnownViolation(
-            "values below 0 were measured, and are not corrected; as a fraction of the largest",
+            "negative values were measured and are not corrected; relative to the largest value",
             lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
             certain=False,
         ),
         "isotropy": KnownViolation(
-            "the table is not mirror-symmetric, or its lookup uses sums that lose digits where a lobe ends",
+            "the table is not mirror-symmetric, or its lookup computes sums that lose digits where a lobe ends",
             lambda model: 0.0 if model.table.mirrored else 2.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "the lookup in the table uses sums that lose digits where a lobe ends",
+            "the lookup in the table computes sums that lose digits where a lobe ends",
             lambda model: 0.1 if model.table.sums else 0.0,
             certain=False,
         ),
@@ -65,7 +65,7 @@ class Measured(BSDF):
 
     @property
     def table(self) -> Measurement:
-        """The table behind it."""
+        """The table that `file` contains."""
         table: Measurement = vars(self)["_table"]
         return table
 
@@ -89,7 +89,7 @@ class Measured(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A direction with that density."""
+        """A direction with the density `pdf`."""
         wi, pdf = self.table.draw(wo, u)
         pdf = where(above(wo, wi), pdf, 0.0)
         value = self.table.value(wo, wi)

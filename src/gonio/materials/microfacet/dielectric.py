@@ -24,15 +24,15 @@ from .microfacet import Terms
 
 
 class _Facet(NamedTuple):
-    """The facet that joins a pair of directions.
+    """The facet that joins a pair of directions by reflection or refraction.
 
-    wo, wi        the pair, in the frame of the widths
+    wo, wi        the pair, in the frame of the anisotropy
     m             normal of the facet, m.z >= 0
     dot_o, dot_i  o.m and i.m
     reflects      whether wi lies on wo's side
-    lit           whether a rough lobe joins them
-    alpha         widths
-    spread        |o.m| dm/dwi (Walter2007, eq. 14), in refraction (eq. 17) over eta^2
+    lit           whether the pair lies in a rough lobe
+    alpha         widths along x and y
+    spread        |o.m| dm/dwi (Walter2007, eq. 14); for refraction (eq. 17) divided by eta^2
     """
 
     wo: Direction
@@ -49,48 +49,48 @@ class _Facet(NamedTuple):
 class Dielectric(microfacet._Microfacet):
     """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
 
-    With eta = eta_i / eta_o (indices on the wi and wo sides) and the facet's normal m along +-(wo + eta wi):
-    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form for radiance, which includes the
-    factor 1 / eta^2 by which radiance shrinks; mode "importance" omits it. alpha below 1e-4 is smooth glass, and
-    eta = 1 is no surface. `transmission=False` leaves only the reflection.
+    With eta = eta_i / eta_o (the indices on the sides of wi and wo) and the facet's normal m along +-(wo + eta wi):
+    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2). This is the form for radiance, with the
+    factor 1 / eta^2 for the change of radiance on refraction; the mode "importance" omits this factor. With alpha below
+    1e-4, the glass is smooth; with eta = 1, there is no surface. `transmission=False` keeps only the reflection.
 
-    Absorption inside (`absorption`, by Beer and Lambert exp(-absorption length)) and the choice among overlapping media
-    (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
+    Absorption inside (`absorption`, by the Beer-Lambert law exp(-absorption length)) and the choice among overlapping
+    media (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
     depends on them.
     """
 
-    eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
+    eta: Index = index(default=1.5, doc="index inside divided by index outside, or a substance", low=0.2, high=5.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
-    albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
-    transmission: bool = flag(default=True, doc="whether refracted light is transmitted, or lost")
+    albedo: Colour = microfacet.albedo_factor("factor on all reflected and transmitted light")
+    transmission: bool = flag(default=True, doc="whether refracted light is transmitted; otherwise it is lost")
     sampling: str = microfacet.sampling_choice()
     absorption: Colour = spectrum(
         default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
-        default=0.0, doc="among overlapping media the highest counts", low=-1e6, high=1e6, inside=True
+        default=0.0, doc="where media overlap, the highest counts", low=-1e6, high=1e6, inside=True
     )
 
     preset_kind: ClassVar[str] = "medium"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
-        """Transparent media by name: eta."""
+        """Transparent media by name, with eta."""
         media = indices.media().items()
         return {name: Preset(m.title, {"eta": indices.DispersiveIndex(m)}, m.source) for name, m in media}
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """F, by name, at a facet seen at cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F, by the name of its formula, at cosines of incidence cos_o and transmission cos_t (0: total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
     def _relative_eta(self, wo: Direction) -> Scalar:
-        """Index on the far side over index on wo's side."""
+        """Index on the far side divided by the index on wo's side."""
         return where(wo.z >= 0.0, self.eta, 1.0 / self.eta)
 
     @function
@@ -102,8 +102,8 @@ class Dielectric(microfacet._Microfacet):
         return where(h.z < 0.0, -h, h)
 
     def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
-        """The facet that joins a pair of directions, along the axes of the anisotropy; rotated last, see
-        `Conductor`."""
+        """The facet that joins a pair of directions, in the frame of the anisotropy; rotated last, see
+        `_Reflector._facet`."""
         m = self._normal(wo, wi, eta)
         wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
         alpha, smooth = self._widths()
@@ -111,10 +111,10 @@ class Dielectric(microfacet._Microfacet):
         reflects = wo.z * wi.z > 0.0
         spread = 0.25 + zeros_like(dot_o)
         if self.transmission:
-            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which is accurate near eta = 1
+            # by Snell's law |o.m + eta i.m| is |1 - eta^2| / (|o.m| + eta |i.m|), which is accurate near eta = 1
             thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
             spread = where(reflects, spread, abs(dot_i * dot_o) * thinned)
-        # a facet seen from its back, or one that would refract to the wrong side, is never sampled
+        # a facet seen from behind, or one that would refract to the wrong side, is never sampled
         lit = (dot_o * wo.z > 0.0) & (dot_i * wi.z > 0.0) & ~smooth
         if not self.transmission:
             lit = lit & reflects
@@ -123,7 +123,7 @@ class Dielectric(microfacet._Microfacet):
     def _reflectance_at(self, facet: _Facet, eta: Scalar) -> Scalar:
         """F of the facet."""
         cos_o = abs(facet.dot_o)
-        # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
+        # for refraction, wi is known: the root in Snell's law would lose its cosine near the critical angle
         cos_t = where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), abs(facet.dot_i))
         return self.reflectance(cos_o, cos_t, eta)
 
@@ -136,18 +136,18 @@ class Dielectric(microfacet._Microfacet):
         return g
 
     def _value(self, facet: _Facet) -> Scalar:
-        """Radiance's eval without albedo and F."""
+        """`eval` for radiance, without albedo and F."""
         d_g = distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet)
         facets = safe_div(d_g, abs(facet.wo.z))
         return where(facet.lit, facets * facet.spread, 0.0)
 
     def _density(self, facet: _Facet, eta: Scalar) -> Scalar:
-        """The pdf without the probability of the lobe: density of the normal times dm/dwi."""
+        """`pdf` without the probability of the lobe: the density of the normal times dm/dwi."""
         density = microfacet.pdf_per_cosine(self, facet.wo, facet.m, facet.alpha)
         return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
 
     def _squeeze(self, reflects: Mask, eta: Scalar) -> Scalar:
-        """eta^2 for refraction: by how much solid angle shrinks on the way in, and radiance grows."""
+        """eta^2 for refraction, 1 for reflection: the factor by which solid angle shrinks and radiance grows inside."""
         return where(reflects, 1.0, sqr(eta))
 
     def _share(self, f: Scalar) -> Scalar:
@@ -155,12 +155,12 @@ class Dielectric(microfacet._Microfacet):
         return f if self.transmission else ones_like(f)
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
-        """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
+        """albedo times F or 1 - F of the chosen lobe, divided by the probability of choosing it, which cancels F."""
         return self.albedo if self.transmission else self.albedo * self._reflectance_at(facet, eta)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The sum of both lobes times |cos theta_i|; 0 where alpha makes them deltas."""
+        """The sum of the two lobes times |cos theta_i|; 0 where they are delta lobes."""
         eta = self._relative_eta(wo)
         facet = self._facet(wo, wi, eta)
         f = self._reflectance_at(facet, eta)
@@ -207,10 +207,10 @@ class Dielectric(microfacet._Microfacet):
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of the light, by the exact equations; the Fresnel kind affects only its amount."""
+        """All light, polarized by the exact equations; the chosen Fresnel kind affects only its amount."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.normal_like(wo), m)  # equal indices pass light straight through, without a normal
+        m = where(delta, frame.normal_like(wo), m)  # equal indices: light goes straight on, no normal
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
@@ -236,7 +236,7 @@ class Dielectric(microfacet._Microfacet):
         return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Pair, Mask]:
-        """Widths, and whether the surface is smooth; if both indices are equal light passes straight through."""
+        """(widths, whether the surface is smooth); with equal indices it is, as light passes straight through."""
         alpha, smooth = widths(self.alpha)
         if self.transmission:
             smooth = smooth | (abs(self.eta - 1.0) < MATCHED)
@@ -272,13 +272,13 @@ class Dielectric(microfacet._Microfacet):
         return self.reflectance(one, one, self.eta) * self.albedo
 
     def mean_reflectance(self, average: str = "exact") -> Scalar:
-        """F_avg from the side of the less dense medium."""
+        """F_avg for light from the side with the lower index."""
         return fresnel.kind(self.fresnel).dielectric_average(self.eta)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """For smooth glass, which absorbs nothing; without transmission F."""
+        """That of smooth glass: `albedo`, since nothing else is absorbed; without transmission, `albedo` times F."""
         if self.delta != "always":
             return None
         albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))
@@ -291,6 +291,6 @@ class Dielectric(microfacet._Microfacet):
         return albedo * backend.to_numpy(f, len(mu))[:, None]
 
 
-# Refraction deflects light by about (eta - 1) tan: below this difference of indices the deflection is lost in the
-# rounding of a float32 direction (6e-8), and the normal that joins two directions cannot be determined.
+# Refraction deflects light by about (eta - 1) tan theta. Below this difference of indices, the deflection is lost in
+# the rounding error of a float32 direction (6e-8), so the normal that joins two directions cannot be determined.
 MATCHED = 1e-6

@@ -22,12 +22,12 @@ def thickness_number() -> Number:
 
 def film_index() -> Number:
     """Declare the film's index."""
-    return number(default=1.38, doc="index of the film, over the outside's", low=1.0, high=3.0)
+    return number(default=1.38, doc="index of the film, relative to the outside", low=1.0, high=3.0)
 
 
 def film_form() -> str:
-    """Declare how RGB colors follow from the waves."""
-    return choice("local", "how RGB colors follow from the waves", film.FORMS)
+    """Declare how RGB colors are computed from the interference."""
+    return choice("local", "how RGB colors are computed", film.FORMS)
 
 
 def bare(one: Conductor) -> Conductor:
@@ -38,9 +38,9 @@ def bare(one: Conductor) -> Conductor:
 class FilmConductor(Conductor):
     """Rough metal under a thin clear film: a `conductor` with the interference colors of F (Belcour2017).
 
-    Every facet carries the film. In spectral variants F is evaluated per wavelength; otherwise RGB colors follow by
-    `form`, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. The fringes of a film thicker than 2
-    or 3 um are closer than the 20 nm steps of `local`.
+    The film covers every facet. In spectral variants, F is evaluated per wavelength; otherwise, `form` determines how
+    RGB colors are computed, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. In films thicker
+    than 2 or 3 um, the fringes are closer together than the 20 nm steps of `local`.
     """
 
     if TYPE_CHECKING:  # the conductor's parameters, which mypy does not recognize as declared
@@ -60,7 +60,7 @@ class FilmConductor(Conductor):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F of the film, times albedo, at a facet seen at cos_theta."""
+        """albedo times F of the film, at the cosine of incidence on a facet."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * film.reflectance(cos_theta, self._film())
@@ -72,7 +72,7 @@ class FilmConductor(Conductor):
         return film.polarization(cos_theta, self._film())[0]
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """The integral of F, whatever `average` is; its rule of ten angles resolves films up to about 1 um."""
+        """F_avg by quadrature, whatever `average` is; its ten angles resolve films up to about 1 um."""
         if self.fresnel == "one":
             return ones_like(self.eta)
         one = ones_like(self.film_eta)

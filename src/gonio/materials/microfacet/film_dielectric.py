@@ -27,9 +27,9 @@ def bare(one: Dielectric) -> Dielectric:
 class FilmDielectric(Dielectric):
     """Rough glass under a thin clear film: a `dielectric` with the interference colors of F (Belcour2017).
 
-    Light that the film does not reflect is transmitted, in the complementary colors. The film is outside: from inside,
-    F is that of the refracted direction. Forms and limits are those of `film-conductor`. eta = film_eta = 1 is no
-    surface; a soap bubble is eta = 1 and film_eta = 1.33.
+    Light that the film does not reflect is transmitted, in the complementary colors. The film is on the outside: for
+    light from inside, F is that of the refracted direction. `form` and its limitations are those of `film-conductor`.
+    With eta = film_eta = 1, there is no surface; eta = 1 with film_eta = 1.33 is a soap bubble.
     """
 
     if TYPE_CHECKING:  # the dielectric's parameters, which mypy does not recognize as declared
@@ -46,12 +46,12 @@ class FilmDielectric(Dielectric):
         Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "delta": KnownViolation("it reflects by its film, not by the bare index", 1.0, certain=False)
+        "delta": KnownViolation("the reflectance is that of the film, not of the bare index", 1.0, certain=False)
     }
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
-        """F of the film at a facet seen at cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F of the film at the cosine of incidence cos_o, with transmitted cosine cos_t (0: total reflection)."""
         white = ones_like(self.albedo)
         if self.fresnel == "one":
             return white * ones_like(cos_o)
@@ -59,7 +59,7 @@ class FilmDielectric(Dielectric):
         return where(cos_t > 0.0, filmed, white)
 
     def _inside(self, eta: Scalar) -> Mask:
-        """Whether light comes from the glass, by the index on the far side over that on the near side."""
+        """Whether light comes from inside the glass; eta is the index on the far side divided by the near side's."""
         return (eta - 1.0) * (self.eta - 1.0) < 0.0
 
     def _film(self) -> film.Film:
@@ -70,8 +70,8 @@ class FilmDielectric(Dielectric):
         return mean(f) if self.transmission else ones_like(mean(f))
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
-        """The lobes are selected by their mean colors."""
-        _, smooth = self._widths()  # without refraction no facet can be determined from its directions
+        """As in `Dielectric`, except that the mean of the color is the probability of a lobe."""
+        _, smooth = self._widths()  # light that is not deflected determines no facet
         cos_o, cos_i = (
             where(smooth, abs(w.z), abs(dot)) for w, dot in ((facet.wo, facet.dot_o), (facet.wi, facet.dot_i))
         )
@@ -84,7 +84,7 @@ class FilmDielectric(Dielectric):
     def _polarization(  # type: ignore[override]
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-        """From inside by Stokes' relations: the same amounts, with the phases of time reversal."""
+        """As in `Dielectric`; from inside by the Stokes relations: equal amounts, with the phases of time reversal."""
         inside = self._inside(eta)
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         back, _ = film.polarization(where(inside, cos_t, cos_o), self._film())
@@ -102,11 +102,11 @@ class FilmDielectric(Dielectric):
 
     @property
     def microsurface(self) -> Microsurface | None:  # type: ignore[override]
-        """None: the energy tables are those of bare glass."""
+        """None, since the energy tables are those of bare glass."""
         return None
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]
-        """From outside: the integral of F, whose rule of ten angles resolves films up to about 1 um."""
+        """F_avg from outside, by quadrature; its ten angles resolve films up to about 1 um."""
         if self.fresnel == "one":
             return ones_like(self.albedo)
         one = ones_like(self.film_eta)
@@ -115,5 +115,5 @@ class FilmDielectric(Dielectric):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """For smooth glass, which absorbs nothing."""
+        """That of smooth glass; None without transmission."""
         return super().known_albedo(mu, phi, inner, nodes) if self.transmission else None

@@ -1,4 +1,4 @@
-"""A metal given by its colors."""
+"""A metal that is specified by its colors."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ class Metal(_Reflector):
     """Rough metal with artist-friendly parameters: a color at normal incidence, and a tint at the edge (F82-tint,
     Kutz2021).
 
-    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times Schlick's value there, so an edge of
-    1 is Schlick's curve; at 90 degrees F = 1. It is the metal of OpenPBR, and has no index: thin films and polarization
-    require a `conductor`.
+    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times the value of Schlick's curve there,
+    so an edge of 1 gives Schlick's curve; at 90 degrees, F = 1. This is the metal of OpenPBR. It has no refractive
+    index: thin films and polarization require a `conductor`.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "linearity": KnownViolation("for an edge below a half and a dark r0, F is clamped at 0", 1.0, certain=False),
-        "precision": KnownViolation("near the places where F is clamped at 0 it is a difference", 0.01, certain=False),
+        "linearity": KnownViolation("for an edge below 0.5 and a dark r0, F is clamped to 0", 1.0, certain=False),
+        "precision": KnownViolation(
+            "near the angles where F is clamped to 0, it is a difference of nearly equal numbers", 0.01, certain=False
+        ),
     }
 
     r0: Colour = spectrum(default=0.9, doc="reflectance at normal incidence", low=0.0, high=1.0, soft_high=True)
@@ -38,12 +40,12 @@ class Metal(_Reflector):
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
-    albedo: Colour = microfacet.albedo_factor("factor on everything reflected")
+    albedo: Colour = microfacet.albedo_factor("factor on all reflected light")
     sampling: str = microfacet.sampling_choice()
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F times albedo, at a facet seen at cos_theta."""
+        """albedo times F, at the cosine of incidence on a facet."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * self._curve(cos_theta)
@@ -52,7 +54,7 @@ class Metal(_Reflector):
         return f82(cos_theta, self.r0, self.edge * schlick(GRAZING, self.r0))
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """The curve's integral, whatever `average` is."""
+        """F_avg, the integral of the curve, whatever `average` is."""
         if self.fresnel == "one":
             return ones_like(self.r0)
         return mean_over_angles(self._curve)

@@ -1,4 +1,4 @@
-"""The base of the two microfacet materials: facts, sampling of normals, and D G over the cosines."""
+"""The base of the microfacet materials: facts, sampling of normals, and D G divided by the cosines."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...optics.ndf import NDF, distribution
 from ...optics.roughness import SMOOTH, widths
 
 SAMPLINGS = {
-    "visible": "normals as wo sees them",
-    "bounded": "visible normals whose reflection can lie above the surface (GGX; glass that transmits: as visible)",
-    "normals": "all normals, by D cos",
+    "visible": "the normals visible from wo",
+    "bounded": "visible normals whose reflection may lie above the surface (GGX only; dielectrics: as visible)",
+    "normals": "all normals, with density D cos",
 }
 
 
@@ -27,7 +27,7 @@ class Terms(NamedTuple):
 
     D  density of microfacet normals, 1/sr
     G  masking and shadowing
-    F  Fresnel reflectance, with the albedo
+    F  Fresnel reflectance, including the albedo
     """
 
     D: Scalar
@@ -36,12 +36,12 @@ class Terms(NamedTuple):
 
 
 def alpha_width() -> Width:
-    """Declare the width."""
+    """Declare the width of the microfacet distribution."""
     return width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
 
 
 def rotation_angle() -> Angle:
-    """Declare the rotation of the two widths."""
+    """Declare the rotation of the anisotropy's axes."""
     return angle(default=0.0, doc="rotation of the anisotropy's axes about the normal, from dp/du")
 
 
@@ -69,12 +69,12 @@ def sampling_choice() -> str:
 
 
 def albedo_factor(doc: str) -> Colour:
-    """Declare the factor on all light that leaves."""
+    """Declare the factor on all scattered light."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
 
 class _Microfacet(BSDF):
-    """A rough surface of mirrors or of glass: the shared properties of conductor and dielectric."""
+    """A rough surface of mirror or glass facets: the shared properties of conductor, metal and dielectric."""
 
     if TYPE_CHECKING:  # declared by each class, in the order of its constructor's arguments
         alpha: Width
@@ -112,13 +112,13 @@ class _Microfacet(BSDF):
         return Microsurface(*kinds, self.alpha, self.rotation, self._index(), self.albedo, self.transmits)
 
     def _index(self) -> Scalar | None:
-        """Index inside over index outside, for a dielectric; None for a conductor."""
+        """Index inside divided by index outside, for a dielectric; None for a conductor."""
         return None
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """For a smooth surface, whose single direction leaves with the weight of a sample."""
+        """That of a smooth surface: the weight of its only sample; None for a rough surface."""
         if self.delta != "always":
             return None
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
@@ -128,7 +128,7 @@ class _Microfacet(BSDF):
 
 
 def delta_of(alpha: object) -> Delta:
-    """Whether user-given widths make a delta lobe: alpha = 0 is a mirror."""
+    """Whether user-given widths result in a delta lobe: alpha = 0 is a mirror."""
     pair = (alpha,) if backend.is_drjit(alpha) else pair_of(alpha)
     if any(backend.is_drjit(width) for width in pair):
         return "maybe"
@@ -138,7 +138,7 @@ def delta_of(alpha: object) -> Delta:
 
 @function
 def upper(w: Direction) -> Direction:
-    """w above the surface, -w below: a facet seen from behind along -w looks as from the front along w."""
+    """w if above the surface, else -w: a facet seen from behind along -w looks the same as from the front along w."""
     return where(w.z < 0.0, -w, w)
 
 
@@ -149,7 +149,7 @@ def _bounded(model: _Microfacet) -> bool:
 
 @function
 def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-    """A normal (m.z > 0) by the model's `sampling`; its back faces a wo below the surface."""
+    """A normal (m.z > 0) by the model's `sampling`; a wo below the surface sees its facet from behind."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return ndf.sample(u1, u2, alpha)
@@ -160,7 +160,7 @@ def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alp
 
 @function
 def pdf_per_cosine(model: _Microfacet, wo: Direction, m: Direction, alpha: Pair) -> Scalar:
-    """Density of `sample_normal` over |o.m|, 1/sr: the cosine cancels in dm/dwi (Walter2007, eq. 14 and 17)."""
+    """Density of `sample_normal` divided by |o.m|, 1/sr; the cosine cancels in dm/dwi (Walter2007, eq. 14 and 17)."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return safe_div(ndf.pdf(m, alpha), abs(dot(wo, m)))

@@ -16,9 +16,9 @@ from ...optics.fresnel.polarization import Diattenuation
 
 
 class Mirror(BSDF):
-    """Ideal reflection: all light leaves at theta_o = theta_i, phi_o = phi_i + pi: a delta lobe (course notes, B)."""
+    """Ideal reflection, a delta lobe: all light leaves at theta_o = theta_i, phi_o = phi_i + pi (course notes, B)."""
 
-    albedo: Colour = spectrum(default=1.0, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="fraction of light that is reflected", low=0.0, high=1.0, soft_high=True)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -32,13 +32,13 @@ class Mirror(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """wo mirrored at the normal."""
+        """wo mirrored about the normal."""
         above = wo.z > 0.0
         one = where(above, ones_like(wo.z), 0.0)
         return Sample(frame.mirror(wo), self.albedo * one, one, above, ones_like(wo.z))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of the light: s changes sign and p does not, as at a perfect conductor."""
+        """All light: s changes sign and p does not, as at a perfect conductor."""
         zero = zeros_like(wo.z)
         value = self.albedo * where(delta & (wo.z > 0.0), 1.0 + zero, 0.0)
         return (Polarized(value, frame.normal_like(wo), Diattenuation(zero, zero - 1.0, zero)),)
@@ -50,5 +50,5 @@ class Mirror(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """albedo, from above."""
+        """`albedo` from above, 0 from below."""
         return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))

@@ -15,12 +15,13 @@ class _Reflector(microfacet._Microfacet):
     """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass defines `reflectance` and `mean_reflectance`."""
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F, times albedo, at a facet seen at cos_theta."""
+        """albedo times F, at the cosine of incidence on a facet."""
         raise NotImplementedError(f"{type(self).__name__} has no reflectance")
 
     def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
-        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
-        along the axes of the anisotropy; rotated last, as wo + wi would magnify the rounding of the rotation."""
+        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether the pair lies in a rough
+        lobe), in the frame of the anisotropy; rotated last, as wo + wi would magnify rounding errors of the rotation.
+        """
         m = frame.half_vector(wo, wi)
         alpha, smooth = self._roughness()
         wo, wi, m = (frame.rotate(w, self._turn) for w in (wo, wi, m))
@@ -28,19 +29,19 @@ class _Reflector(microfacet._Microfacet):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """albedo F D G / (4 cos theta_o); 0 where alpha makes it a mirror."""
+        """albedo F D G / (4 cos theta_o); 0 where the surface is a mirror."""
         wo, wi, m, alpha, lit = self._facet(wo, wi)
         return self.reflectance(abs(dot(wo, m))) * where(lit, microfacet.reflection(self, wo, wi, m, alpha), 0.0)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of the sampled normal over 4 (o.m) (Walter2007, eq. 14)."""
+        """Density of the sampled normal divided by 4 (o.m) (Walter2007, eq. 14)."""
         wo, wi, m, alpha, lit = self._facet(wo, wi)
         return where(lit, 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha), 0.0)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
+        """wo mirrored about a sampled normal; a direction below the surface is a failed sample."""
         alpha, smooth = self._roughness()
         wo_local = frame.rotate(wo, self._turn)
         m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
@@ -63,7 +64,7 @@ class _Reflector(microfacet._Microfacet):
         return Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """F at the surface's own normal."""
+        """F at the angle between wo and the surface normal."""
         return self.reflectance(abs(wo.z))
 
     def normal_reflectance(self) -> Spectrum:

@@ -20,14 +20,18 @@ from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from . import microfacet
 
 BOUNCES = {
-    "polarized": "separately for s and p, which a smooth sheet does not mix",
-    "mean": "for their mean, as in most renderers; all light leaves unpolarized",
+    "polarized": "summed separately for s and p polarization, which a smooth sheet does not mix",
+    "mean": "summed for their mean, as in most renderers; all light leaves unpolarized",
 }
 
 
 class _Sheet(NamedTuple):
-    """Reflection by a sheet, all bounces included: of s, of p, and the product of both fields; the product
-    transmitted."""
+    """Reflection and transmission by a sheet, all bounces included.
+
+    s, p    reflectance of each polarization
+    cross   product of the two reflected fields
+    passed  product of the two transmitted fields
+    """
 
     s: Scalar
     p: Scalar
@@ -39,22 +43,22 @@ class ThinDielectric(BSDF):
     """A thin sheet of clear glass, such as a window pane. Light that is not reflected passes straight through (PBRT4,
     sec. 9.5).
 
-    Light bounces between both faces, R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and T' = 1 - R'; the sheet is
-    thicker than the light's coherence length, thinner than any visible displacement. R is that of each polarization,
-    and R' the mean of both: at 60 degrees, index 1.5, 0.152. `bounces="mean"` uses R' of the mean R, 0.164, as in
-    renderers without polarization.
+    Light bounces between the two faces: R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and T' = 1 - R'. The sheet is
+    thicker than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its values
+    for the two polarizations, 0.152 at 60 degrees for an index of 1.5. `bounces="mean"` computes R' from the mean R
+    instead, 0.164, as do renderers without polarization.
     """
 
-    eta: Number = number(default=1.5, doc="index of the sheet over that around it", low=0.2, high=5.0)
+    eta: Number = number(default=1.5, doc="index of the sheet, relative to its surroundings", low=0.2, high=5.0)
     fresnel: Member = microfacet.fresnel_choice()
     bounces: str = choice("polarized", "reflectance that is summed over the bounces", BOUNCES)
-    albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
+    albedo: Colour = microfacet.albedo_factor("factor on all reflected and transmitted light")
 
     preset_kind: ClassVar[str] = "medium"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
-        """Transparent media by name: eta, for sodium light; a sheet sends all wavelengths the same way."""
+        """Transparent media by name, with eta for sodium light, since a sheet does not disperse light."""
         return {name: Preset(m.title, {"eta": m.sodium}, m.source) for name, m in indices.media().items()}
 
     @function
@@ -67,7 +71,7 @@ class ThinDielectric(BSDF):
         return _all_bounces(fresnel.kind(self.fresnel).dielectric(cos, cos_t, self.eta))
 
     def _sheet(self, cos: Scalar, cos_t: Scalar) -> _Sheet:
-        """All bounces; powers add up, since waves of different bounces are incoherent."""
+        """The sum of all bounces; powers are added, since waves of different bounces are incoherent."""
         minus_r_s, r_p = exact.amplitudes(cos, cos_t, self.eta)
         s, p, once = sqr(minus_r_s), sqr(r_p), -minus_r_s * r_p
         through = (1.0 - s) * (1.0 - p)  # both faces
@@ -86,7 +90,7 @@ class ThinDielectric(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects reflection with probability R'; else the direction is -wo."""
+        """u1 selects reflection with probability R'; otherwise the direction is -wo."""
         share = self.reflectance(abs(wo.z))
         reflects = u.x < share
         one = ones_like(wo.z)
@@ -95,7 +99,7 @@ class ThinDielectric(BSDF):
         return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of the light, unless polarization is lost between the bounces."""
+        """All light; none for `bounces="mean"`, where polarization is lost between the bounces."""
         if self.bounces == "mean":
             return ()
         cos = abs(wo.z)
@@ -126,10 +130,10 @@ class ThinDielectric(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """albedo: nothing else is absorbed."""
+        """`albedo`, since nothing else is absorbed."""
         return np.array(np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3)))
 
 
 def _all_bounces(face: Scalar) -> Scalar:
-    """2 R / (1 + R): the reflectance of both faces together."""
+    """2 R / (1 + R): the reflectance of the two faces together."""
     return 2.0 * face / (1.0 + face)

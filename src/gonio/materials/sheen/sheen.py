@@ -25,8 +25,8 @@ from ...optics.warp import square_to_cosine_hemisphere
 class Layer(NamedTuple):
     """The transformed cosine for a wo: M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) maps it back to the cosine.
 
-    A, B  of the matrix
-    R     the layer's albedo along wo
+    A, B  entries of the matrix
+    R     albedo of the layer for wo
     """
 
     A: Scalar
@@ -38,28 +38,28 @@ class Sheen(BSDF):
     """Light scattered by a thin layer of upright fibers: f cos theta_i = albedo R(wo) D(wo, wi) (Zeltner2022).
 
     D is a linearly transformed cosine (Heitz2016a), fitted to random walks in a layer of lossless microflakes of unit
-    density and thickness, so it includes all orders of scattering. R is the layer's own albedo: the rest of the light
-    passes to the surface below, which this model omits. The color is only a factor: absorbing fibers would tint later
-    bounces more. Sampled exactly, every weight is albedo R.
+    density and thickness, so it includes all orders of scattering. R is the albedo of the layer: the rest of the light
+    passes to the surface below, which this model does not include. The color is only a factor, while absorbing fibers
+    would tint later bounces more. Sampling is exact: every weight is albedo R.
 
-    The fit depends on wo only, so the model is not reciprocal. Its table has 32 x 32 nodes, linear between them.
+    The fit depends on wo only, so the model is not reciprocal. Its table has 32 x 32 nodes, interpolated linearly.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="factor on all reflected light", low=0.0, high=1.0, soft_high=True)
     roughness: Number = number(
         default=0.5,
-        doc="0 is fibers along the normal, 1 flakes in any direction: root of their cross section",
+        doc="square root of the flakes' cross section: 0 for fibers along the normal, 1 for random directions",
         low=0.0,
         high=1.0,
     )
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("its table of lobes depends on the viewer's direction only", 2.0)
+        "reciprocity": KnownViolation("the table of lobes depends on the view direction only", 2.0)
     }
 
     @function
     def _lobe(self, wo: Direction) -> Layer:
-        """The row of the table."""
+        """The entry of the table, interpolated."""
         table = _table()
         rows, columns = table.shape
         return Layer(*ops.lookup(table, ops.inset(self.roughness, rows), ops.inset(wo.z, columns)))
@@ -95,7 +95,7 @@ class Sheen(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The color at a view: albedo times R, the albedo of the lobe's fit."""
+        """The directional albedo for wo: albedo times R."""
         return self.albedo * self._lobe(wo).R
 
     def known_albedo(
@@ -110,6 +110,6 @@ class Sheen(BSDF):
 
 @lru_cache(maxsize=1)
 def _table() -> ops.Table:
-    """A, B and R by roughness and mu."""
+    """A, B and R, over roughness and mu."""
     text = Path(__file__).with_name("zeltner2022.json").read_text()
     return ops.Table("sheen", np.array(json.loads(text)["coefficients"]))

@@ -25,19 +25,21 @@ class SheenCharlie(BSDF):
     """Cloth of upright fibers: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
 
     D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), which has its peak at the horizon instead of the normal
-    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), Lambda = exp L by their fit; their softened terminator, which is not
-    reciprocal, is omitted. There is no Fresnel term. Single scattering: at normal incidence it reflects a fifth of the
-    light at alpha = 1, a thousandth at alpha = 0.1; the rest passes to the cloth below, which this model omits. glTF's
-    sheen is this one, with alpha the square of its roughness. Below alpha = 0.07 the fit reflects more than it receives
-    near the horizon. Sampled by a guide.
+    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with Lambda = exp L by the fit of the paper
+
+    The softened terminator of the paper is omitted, because it is not reciprocal. There is no Fresnel term, and only
+    single scattering: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a thousandth at
+    alpha = 0.1. The rest passes to the cloth below, which this model does not include. This is the sheen of glTF, with
+    alpha the square of glTF's roughness. Below alpha = 0.07, the fit reflects more light than it receives near the
+    horizon. Sampled by a guide.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
-    alpha: Number = number(default=0.3, doc="tilt of the fibers from the surface's plane", low=0.01, high=1.0)
+    albedo: Colour = spectrum(default=1.0, doc="factor on all reflected light", low=0.0, high=1.0, soft_high=True)
+    alpha: Number = number(default=0.3, doc="spread of the facets' normals about the horizon", low=0.01, high=1.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "Lambda's fit masks too little for alpha below 0.07: at 89 degrees the albedo is then over 1",
+            "for alpha below 0.07, the fit of Lambda masks too little: the albedo exceeds 1 at 89 degrees",
             lambda model: _gain(model),
             certain=False,
         )
@@ -45,7 +47,7 @@ class SheenCharlie(BSDF):
 
     @function
     def _density(self, h: Direction) -> Scalar:
-        """D, by sin^2 from x and y: 1 / alpha is a large power."""
+        """D, from sin^2 = x^2 + y^2, since the exponent 1 / alpha can be large."""
         power = 1.0 / self.alpha
         sin2 = frame.sin2(h)
         positive = sin2 > frame.TINY
@@ -68,7 +70,7 @@ class SheenCharlie(BSDF):
 
     @function
     def _visible(self, wo: Direction, wi: Direction) -> Scalar:
-        """G, the masking of both directions."""
+        """G, masking and shadowing of the two directions."""
         return 1.0 / (1.0 + self._lambda(wo.z) + self._lambda(wi.z))
 
     @method
@@ -86,7 +88,7 @@ class SheenCharlie(BSDF):
 
 
 def _gain(model: SheenCharlie) -> float:
-    """The gain beyond 1 at the worst angle: measured at 40 widths and 60 angles, plus a tenth of it."""
+    """The excess of the albedo above 1 at the worst angle, measured at 40 widths and 60 angles, plus a tenth."""
     alpha = float(np.min(np.asarray(model.alpha)))
     return float(np.interp(alpha, GAINS[0], GAINS[1])) * float(np.max(np.asarray(model.albedo)))
 

@@ -13,13 +13,13 @@ from ..tables.base import Measurement
 from ..tables.half_difference import HalfDifference, sampled
 
 CELLS = (90, 90, 180)
-ONE_WAY = 0.01  # relative change of f by exchanging wo and wi from which on a full turn of phi_d is stored
+ONE_WAY = 0.01  # relative change of f by swapping wo and wi above which a full turn of phi_d is stored
 
 
 class Method:
     """A method to represent a table in fewer bytes.
 
-    name    on the command line
+    name    its name on the command line
     shared  whether several materials are represented together, in one file, with shared data
     """
 
@@ -28,8 +28,8 @@ class Method:
     shared: ClassVar[bool] = False
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        """Tables of kinds that `.gonio` files hold, in about `size` bytes per material or, for a kind of fixed size, in
-        that. Raises InputError for tables to which the method does not apply."""
+        """Tables of kinds that `.gonio` files hold, in about `size` bytes per material, or in the fixed size of the
+        kind. Raises InputError for tables to which the method does not apply."""
         raise NotImplementedError
 
 
@@ -37,8 +37,8 @@ Method.family = Family("method", "gonio.compression", ["gonio.measure.compressio
 
 
 def over_half_vectors(table: Measurement) -> HalfDifference:
-    """The table itself if it is one over half vector and difference in RGB; else one of MERL's size, over a full turn
-    of phi_d if exchanging both directions matters."""
+    """The table itself if it is an RGB table over half vector and difference angle; else one of MERL's size, over a
+    full turn of phi_d if swapping the two directions matters."""
     if isinstance(table, HalfDifference) and table.values.shape[-1] == 3:
         return table
     one_way = not table.reciprocal and asymmetry(table) > ONE_WAY

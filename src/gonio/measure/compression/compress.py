@@ -26,10 +26,10 @@ class Compressed:
     """A compressed material.
 
     path     the file, followed by the material's name if it holds several
-    kind     of the table in it
-    method   of compression
+    kind     kind of the table in it
+    method   compression method
     size     bytes per material: the mean, for a file with several
-    before   bytes of its original numbers
+    before   bytes of the original numbers
     error    E |new - old| / E |old| of f cos, as reported by `gonio convert`
     sphere   mean relative error of a sphere's pixels under a lamp and a sky
     seconds  computing time per material
@@ -58,9 +58,9 @@ def compress(
     """Compress measured materials into a `.gonio` file; the errors are measured on the written file.
 
     source  a file or several, as `go.Measured` takes them; several make one file, whose materials are OUT.gonio:NAME
-    codec   log (quantised logarithms), lowrank (factors that all share), rgl (without `vndf`), network (675 weights)
-    bytes   a material, for log and lowrank
-    Raises InputError where a file cannot be read, or the codec cannot be used for it.
+    codec   log (quantized logarithms), lowrank (shared factors), rgl (without `vndf`), network (675 weights)
+    bytes   size per material, for log and lowrank
+    Raises InputError if a file cannot be read, or if the codec cannot be used for it.
     """
     one = Method.family.get(codec, "codec")
     if not isinstance(bytes, int) or bytes < LEAST:

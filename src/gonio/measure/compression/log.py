@@ -19,8 +19,8 @@ from ..tables.low_rank import LowRank
 from ..tables.rebuilt import Rebuilt, rebuilding
 from .base import Method, over_half_vectors
 
-OFFSET = 0.05  # of the median of f: darker cells are measured with lower relative accuracy
-FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and the step of the cosines meanwhile
+OFFSET = 0.05  # fraction of the median of f: darker cells are measured with lower relative accuracy
+FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and the step of the cosine coefficients meanwhile
 STEPS = (1e-3, 300.0)  # the range in which the step is searched
 HALVINGS = 9
 
@@ -67,7 +67,7 @@ class Logs:
         held = table._held(rgb) if not table.valid.all() else rgb
         self.values = np.log(np.maximum(held, 0.0) + self.offset) @ COLOURS.T
         if not table.valid.all():
-            # filling the others by a coarse cosine series needs the fewest bytes
+            # filling the invalid cells with a coarse cosine series needs the fewest bytes
             for _ in range(FILLS):
                 coarse = from_cosines(np.round(to_cosines(self.values) / FILL_STEP) * FILL_STEP)
                 self.values[~table.valid] = coarse[~table.valid]
@@ -82,7 +82,7 @@ class Logs:
 
 
 def coded(cls: type[T], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> T:
-    """A table over half vectors from numbers by frequency; `shared` bytes of `more` are not counted."""
+    """A half-vector table from numbers by frequency; `shared` bytes of `more` are not counted."""
     return rounded(cls, logs.table, numbers, {**logs.stored, **more}, (logs.table.turn, logs.offset), size, shared)
 
 
@@ -92,7 +92,7 @@ def rounded(
 ) -> C:  # fmt: skip
     """A table whose numbers are rounded as finely as a file of `size` bytes allows.
 
-    stored  its other arrays; `shared` of their bytes are not counted
+    stored  the table's other arrays; `shared` of their bytes are not counted
     scale   turn and offset, between which the step is inserted
     """
     own = Own()

@@ -69,7 +69,7 @@ def _vectors(every: list[Floats], axis: int) -> Floats:
 
 
 def _missed(logs: Logs, made: LowRank) -> float:
-    """The mean difference of the logarithms."""
+    """The mean absolute difference of the logarithms."""
     lit: NDArray[np.bool_] = logs.lit
     old = logs.table.values[lit]
     return float(np.abs(np.log(made.values[lit] + logs.offset) - np.log(np.maximum(old, 0.0) + logs.offset)).mean())

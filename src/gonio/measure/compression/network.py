@@ -18,11 +18,11 @@ from .base import Method, over_half_vectors
 
 Floats32 = NDArray[np.float32]
 
-OFFSET = 0.3  # of the median of f: separates absolute from relative differences
+OFFSET = 0.3  # fraction of the median of f: separates absolute from relative differences
 LOWEST = 0.01  # minimum cosine of both directions in training: within 0.6 degrees of the horizon
-STEPS, BATCH, RATE = 9000, 2048, 1e-2  # of Adam; the rate decreases linearly to 0
-ROUNDS, PAIRS = 40, 5000  # of Gauss-Newton, with as many pairs each
-LARGEST = 60.0  # of log(1 + f), within the range of exp in float32
+STEPS, BATCH, RATE = 9000, 2048, 1e-2  # for Adam; the rate decreases linearly to 0
+ROUNDS, PAIRS = 40, 5000  # for Gauss-Newton, with as many pairs each
+LARGEST = 60.0  # largest log(1 + f), within the range of exp in float32
 
 
 class NetworkMethod(Method):
@@ -65,7 +65,7 @@ class Data:
         phi_d = (np.arange(count) + 0.5) / count * table.turn
         h, d, p = (a.ravel() for a in np.meshgrid(theta_h, theta_d, phi_d, indexing="ij"))
         along, side = np.sin(d) * np.cos(p), np.sin(d) * np.sin(p)
-        flip = np.where(side < 0.0, -1.0, 1.0)  # a full turn is reduced to one half: exchanging changes nothing
+        flip = np.where(side < 0.0, -1.0, 1.0)  # a full turn is reduced to one half: swapping wo and wi changes nothing
         both = np.stack([np.sin(h), 0.0 * h, np.cos(h), along * flip, side * flip, np.cos(d)]).astype(np.float32)
         lowest = np.cos(d) * np.cos(h) - np.abs(np.sin(h) * along)
         usable = table.valid.ravel() & (lowest > LOWEST)
@@ -118,7 +118,7 @@ def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weight
 
 
 def _refined(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
-    """The weights after Levenberg-Marquardt on the squares: with 675 weights the normal equations are small."""
+    """The weights after Levenberg-Marquardt on the squares: with 675 weights, the normal equations are small."""
     damping = 1e-2
     for _ in range(ROUNDS):
         pick = rng.choice(data.inputs.shape[1], min(PAIRS, data.inputs.shape[1]), replace=False)
@@ -146,7 +146,7 @@ def _units(weights: Weights, inputs: Floats32) -> tuple[Floats32, Floats32, Floa
 
 
 def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
-    """Differences of the logarithms, (3, N), and their derivatives by the network's outputs."""
+    """Differences of the logarithms, (3, N), and their derivatives with respect to the network's outputs."""
     said = _units(weights, data.inputs)[2]
     f = np.expm1(said)
     lit = f > 0.0
@@ -155,7 +155,7 @@ def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
 
 
 def _normal_equations(weights: Weights, data: Data) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """J J^T, J r and the mean of r^2, r the differences: back-propagation of each channel, written explicitly."""
+    """J J^T, J r and the mean of r^2, with r the differences: explicit back-propagation for each channel."""
     first, second, _ = _units(weights, data.inputs)
     rest, derivative = _differences(weights, data)
     sizes = [weights[name].size for name in SHAPES]

@@ -9,9 +9,9 @@ import numpy as np
 from ..tables.base import Floats
 
 SIZE = 64  # pixels across
-LAMP = np.array([-0.5, 0.6, 0.62])  # direction toward it; as bright as the whole sky
+LAMP = np.array([-0.5, 0.6, 0.62])  # direction toward the lamp, which is as bright as the whole sky
 SKY = 256  # evenly spread directions of the sky
-DARK = 0.01  # of the picture's mean: lower limit of the denominator of relative differences
+DARK = 0.01  # fraction of the picture's mean: lower limit of the denominator of relative differences
 
 Rgb = Callable[[Floats, Floats], Floats]
 
@@ -37,7 +37,7 @@ def lights() -> tuple[Floats, Floats]:
 
 
 def picture(rgb: Rgb) -> Floats:
-    """The pixels of the sphere's disc, (P, 3), of f cos theta_i (wo, wi) -> (N, 3)."""
+    """The pixels of the sphere's disk, (P, 3), for a function f cos theta_i of (wo, wi) -> (N, 3)."""
     n, t, b = frame()
     wo = np.stack([t[:, 2], b[:, 2], n[:, 2]], -1)  # the view, (0, 0, 1), in each pixel's frame
     radiance = np.zeros_like(n)

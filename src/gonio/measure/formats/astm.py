@@ -49,7 +49,7 @@ class Astm(Format):
             elif len(head) < 64:
                 head[word[:80]] = rest.lstrip("= ")[:400]
         if not columns:
-            raise InputError("no line of VARS", where, "this is no ASTM E1392 file")
+            raise InputError("no VARS line", where, "this is not an ASTM E1392 file")
         values = table(rows, len(columns), where)
         claimed = next((text for key, text in head.items() if key.upper() == "NUM_POINTS"), "")
         if claimed and (not claimed.isdecimal() or int(claimed) != len(values)):

@@ -13,14 +13,14 @@ from ...errors import InputError
 from ...members import Family, instances_of
 from ..tables.base import Measurement
 
-MAX_BYTES = 1 << 31  # of a file: 60 times the largest existing table
+MAX_BYTES = 1 << 31  # largest file size: 60 times the largest existing table
 
 
 class Format:
     """A file format.
 
     name      printed by `gonio info`
-    suffixes  by which files are recognized; the first is used for writing
+    suffixes  suffixes by which files are recognized; the first is used for writing
     writes    the kind of table that `write` accepts, by name; "" if the format cannot be written
     """
 
@@ -46,7 +46,7 @@ class Format:
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
     def resampled(self, source: Measurement) -> Measurement:
-        """A table of the kind `writes` with the values of another; unchanged if it is of that kind."""
+        """A table of the kind `writes` with the values of another; unchanged if it is already of that kind."""
         raise NotImplementedError
 
     def items(self, data: bytes, where: str) -> list[str]:
@@ -69,7 +69,7 @@ def contents(path: Path, where: str = "") -> bytes:
     try:
         size = path.stat().st_size
         if not path.is_file():
-            raise InputError(f"'{path}' is no file", where or str(path))
+            raise InputError(f"'{path}' is not a file", where or str(path))
         if size > MAX_BYTES:
             raise InputError(f"{size} bytes, at most {MAX_BYTES} expected", str(path))
         return path.read_bytes()

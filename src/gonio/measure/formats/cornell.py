@@ -19,8 +19,8 @@ WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; used t
 class Cornell(Format):
     """Cornell text: the number of wavelengths, the wavelengths [nm], then one sample per row.
 
-    A sample is theta_i, phi_i, theta_r, phi_r in radians and a value per wavelength. Lines that start with # are
-    comments, the first of them the title.
+    A sample is theta_i, phi_i, theta_r, phi_r in radians and one value per wavelength. Lines that start with # are
+    comments, and the first of them is the title.
     """
 
     name: ClassVar[str] = "cornell"
@@ -35,7 +35,7 @@ class Cornell(Format):
             else:
                 words += [(number, word) for word in line.split()]
         if not words:
-            raise InputError("no numbers in it", where)
+            raise InputError("no numbers in this file", where)
         count = numbers([words[0][1]], where, words[0][0])[0]
         if count != int(count) or not 1 <= count <= len(words):
             raise InputError(f"{count:g} wavelengths, in a file of {len(words)} numbers", f"{where}:{words[0][0]}")

@@ -33,7 +33,7 @@ class Merl(Format):
         shape = struct.unpack("<3i", data[:12])
         if shape[:2] != CELLS or shape[2] not in (180, 360):
             what = f"{' x '.join(map(str, shape))} cells, 90 x 90 x 180 or 90 x 90 x 360 expected"
-            raise InputError(what, where, "this is no MERL file, or a damaged one")
+            raise InputError(what, where, "this is not a MERL file, or it is damaged")
         cells = shape[0] * shape[1] * shape[2]
         wanted = 12 + 3 * 8 * cells
         if len(data) != wanted:
@@ -56,8 +56,8 @@ class Merl(Format):
     def resampled(self, source: Measurement, phi: int | None = None) -> Measurement:
         """The table itself if it has MERL's cells; else the values at the center of each cell.
 
-        phi  cells of phi_d: 180 over half a turn, or 360 over a complete one, which preserves nonreciprocal values;
-             None: as many as the table has, else 180
+        phi  cells of phi_d: 180 for half a turn, or 360 for a full turn, which preserves nonreciprocal values; None for
+             as many as the table has, else 180
         """
         if isinstance(source, HalfDifference) and source.values.shape[:3] in ((*CELLS, 180), (*CELLS, 360)):
             cells = source.values.shape[2]

@@ -31,7 +31,7 @@ class Networks(Format):
     def items(self, data: bytes, where: str) -> list[str]:
         names = sorted({name.rpartition("/")[0] for name in arrays(data, where) if "/" in name})
         if not names:
-            raise InputError("no networks in it: no array is named NAME/kernel0", where)
+            raise InputError("no networks in this file: no array is named NAME/kernel0", where)
         return names
 
     def read(self, data: bytes, where: str, item: str = "") -> HalfDifference:
@@ -39,7 +39,7 @@ class Networks(Format):
         if not item and len(names) == 1:
             item = names[0]
         if item not in names:
-            what = f"no material '{item}' in it" if item else f"{len(names)} materials in it, one expected"
+            what = f"no material '{item}' in this file" if item else f"it has {len(names)} materials, one expected"
             hint = did_you_mean(item, names) if item else f"give {where}:{names[0]}, or another of " + ", ".join(names)
             raise InputError(what, where, hint)
         stored = arrays(data, where)
@@ -63,9 +63,10 @@ class Networks(Format):
 
 
 def tabulated(weights: dict[str, NDArray[np.float32]]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """A network's values at the centers of MERL's cells, (90, 90, 180, 3), and which lie above the surface.
+    """A network's values at the centers of MERL's cells, (90, 90, 180, 3), and which of them lie above the surface.
 
-    A cell's half vector is (sin theta_h, 0, cos theta_h), its difference vector the light's direction in its frame.
+    A cell's half vector is (sin theta_h, 0, cos theta_h), its difference vector is the light's direction in the frame
+    of the half vector.
     """
     n, m, count = CELLS
     theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)

@@ -19,7 +19,7 @@ LARGEST = 1 << 28  # bytes of all arrays together if they are compressed: deflat
 
 
 def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The arrays in a file, by name. Raises InputError for a file that is not a zip, damaged, or holds objects
+    """The arrays in a file, by name. Raises InputError if the file is not a zip file, is damaged, or holds objects
     (pickles)."""
     if data[-22:-18] != b"PK\5\6":  # the end of an archive without a comment
         raise InputError("it does not end like a .npz file", where, "the file is truncated, longer, or not a .npz")
@@ -57,7 +57,7 @@ def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
 def _array(content: bytes, name: str, where: str) -> NDArray[np.generic]:
     place = f"{where}: {name[:80]}"
     if content[:6] != b"\x93NUMPY" or len(content) < 12:
-        raise InputError("no NumPy array", place)
+        raise InputError("not a NumPy array", place)
     wide = content[6] >= 2
     start = 12 if wide else 10
     (length,) = struct.unpack_from("<I" if wide else "<H", content, 8)

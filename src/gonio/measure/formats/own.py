@@ -14,10 +14,10 @@ from ..tables.base import Measurement, finite
 from .base import Format
 from .npz import arrays, written
 
-VERSION = 1  # of a file with one material
-SEVERAL = 2  # of a file with several
+VERSION = 1  # version of a file with one material
+SEVERAL = 2  # version of a file with several
 MANIFEST = "manifest"
-BESIDE = ("error", "first")  # of `Measurement.beside`
+BESIDE = ("error", "first")  # keys of `Measurement.beside`
 
 Arrays = Mapping[str, NDArray[np.generic]]
 
@@ -25,7 +25,7 @@ Arrays = Mapping[str, NDArray[np.generic]]
 class Own(Format):
     """Gonio table: a .npz of plain arrays and a manifest in JSON (version, kind, title, source, axes with units).
 
-    Values are f in 1/sr (for adaptive tables as in the RGL's format), angles are radians, wavelengths nm. No array is
+    Values are f in 1/sr (in adaptive tables as in the RGL format), angles are radians, wavelengths nm. No array is
     compressed and nothing is pickled. Every kind of table is stored unchanged, with the standard error of each value
     (`error`) and its single-bounce part (`first`) if an instrument measured them.
 
@@ -44,7 +44,7 @@ class Own(Format):
         parts, several = self._parts(data, where)
         manifest = several.get(item)
         if several and manifest is None:
-            what = f"no material '{item}' in it" if item else f"{len(several)} materials in it, one expected"
+            what = f"no material '{item}' in this file" if item else f"it has {len(several)} materials, one expected"
             names = list(several)
             hint = did_you_mean(item, names) if item else f"give {where}:{names[0]}, or another of " + ", ".join(names)
             raise InputError(what, where, hint)
@@ -52,7 +52,7 @@ class Own(Format):
             own = {name.removeprefix(f"{item}/"): part for name, part in parts.items() if name.startswith(f"{item}/")}
             parts = {**{name: part for name, part in parts.items() if "/" not in name}, **own}
         elif item:
-            raise InputError(f"no material '{item}' in it", where, "it holds a single material, give no name")
+            raise InputError(f"no material '{item}' in this file", where, "it holds a single material: give no name")
         else:
             manifest = self._manifest(parts, where)
         parts.pop(MANIFEST)
@@ -63,7 +63,7 @@ class Own(Format):
             raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
         for name, part in parts.items():
-            if part.size == 0:  # such as an axis without entries, of which no table has one
+            if part.size == 0:  # such as an axis without entries, which no table has
                 raise InputError(f"the array {name} of shape {part.shape} is empty", where, "the file is damaged")
         nm = parts.pop("wavelengths", None)
         extra = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
@@ -117,7 +117,7 @@ class Own(Format):
         return written({MANIFEST: _text({"version": VERSION, **_about(kind, about)}), **parts, **more})
 
     def write_several(self, tables: Mapping[str, Measurement]) -> bytes:
-        """The file of several tables, by name; arrays that all share are stored once."""
+        """The file of several tables, by name; arrays shared by all are stored once."""
         manifests = {
             name: _about(type(table), {"title": table.title, "source": table.source}) for name, table in tables.items()
         }
@@ -158,4 +158,4 @@ def _text(manifest: Mapping[str, Any]) -> NDArray[np.uint8]:
 
 
 def _no_manifest(where: str) -> InputError:
-    return InputError("no manifest of a Gonio table in it", where, "gonio convert IN OUT.gonio writes one")
+    return InputError("this file has no manifest of a Gonio table", where, "gonio convert IN OUT.gonio writes one")

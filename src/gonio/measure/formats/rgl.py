@@ -1,4 +1,4 @@
-"""The RGL's `.bsdf`: tensor files with tables in adaptive coordinates (Dupuy2018)."""
+"""The RGL's `.bsdf` format: tensor files with tables in adaptive coordinates (Dupuy2018)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ MAGIC = b"tensor_file\0"
 TYPES = {
     1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8",
 }  # fmt: skip
-ALIGNED = 8  # bytes of which fields start at multiples, and of which a file may have padding at its end
+ALIGNED = 8  # bytes: fields start at multiples of this, and a file may end with so much padding
 FIELDS, NAME, RANK = 64, 256, 8  # limits for plausible files
 
 
 class Rgl(Format):
     """RGL BSDF: a tensor file (`tensor_file`, version 1.0) of Dupuy2018, RGB or spectral.
 
-    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 per axis. Required are
-    phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; other fields are ignored.
+    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 per axis. Required fields
+    are phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; other fields are ignored.
     """
 
     name: ClassVar[str] = "rgl"

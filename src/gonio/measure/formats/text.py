@@ -19,7 +19,7 @@ def lines(data: bytes, where: str) -> list[str]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # comments in an older encoding; numbers are the same
+        text = data.decode("latin-1")  # comments may use an older encoding; numbers are the same
     rows = text.splitlines()
     if any(len(line) > LONGEST for line in rows):
         raise InputError(f"a line of more than {LONGEST} characters", where)

@@ -15,11 +15,11 @@ from .text import lines, numbers, table, written
 
 AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 BLOCKS = {"monochrome": ("Monochrome",), "xyz": ("TristimulusX", "TristimulusY", "TristimulusZ")}
-MOST = 100_000  # nodes of an axis that are believed before they are counted
+MOST = 100_000  # largest accepted number of nodes of an axis before they are counted
 
 
 class _Lines:
-    """The numbered lines of a file, without comments and empty lines, read one after the other."""
+    """The numbered lines of a file, without comments and empty lines, read one by one."""
 
     def __init__(self, rows: list[tuple[int, str]], where: str) -> None:
         self._rows, self.where = iter(rows), where
@@ -36,7 +36,7 @@ class _Lines:
         return row
 
     def keyword(self, word: str, first_only: bool = True, hint: str = "") -> tuple[int, str]:
-        """The next line, which must be this keyword, or begin with it."""
+        """The next line, which must be this keyword or begin with it."""
         number, line = self.following(f"'{word}'")
         if (line.split()[0] if first_only else line).lower() != word.lower():
             raise InputError(f"'{line[:40]}' where '{word}' is expected", f"{self.where}:{number}", hint)
@@ -99,11 +99,12 @@ def _channel(rest: _Lines, block: str, incidences: int, azimuths: int, radials: 
 
 
 class Zemax(Format):
-    """Zemax BSDF: a head of keywords with the axes in degrees, then a block of values for each channel.
+    """Zemax BSDF: a header of keywords with the axes in degrees, then a block of values for each channel.
 
-    The view's angles are about the mirror direction: ScatterRadial from it, ScatterAzimuth around it, 0 toward the
-    normal. A block is, for each AngleOfIncidence, a line "TIS x" and a row of radial values for each azimuth, 1/sr.
-    BRDF of one SampleRotation, Monochrome or XYZ; anisotropic samples (several rotations) and BTDF are refused.
+    The view's angles are relative to the mirror direction: ScatterRadial from it, ScatterAzimuth around it, 0 toward
+    the normal. A block has, for each AngleOfIncidence, a line "TIS x" and a row of radial values for each azimuth,
+    1/sr. Only a BRDF of one SampleRotation, Monochrome or XYZ, is read; anisotropic samples (several rotations) and
+    BTDFs are rejected.
     """
 
     name: ClassVar[str] = "zemax"
@@ -152,7 +153,7 @@ class Zemax(Format):
         return "".join(parts).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The table itself where it is about the mirror direction; else its nodes filled."""
+        """The table itself if it is about the mirror direction; else its values at the nodes of such a table."""
         return source if isinstance(source, Specular) else sampled(source.rgb, title=source.title, source=source.source)
 
 

@@ -8,15 +8,15 @@ from .. import colours
 from .adaptive import Adaptive
 from .base import Floats, Measurement
 
-VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; per side of the normals' square; per side of the values' square
+VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; per side of the square of normals; per side of the square of values
 
 
 def adapted(source: Measurement) -> Adaptive:
     """An adaptive table of a measurement with rotational and mirror symmetry.
 
-    D comes from retro-reflection, where half vector and direction coincide: f(w, w) = D F G / (4 cos^2), so that
+    D is derived from retroreflection, where half vector and direction coincide: f(w, w) = D F G / (4 cos^2), so that
     D ~ f cos^2 up to masking (Dupuy2018, sec. 3.2, without its iteration: a warp works with any D, and its errors are
-    compensated by the values). sigma is its projected area, vndf = D max(0, wo.m) / sigma.
+    compensated by the values). sigma is its projected area, and vndf = D max(0, wo.m) / sigma.
     """
     theta_m = np.linspace(0.0, 1.0, NORMALS) ** 2 * (0.5 * np.pi)
     held = np.minimum(theta_m, 0.5 * np.pi - 0.02)
@@ -26,7 +26,7 @@ def adapted(source: Measurement) -> Adaptive:
     phi_m = np.linspace(-np.pi, np.pi, NORMALS)
     theta = 0.5 * np.pi * (1.0 - (1.0 - np.linspace(0.0, 1.0, VIEWS)) ** 1.4)
     theta[-1] -= 1e-3  # eval is undefined at the horizon
-    weight = 2.0 * np.pi**2 * np.sqrt(theta_m * (2.0 / np.pi)) * np.sin(theta_m)  # d omega_m over du
+    weight = 2.0 * np.pi**2 * np.sqrt(theta_m * (2.0 / np.pi)) * np.sin(theta_m)  # d omega_m / du
     mean = np.gradient(np.linspace(0.0, 1.0, NORMALS))
 
     def cosines(angle: Floats) -> Floats:
@@ -41,7 +41,7 @@ def adapted(source: Measurement) -> Adaptive:
         """The projected area of the facets, int D max(0, wo.m) dm."""
         return np.einsum("vpt,p,t->v", cosines(angle), azimuth_weights, ndf * weight * mean)
 
-    ndf = ndf / float(area(np.zeros(1))[0])  # at normal incidence the facets' projected area is the surface's
+    ndf = ndf / float(area(np.zeros(1))[0])  # at normal incidence, the projected area of the facets is the surface's
     sigma = area(theta_m)
     vndf = cosines(theta) * (ndf * weight) / np.maximum(area(theta), 1e-9)[:, None, None]
     warp = {"phi_i": np.zeros(1), "theta_i": theta, "vndf": vndf[None]}
@@ -58,10 +58,10 @@ def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
     values = np.zeros((*lit.shape, 3))
     values[lit] = source.rgb(wo[lit], wi[lit]) / factor[lit][:, None]
-    for one, valid in zip(values, lit, strict=True):  # below the horizon the nearest value, to preserve those above
+    for one, valid in zip(values, lit, strict=True):  # nearest values below the horizon preserve those above it
         if valid.any():
             one[:] = one[tuple(distance_transform_edt(~valid, return_distances=False, return_indices=True))]
     luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
-    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # light between nodes that are black
+    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # for light between nodes that are black
     arrays = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
     return Adaptive({**warp, **arrays}, title=source.title, source=source.source)

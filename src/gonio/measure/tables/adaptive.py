@@ -1,4 +1,4 @@
-"""Tables in coordinates that follow the material's own distribution of normals, as the RGL measures (Dupuy2018)."""
+"""Tables in coordinates that follow the material's own distribution of normals, as in the RGL's files (Dupuy2018)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..angles import azimuth, direction
 from ..warp import Nodes, Slices, Warp, named
 from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
 
-ROUNDING = 1e-6  # negative densities smaller than this fraction of the largest are noise: one of nine files has -1e-10
+ROUNDING = 1e-6  # relative to the largest density; smaller negative ones are noise: one of nine files has -1e-10
 TINY_JACOBIAN = 1e-6  # as in Mitsuba's `measured`, so that densities agree at the normal too
 
 
@@ -31,7 +31,7 @@ class Adaptive(Measurement):
 
     arrays: phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
     luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all bilinear between nodes on the edges.
-    Isotropic if phi_i has at most 2 entries. Beyond the last angle of view the values of the last one are used.
+    Isotropic if phi_i has at most 2 entries. Beyond the last angle of view, the values at the last one are used.
     """
 
     name = "adaptive"
@@ -86,7 +86,7 @@ class Adaptive(Measurement):
 
     @cached_property
     def _reduction(self) -> int:
-        """How many times the measured azimuths fit into a turn; the others are mirrored into them."""
+        """How many times the measured range of azimuths fits into a turn; other azimuths are mirrored into it."""
         span = self.phi[-1] - self.phi[0]
         return 1 if self.isotropic else max(1, round(2.0 * np.pi / span))
 
@@ -120,7 +120,7 @@ class Adaptive(Measurement):
         return named("rgb", padded(rgb.reshape(-1, *rgb.shape[2:])))
 
     def _folded(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
-        """Both directions, mirrored so that wo lies among the measured azimuths."""
+        """Both directions, mirrored so that wo lies within the measured azimuths."""
         if self._reduction < 2:
             return wo, wi
         flip_y = -copysign(1.0 + 0.0 * wo.y, wo.y)
@@ -163,7 +163,7 @@ class Adaptive(Measurement):
 
     @ops.function
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the visible normal, times that of its position in the luminance, per solid angle of wi."""
+        """The density of the visible normal times that of its position in the luminance, per solid angle of wi."""
         wo, wi = self._folded(wo, wi)
         m = ops.normalize(wo + wi)
         slices, phi = self._slices(wo)
@@ -173,7 +173,7 @@ class Adaptive(Measurement):
 
     @ops.function
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        """A position by luminance, then the normal with its density, at which wo is mirrored."""
+        """A position sampled by luminance, then the normal with its density, and wo reflected by this normal."""
         folded, _ = self._folded(wo, wo)
         slices, phi = self._slices(folded)
         bright = self._bright.sample(slices, u.y, u.z)
@@ -188,7 +188,7 @@ class Adaptive(Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def nodes(self) -> tuple[Floats, Floats, Floats]:
-        """wo and wi of every value of an isotropic table, (theta_i, y, x, 3), and the factor of the value."""
+        """wo and wi for every value of an isotropic table, (theta_i, y, x, 3), and the factor of the value."""
         types = backend.types("float64")
         shape = (len(self.theta), *self.luminance.shape[2:])
         view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))
@@ -232,20 +232,20 @@ class Adaptive(Measurement):
 
 @ops.function
 def polar(w: Direction) -> Scalar:
-    """The angle to the normal, by its chord: 2 asin(|w - z| / 2)."""
+    """The angle to the normal, from its chord: 2 asin(|w - z| / 2)."""
     chord2 = w.x * w.x + w.y * w.y + (w.z - 1.0) * (w.z - 1.0)
     return 2.0 * ops.atan2(sqrt(chord2), ops.safe_sqrt(4.0 - chord2))
 
 
 @ops.function
 def _jacobian(x: Scalar, m: Direction, wi: Direction) -> Scalar:
-    """d omega_i / du: 4 (wi.m) for the mirroring, 2 pi^2 x sin theta_m for the square."""
+    """d omega_i / du: 4 (wi.m) for the reflection, 2 pi^2 x sin theta_m for the square."""
     sin = ops.safe_sqrt(m.x * m.x + m.y * m.y)
     return maximum((2.0 * ops.pi**2) * x * sin, TINY_JACOBIAN) * (4.0 * ops.abs(dot(wi, m)))
 
 
 def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = None) -> tuple[Scalar, ...]:
-    """Every channel of a table with nodes on the edges of the unit square, for a mixture of slices or the only
+    """Every channel of a table with nodes on the edges of the unit square, for a mixture of slices or for the only
     slice."""
     rows, columns = table.shape[-2:]
     at_x, at_y = ops.clamp(x, 0.0, 1.0) * (columns - 1.0), ops.clamp(y, 0.0, 1.0) * (rows - 1.0)

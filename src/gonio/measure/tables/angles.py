@@ -1,4 +1,4 @@
-"""Tables over the angles themselves: theta_i, theta_r and |phi_r - phi_i|, as first proposed by the course."""
+"""Tables over the angles themselves, theta_i, theta_r and |phi_r - phi_i|, as first proposed by the course."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ SAME = 1e-6  # relative difference below which values count as reciprocal: files
 class Angles(Guided, Measurement):
     """f at nodes of (theta_i, theta_r, |phi_r - phi_i|), linear between them (course notes, part B).
 
-    theta_i is the light's angle. Values are constant beyond the first and the last node. If both angles have the same
-    nodes and the values are symmetric, only half of them is stored: those of theta_i <= theta_r.
+    theta_i is the light's angle. Values are constant beyond the first and the last node. If the two axes have the same
+    nodes and the values are symmetric, only half of them are stored: those with theta_i <= theta_r.
     """
 
     name = "angles"
@@ -45,7 +45,7 @@ class Angles(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, theta_r and phi; values: at these nodes, and of each channel."""
+        """grid: the nodes of theta_i, theta_r and phi; values: values per node and channel."""
         super().__init__(title, source, wavelengths)
         theta_i, theta_r, phi = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -60,7 +60,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def reciprocal(self) -> bool:
-        """Whether exchanging both angles changes nothing."""
+        """Whether swapping the two angles changes nothing."""
         if not np.array_equal(self.theta_i, self.theta_r):
             return False
         swapped = np.swapaxes(self.values, 0, 1)
@@ -73,7 +73,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def _table(self) -> Table:
-        """(pair of angles, phi): for a reciprocal table the pairs with i <= r."""
+        """(pair of angles, phi); for a reciprocal table, only the pairs with i <= r."""
         rgb = padded(in_rgb(self.values, self.wavelengths))
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -108,7 +108,7 @@ class Angles(Guided, Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The values, as (pair, phi, channel) of theta_i <= theta_r only, if reciprocity gives the others."""
+        """The values; if reciprocity gives the others, as (pair, phi, channel) of theta_i <= theta_r only."""
         values = self.values
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -149,7 +149,7 @@ def nodes(thetas: int = 46, phis: int = 73) -> tuple[Floats, Floats]:
 
 
 def pairs(theta_i: Floats, theta_r: Floats, phi: Floats) -> tuple[Floats, Floats]:
-    """wo and wi of every node, (N, 3) each, in the order of the table."""
+    """wo and wi for every node, (N, 3) each, in the order of the table."""
     i, r, p = (a.ravel() for a in np.meshgrid(theta_i, theta_r, phi, indexing="ij"))
     wi = np.stack([np.sin(i), 0.0 * i, np.cos(i)], -1)
     return np.stack([np.sin(r) * np.cos(p), np.sin(r) * np.sin(p), np.cos(r)], -1), wi

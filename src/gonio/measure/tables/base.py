@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 class Measurement:
     """Values of a BRDF over directions, as stored, with their metadata.
 
-    name         of the kind: "half-difference", ...
-    title        of the measured material, from the file
+    name         name of the kind: "half-difference", ...
+    title        title of the measured material, from the file
     source       origin: the format, and other metadata of the file
     wavelengths  nm, one per channel; None if the channels are red, green and blue, or a single gray one
     beside       further arrays of the values' shape from an instrument, stored in `.gonio` files: "error", the standard
@@ -36,7 +36,7 @@ class Measurement:
 
     family: ClassVar[Family[type[Measurement]]]
     name: ClassVar[str] = ""
-    axes: ClassVar[Mapping[str, str]] = {}  # of its arrays: name -> description with unit
+    axes: ClassVar[Mapping[str, str]] = {}  # axes of its arrays: name -> description with unit
 
     def __init__(
         self, title: str = "", source: Mapping[str, str] | None = None, wavelengths: Floats | None = None
@@ -48,7 +48,7 @@ class Measurement:
     # ------------------------------------------------------------------ as formulas
 
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f(wo, wi) cos theta_i of two directions above the surface, linear sRGB."""
+        """f(wo, wi) cos theta_i for two directions above the surface, linear sRGB."""
         raise NotImplementedError
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -61,12 +61,12 @@ class Measurement:
 
     @property
     def reciprocal(self) -> bool:
-        """Whether exchanging wo and wi changes nothing, between the stored values too."""
+        """Whether swapping wo and wi changes nothing, also between the stored values."""
         return False
 
     @property
     def mirrored(self) -> bool:
-        """Whether it is mirror-symmetric to the last digits, between the stored values too."""
+        """Whether it is mirror-symmetric to the last digit, also between the stored values."""
         return False
 
     sums: ClassVar[bool] = False  # whether lookups search cumulative sums
@@ -76,16 +76,16 @@ class Measurement:
         return albedo(self, np.radians(ANGLES))
 
     def albedos(self) -> Floats:
-        """The directional albedo at `ANGLES` of view, (N, 3), by 4096 samples each, with errors of some thousandths."""
+        """The directional albedo at `ANGLES` of view, (N, 3), from 4096 samples each, with errors of a few 0.001."""
         return self._albedos
 
     @property
     def angular_range(self) -> AngularRange:
-        """The measured angles; beyond, the nearest values are used."""
+        """The measured angles; beyond these, the nearest values are used."""
         return EVERYWHERE
 
     def prepare(self) -> None:
-        """Compute expensive data for the formulas, which is impossible while a renderer records its kernels."""
+        """Compute expensive data for the formulas, which is impossible while a renderer is recording its kernels."""
 
     @property
     def isotropic(self) -> bool:
@@ -118,7 +118,7 @@ class Measurement:
         raise NotImplementedError
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
-        """f cos theta_i of pairs, (N, 3), in float64; 0 below the surface."""
+        """f cos theta_i for pairs, (N, 3), in float64; 0 below the surface."""
         types = backend.types("float64")
         rgb = np.empty((len(wo), 3))
         for start in range(0, len(wo), CHUNK):
@@ -159,7 +159,7 @@ Measurement.family = Family("kind of table", "gonio.tables", ["gonio.measure.tab
 
 
 def above(wo: Direction, wi: Direction) -> Mask:
-    """Whether both lie above the surface."""
+    """Whether both directions lie above the surface."""
     return (wo.z > 0.0) & (wi.z > 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Tables without a density of their own: they are sampled by a guide computed from their values."""
+"""Tables without a density of their own, which are sampled by a guide computed from their values."""
 
 from __future__ import annotations
 

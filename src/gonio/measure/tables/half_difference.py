@@ -1,4 +1,4 @@
-"""Tables over half vector and difference angle, as the MERL database (Matusik2003)."""
+"""Tables over half vector and difference angle, as in the MERL database (Matusik2003)."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..warp import named
 from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
-GRAZING = 0.03  # cosine of light under which a value f cos theta_i tells nothing of f: 1.7 degrees from the horizon
+GRAZING = 0.03  # smallest cosine of light at which f cos theta_i determines f: 1.7 degrees from the horizon
 
 
 class HalfDifference(Guided, Measurement):
     """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
 
     Cell (i, j, k) of (n, m, l) covers theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns, theta_d in equal steps
-    of a quarter turn, phi_d in equal steps of half a turn, or of a full one. Half a turn suffices by reciprocity:
-    exchanging wo and wi adds pi to phi_d. Values belong to the centers of cells, in the square root too, and are linear
-    between them; phi_d is periodic. Before the first center and beyond the last, values are constant: in a table of
-    MERL's size theta_h > 89.0 and theta_d > 89.5 degrees are extrapolated.
+    of a quarter turn, phi_d in equal steps of half a turn, or of a full one. Half a turn suffices for reciprocal
+    tables, since swapping wo and wi adds pi to phi_d. Values belong to the centers of cells, also with respect to the
+    square root, and are linear between them; phi_d is periodic. Before the first center and beyond the last, values are
+    constant: in a table of MERL's size, theta_h > 89.0 and theta_d > 89.5 degrees are extrapolated.
 
-    A negative cell is invalid: its value is 0. Its number is preserved; the interpolation replaces it by the number of
-    the preceding valid cell along theta_d, where both directions are higher.
+    A negative cell is invalid, with a value of 0. Its number is preserved; the interpolation replaces it by the number
+    of the preceding valid cell along theta_d, where both directions are higher.
     """
 
     name = "half-difference"
@@ -69,7 +69,7 @@ class HalfDifference(Guided, Measurement):
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether phi_d and its opposite have the same values."""
+        """Whether phi_d and -phi_d have the same values."""
         return bool(np.allclose(self.values, self.values[:, :, ::-1], rtol=1e-9, atol=0.0))
 
     @property
@@ -90,12 +90,12 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def _folded(self) -> bool:
-        """Whether half of it, up to a phi_d of a quarter turn, suffices: fewer bytes are faster to fetch."""
+        """Whether half of the table, up to a phi_d of a quarter turn, suffices: fewer bytes are faster to fetch."""
         return self.mirrored and self.reciprocal and self.values.shape[2] % 2 == 0
 
     def _held(self, values: Floats) -> Floats:
-        """Invalid cells replaced by the last valid one at a smaller theta_d, since both directions rise with it; if
-        there is none, by the nearest, with a step along theta_h counted as four of the others."""
+        """Invalid cells replaced by the last valid one at a smaller theta_d, where both directions are higher; if there
+        is none, by the nearest, with a step along theta_h counted as four of the others."""
         step = np.arange(values.shape[1])[None, :, None]
         last = np.maximum.accumulate(np.where(self.valid, step, -1), axis=1)
         held = np.take_along_axis(values, np.maximum(last, 0)[..., None], axis=1)
@@ -169,7 +169,7 @@ def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, F
 
 
 def pair_at(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
-    """wo and wi of a half vector in the plane of x and z and a difference: the inverse of `angles.half_difference`."""
+    """wo and wi for a half vector in the x-z plane and a difference: the inverse of `angles.half_difference`."""
     sin_h, cos_h, sin_d, cos_d = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
     along, side = sin_d * np.cos(phi_d), sin_d * np.sin(phi_d)
     offset = np.stack([along * cos_h, side, -along * sin_h], -1)
@@ -183,11 +183,12 @@ def sampled(
     """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at the centers of the cells.
 
     A cell whose center lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
-    exchange, whose values are f cos theta_i and f cos theta_o if the material is reciprocal. Least squares of both give
+    swapped pair, whose values are f cos theta_i and f cos theta_o if the material is reciprocal. Least squares of the
+    two give
 
         f = (v cos theta_i + v' cos theta_o) / (cos^2 theta_i + cos^2 theta_o).
 
-    The mean of the quotients would divide the error of a value at grazing light by a cosine close to 0.
+    The mean of the quotients would divide the error of a value near grazing angles by a cosine close to 0.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
@@ -196,7 +197,7 @@ def sampled(
     cosine_o, cosine_i = wo[lit, 2:], wi[lit, 2:]
     forward = value(wo[lit], wi[lit])
     f = (forward * cosine_i + value(wi[lit], wo[lit]) * cosine_o) / (cosine_i**2 + cosine_o**2)
-    if turn > 4.0:  # a cell of its own for each, but the quotient is unreliable at grazing light
+    if turn > 4.0:  # each has its own cell, but the quotient is unreliable at grazing angles
         f = np.where(cosine_i > GRAZING, forward / cosine_i, f)
     values[lit] = np.maximum(f, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

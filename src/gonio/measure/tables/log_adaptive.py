@@ -15,7 +15,7 @@ from .base import Floats
 from .log_table import COLOURS, from_cosines, head, unpacked
 from .rebuilt import Rebuilt
 
-MIN_LUMINANCE = 0.02  # of a view's mean luminance: light between nodes that are black
+MIN_LUMINANCE = 0.02  # fraction of a view's mean luminance, for light between nodes that are black
 
 
 class LogAdaptive(Rebuilt):
@@ -51,6 +51,6 @@ class LogAdaptive(Rebuilt):
 
 
 def log_values(values: Floats, offset: float) -> Floats:
-    """asinh(value / offset) as brightness and two differences, (view, y, x, 3), of (phi_i, theta_i, 3, y, x)."""
+    """asinh(value / offset) as brightness and two differences, (view, y, x, 3), from (phi_i, theta_i, 3, y, x)."""
     last = np.moveaxis(values, 2, -1)
     return np.arcsinh(last.reshape(-1, *last.shape[2:]) / offset) @ COLOURS.T

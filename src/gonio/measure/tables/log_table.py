@@ -17,12 +17,12 @@ from .half_difference import HalfDifference, centres
 
 Ints = NDArray[np.int64]
 
-LARGEST = 90 * 90 * 360  # cells: the limit for a compressed file, the largest of MERL's sizes
+LARGEST = 90 * 90 * 360  # limit on the number of cells in a compressed file: the largest of MERL's sizes
 PLANES = 3  # bytes of an integer
-# Raw streams without a header, so a file cannot request more memory than these settings. Bytes of integers are not
-# text.
+# Raw streams without a header, so a file cannot request more memory than these settings. The context bits are 0 because
+# bytes of integers are not text.
 CODER = [{"id": lzma.FILTER_LZMA2, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}]
-# Brightness and two differences: the channels of most materials differ by a nearly constant factor. Orthonormal.
+# Brightness and two differences, orthonormal: the channels of most materials differ by a nearly constant factor.
 COLOURS = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [0.5, -1.0, 0.5]])
 COLOURS = COLOURS / np.linalg.norm(COLOURS, axis=1, keepdims=True)
 
@@ -31,7 +31,7 @@ class LogTable(HalfDifference):
     """A table of log(f + offset) as cosine coefficients, each rounded to a multiple of `step`.
 
     The discrete cosine transform over (theta_h, theta_d, phi_d) concentrates smooth parts in few numbers; most others
-    become 0. Rounding causes a uniform error of the logarithm, hence a relative error of f. Cells whose center lies
+    become 0. Rounding causes a uniform error of the logarithm, and hence a relative error of f. Cells whose center lies
     below the surface are invalid again; other invalid cells hold the values of the cosine series.
     """
 

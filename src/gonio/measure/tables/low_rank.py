@@ -49,5 +49,5 @@ def expanded(core: Floats, bases: list[Floats]) -> Floats:
 
 
 def projected(logs: Floats, bases: list[Floats]) -> Floats:
-    """The core closest to given logarithms, for bases of orthonormal columns."""
+    """The core closest to given logarithms, for bases with orthonormal columns."""
     return expanded(logs, [basis.T for basis in bases])

@@ -21,10 +21,10 @@ SHAPES = {"kernel0": (6, 21), "bias0": (21,), "kernel1": (21, 21), "bias1": (21,
 
 
 class Network(Guided, Measurement):
-    """f = exp(network(half vector, difference vector)) - 1 with 6 -> 21 -> 21 -> 3 rectified units, 675 weights.
+    """f = exp(network(half vector, difference vector)) - 1, with 6 -> 21 -> 21 -> 3 rectified units, 675 weights.
 
-    The half vector is rotated above x, the difference vector is the light's direction in its frame, on the side of
-    y >= 0, so exchanging both directions changes nothing. Negative outputs are 0. The network itself is evaluated
+    The half vector is rotated above x; the difference vector is the light's direction in its frame, on the side of
+    y >= 0, so swapping the two directions changes nothing. Negative outputs are 0. The network itself is evaluated
     wherever f is: in renders and in shaders.
     """
 

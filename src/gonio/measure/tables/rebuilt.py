@@ -13,8 +13,8 @@ from ...errors import InputError
 from .adaptive import Adaptive
 from .base import Floats, axis, finite
 
-LARGEST = 1 << 23  # values of a rebuilt `vndf`: six times the largest of the RGL's
-ROUNDS = 12  # of alternately solving for the normals and the scale of each view
+LARGEST = 1 << 23  # largest number of values of a rebuilt `vndf`: six times the largest in the RGL's files
+ROUNDS = 12  # rounds of solving alternately for the normals and for the scale of each view
 
 
 class Rebuilt(Adaptive):
@@ -97,7 +97,7 @@ def normals_of(table: Adaptive) -> Floats:
 
 
 def rebuilding(table: Adaptive) -> dict[str, NDArray[np.generic]]:
-    """The arrays that `Rebuilt` requires in place of `vndf`."""
+    """The arrays that `Rebuilt` requires instead of `vndf`."""
     return {"normals": normals_of(table), "shape": np.array(table.vndf.shape[2:], np.int32)}
 
 

@@ -19,16 +19,16 @@ from .half_difference import HalfDifference, centres
 
 CELLS = (45, 30, 30)  # of the table that interpolates the samples
 NEIGHBORS = 24  # samples from which a cell is interpolated
-DARK = 1e-3  # of the median value: separates absolute from relative differences
-SAME = 1e-6  # distance in the features below which samples are repeated measurements
+DARK = 1e-3  # fraction of the median value: separates absolute from relative differences
+SAME = 1e-6  # distance of features below which samples are repeated measurements
 
 
 class Samples(Guided, Measurement):
     """f at pairs of directions (theta_i, phi_i, theta_r, phi_r), in no order.
 
-    Between them f is interpolated linearly over the distance in theta_h by its square root, theta_d and phi_d, among
-    the 24 nearest samples, in the logarithm of the values. This is done once, at the centers of a half-difference
-    table, which is evaluated from then on. A pair shares its value with its mirror image and its exchange: isotropy and
+    Between them, the logarithm of f is interpolated from the 24 nearest samples by a linear radial basis function of
+    the distance in sqrt(theta_h), theta_d and phi_d. This is done once, at the centers of a half-difference table,
+    which is evaluated from then on. A pair shares its value with its mirror image and its swapped pair: isotropy and
     reciprocity are assumed.
     """
 
@@ -45,7 +45,7 @@ class Samples(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """directions  (N, 4), as above, i the light's; values: (N, channel)"""
+        """directions: (N, 4), as above, i the light's; values: (N, channel)"""
         super().__init__(title, source, wavelengths)
         self.directions, self.values = finite(directions, "the directions", where), finite(values, "the values", where)
         if self.directions.ndim != 2 or self.directions.shape[1] != 4 or self.values.ndim != 2:
@@ -73,7 +73,7 @@ class Samples(Guided, Measurement):
 
     @property
     def angular_range(self) -> AngularRange:
-        """The range of both directions together, since a pair also represents its exchange."""
+        """The range of the two directions together, since a pair also represents its swapped pair."""
         ends = np.sort(self.directions[:, [0, 2]], axis=None)
         return of_nodes(ends, ends, np.zeros(0))
 
@@ -131,7 +131,7 @@ class Samples(Guided, Measurement):
 def _features(wo: Floats, wi: Floats) -> Floats:
     """The coordinates of a pair, (N, 4): theta_h by its square root, theta_d, and phi_d weighted by theta_d.
 
-    cos 2 phi_d and |sin 2 phi_d| are the same for a pair, its mirror image and its exchange.
+    cos 2 phi_d and |sin 2 phi_d| are the same for a pair, its mirror image and its swapped pair.
     """
     h, d = wo + wi, wi - wo
     flat, length = np.hypot(h[:, 0], h[:, 1]), np.linalg.norm(h, axis=1)

@@ -20,11 +20,11 @@ from .guided import Guided
 
 
 class Specular(Guided, Measurement):
-    """f at nodes of (theta_i, azimuth, radial), the view's polar angles about the mirror direction of the light.
+    """f at nodes of (theta_i, azimuth, radial), the polar angles of the view about the mirror direction of the light.
 
-    Radial 0 is the mirror direction; azimuth 0 points from there to the normal (Zemax's tabular BSDF). Linear between
-    nodes, constant beyond the first and the last; an azimuth that ends at pi is mirrored, one that ends at 2 pi is
-    periodic.
+    Radial 0 is the mirror direction; azimuth 0 points from there to the normal (Zemax's tabular BSDF). Values are
+    linear between nodes and constant beyond the first and the last; an azimuth that ends at pi is mirrored, one that
+    ends at 2 pi is periodic.
     """
 
     name = "specular"
@@ -43,7 +43,7 @@ class Specular(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, azimuth and radial; values: at these nodes, and of each channel."""
+        """grid: the nodes of theta_i, azimuth and radial; values: values per node and channel."""
         super().__init__(title, source, wavelengths)
         theta_i, azimuth, radial = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -135,7 +135,7 @@ def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scal
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes, or above those that lie too low."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes, or above nodes that lie too low."""
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
     radial = np.radians(

@@ -1,4 +1,4 @@
-"""Artist-friendly parameters of metals, reflectivity and edge tint, and a fit of F_avg in them."""
+"""Artist-friendly parameters of metals, reflectivity and edge tint, and a fit of F_avg as a function of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def edge_tint(eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
 
 def index_of(r: Reals, g: Reals) -> tuple[Reals, Reals]:
     """(eta, k) of the metal with reflectivity r and edge tint g, both in (0, 1) (Gulbrandsen2014, eq. 2
-    and 3): `go.Conductor(*index_of(np.array([0.944, 0.776, 0.373]), np.array([0.998, 0.981, 0.751])))` is about gold.
+    and 3): `go.Conductor(*index_of(np.array([0.944, 0.776, 0.373]), np.array([0.998, 0.981, 0.751])))` resembles gold.
     """
     root = r**0.5
     eta = g * (1.0 - r) / (1.0 + r) + (1.0 - g) * (1.0 + root) / (1.0 - root)

@@ -1,4 +1,4 @@
-"""The base of all Fresnel kinds; a member must define `curve`, or both `conductor` and `dielectric`.
+"""The base of all Fresnel kinds; a member must define `curve`, or `conductor` and `dielectric`.
 
 `eta` is the index on the far side divided by the index on the incident side; for conductors eta and k are those of the
 metal divided by the index of the outer dielectric. Cosines, >= 0, are relative to the facet's normal.
@@ -17,7 +17,7 @@ from ..special import gauss
 R = TypeVar("R", Scalar, Spectrum)
 N = TypeVar("N", float, Scalar, Spectrum)
 
-# Gauss-Legendre in sqrt(mu). Errors: 2e-7 over every metal preset, 4e-8 for glass with eta 1.05 to 3
+# of the Gauss-Legendre rule in sqrt(mu); error 2e-7 for all metal presets, 4e-8 for glass with eta from 1.05 to 3
 NODES = 10
 
 
@@ -26,7 +26,7 @@ class Fresnel(Part):
 
     The first line of a member's docstring is its title in the manual.
 
-    white  whether it reflects everything at any angle and index: the kind used for furnace tests and tables
+    white  whether it reflects all light at any angle and index, as furnace tests and tables require
     """
 
     name: ClassVar[str] = ""
@@ -59,11 +59,11 @@ class Fresnel(Part):
         return where(cos_t > 0.0, self.curve(where(eta < 1.0, cos_t, cos_i), r0_dielectric(eta)), 1.0)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """F_avg = 2 int F mu dmu of a metal by Gauss's rule in sqrt(mu), error 2e-7."""
+        """F_avg = 2 int F mu dmu of a metal by Gauss-Legendre quadrature in sqrt(mu); error 2e-7."""
         return average(lambda mu: self.conductor(mu, eta, k))
 
     def dielectric_average(self, eta: Scalar) -> Scalar:
-        """F_avg of a dielectric from its less dense side, eta or 1 / eta, by Gauss's rule in sqrt(mu), error 4e-8.
+        """F_avg of a dielectric of index eta or 1 / eta from its less dense side, by the same rule; error 4e-8.
 
         From the denser side it is 1 - (1 - F_avg) / eta^2, eta > 1, by reciprocity.
         """
@@ -85,7 +85,7 @@ def kind(name: str) -> Fresnel:
 
 
 def average(reflectance: Callable[[float], R]) -> R:
-    """2 int F(mu) mu dmu of a function of the cosine; a static sum, so it can be recorded."""
+    """2 int F(mu) mu dmu of a function of the cosine, as a sum of fixed length, which can be recorded."""
     rule = [(float(x), float(w)) for x, w in zip(*gauss(NODES), strict=True)]  # NumPy floats would absorb Dr.Jit values
     (x, w), *others = rule
     total = reflectance(x * x) * (4.0 * w * x**3)
@@ -98,7 +98,7 @@ def average(reflectance: Callable[[float], R]) -> R:
 def cos_transmitted(cos_i: Scalar, eta: Scalar) -> Scalar:
     """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
 
-    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels at the critical angle only.
+    sqrt(1 - (1 - cos^2) / eta^2), with eta^2 - 1 as a product, so that it cancels only at the critical angle.
     """
     return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
 

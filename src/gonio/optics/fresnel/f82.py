@@ -1,4 +1,4 @@
-"""Schlick's curve through a second value near grazing: the F82 model of Adobe Standard Material."""
+"""Schlick's curve with a second given value near grazing: the F82 model of Adobe Standard Material."""
 
 from __future__ import annotations
 
@@ -35,8 +35,11 @@ def _edge(eta: Scalar) -> Scalar:
 
 @function
 def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
-    """Schlick's curve from r0 minus c x (1 - x)^6, with c such that the value at cosine 1/7 is `edge` (Kutz2021);
-    clamped to >= 0, since a dark edge with a dark r0 would make it negative."""
+    """Schlick's curve from r0 minus c x (1 - x)^6, x = cos_i, with c such that the value at 1/7 is `edge` (Kutz2021).
+
+    Clamped to >= 0, since a dark edge with a dark r0 would make it negative.
+    """
     x = minimum(maximum(cos_i, 0.0), 1.0)
     dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)
-    return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)  # this order has a gradient at r0 = 0
+    # with the arguments of `maximum` in this order the gradient at r0 = 0 exists
+    return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)

@@ -1,7 +1,7 @@
-"""Reflection by a thin film on a surface: interference of the waves from its two faces, and its colors.
+"""Reflection by a thin film on a surface: interference of the waves from its two faces, and the resulting colors.
 
-`film_amplitudes` has the amplitudes at one wavelength, which spectral variants evaluate. RGB colors follow from them by
-one of the members of `FORMS`. All indices are relative to the outside.
+`film_amplitudes` computes the amplitudes at one wavelength, as spectral variants need them. RGB colors follow from
+these by one of the methods in `FORMS`. All indices are relative to the outer medium.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FORMS = {
     "belcour-barla": "the interference as Gaussians in Fourier space (Belcour2017)",
 }
 
-# 390 to 770 nm in steps of 20: the fringes of a 1 um film are 100 nm apart, of a 3 um film 35 nm
+# 390 to 770 nm in steps of 20: the fringes of a 1 um film are 100 nm apart, those of a 3 um film 35 nm
 NODES = np.arange(390.0, 771.0, 20.0)
 WEIGHTS = colour.weights(NODES)
 
@@ -32,11 +32,11 @@ WEIGHTS = colour.weights(NODES)
 class Film(NamedTuple):
     """A film on a base, as a material describes it.
 
-    eta, k      of the base, per channel; k None: the base is clear without total reflection from outside, eta > sin
+    eta, k      index of the base, per channel; k is None for a clear base without total reflection (eta > sin)
     film_eta    index of the film
     thickness   nm
     form        a name of `FORMS`
-    wavelengths of the rays, nm, one per channel, in spectral variants; else None
+    wavelengths those of the rays, nm, one per channel, in spectral variants; else None
     """
 
     eta: Spectrum
@@ -48,7 +48,7 @@ class Film(NamedTuple):
 
 
 def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
-    """R of unpolarized light at cos_i: at the rays' wavelengths if these are known, else by the film's form."""
+    """R for unpolarized light at cos_i: at the rays' wavelengths if given, else as a color by the film's form."""
     index = film.eta, film.k, film.film_eta, film.thickness
     if film.wavelengths is not None:
         return _spectrum_of(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
@@ -69,7 +69,7 @@ def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: 
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-    """Polarization by reflection and refraction from outside, summed over wavelengths for every form of the film."""
+    """Diattenuation by reflection and by refraction from outside; for every form of the film a sum over wavelengths."""
 
     def summed(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
         def at(eta: Scalar, k: Scalar | None, nm: Scalar | float) -> Scalar:
@@ -81,7 +81,7 @@ def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Di
         return waves.s.times(waves.p.conjugate)
 
     def transmitted(waves: Amplitudes) -> Complex:
-        """t_s times the conjugate of t_p; their phases differ only by their denominators."""
+        """t_s times the conjugate of t_p, whose phases differ only by those of their denominators."""
         phase = waves.under_s.conjugate.times(waves.under_p)
         size = maximum(1.0 - waves.s.square, 0.0) * maximum(1.0 - waves.p.square, 0.0)
         return phase.scaled(sqrt(size / maximum(phase.square, 1e-30)))
@@ -137,8 +137,11 @@ def _sum(
     nodes: Sequence[int],
     at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar],
 ) -> Spectrum:
-    """The color of `at` over some of the nodes. Red, green and blue indices are those at `RGB_WAVELENGTHS`; between
-    these they are interpolated linearly, beyond them they are constant."""
+    """The contribution of some of the nodes to the color of `at`.
+
+    The red, green and blue indices hold at `RGB_WAVELENGTHS`; between these they are interpolated linearly, beyond they
+    are constant.
+    """
     etas, ks = channels(eta), channels_of_k(k, eta)
     mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]
     totals: list[Scalar] = []

@@ -1,7 +1,7 @@
 """The amplitudes of a thin film: its faces, and the sum of all waves that they reflect.
 
-With the amplitudes r12 of the film's upper face and r23 of the surface below it, and the phase delta = 4 pi d w2 /
-lambda of a round trip, w2 = sqrt(eta2^2 - sin^2), the sum is (Airy; Born1999, sec. 7.6)
+With the amplitudes r12 of the film's upper face and r23 of the surface below it, and the round-trip phase
+delta = 4 pi d w2 / lambda, w2 = sqrt(eta2^2 - sin^2), the sum is (Airy; Born1999, sec. 7.6)
 
     r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)).
 """
@@ -46,7 +46,7 @@ class Complex(NamedTuple):
 
 
 class Real(NamedTuple):
-    """A real number with the interface of `Complex`, for clear bases: a third of the work."""
+    """A real number with the interface of `Complex`, for clear bases, at a third of the cost."""
 
     re: Scalar
 
@@ -90,7 +90,7 @@ class Faces(NamedTuple):
 
 
 class ClearFaces(NamedTuple):
-    """`Faces` of a clear base."""
+    """`Faces` for a clear base."""
 
     top: tuple[Scalar, Scalar]
     base: tuple[Real, Real]
@@ -123,8 +123,9 @@ def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickn
 
 
 def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tuple[Complex, Complex]:
-    """(r_s, r_p) between two media, a over b, with w = sqrt(n^2 - sin^2): r_s = (n_a^2 - n_b^2) / (w_a + w_b)^2 and
-    r_p = -r_s (w_a w_b - sin^2) / (w_a w_b + sin^2). Nothing cancels if the indices are close."""
+    """(r_s, r_p) of the face between medium a above and b below: with w = sqrt(n^2 - sin^2),
+    r_s = (n_a^2 - n_b^2) / (w_a + w_b)^2 and r_p = -r_s (w_a w_b - sin^2) / (w_a w_b + sin^2), in which nothing cancels
+    for close indices."""
     both = Complex(above + below.re, below.im)
     s = contrast.over(both.times(both))
     product = below.scaled(above)
@@ -148,7 +149,7 @@ def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
 
 
 class Amplitudes(NamedTuple):
-    """The sum of all waves at one wavelength: the reflected fields, and their denominators under_s and under_p."""
+    """The sums of all waves at one wavelength: reflected amplitudes s, p and their denominators."""
 
     s: Complex
     p: Complex
@@ -160,8 +161,8 @@ class Amplitudes(NamedTuple):
 def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
     """The sum of all waves at a wavelength in the unit of the thickness.
 
-    With E = e^(i delta) the numerator is r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), with r13 of the bare surface:
-    it cancels only where the waves do.
+    With E = e^(i delta) the numerator is r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), where r13 is that of the bare
+    surface: it cancels only where the waves do.
     """
     turns = 2.0 * film.way / wavelength
     half_angle = (turns - floor(turns)) * math.pi  # sine in shaders is accurate near 0 only

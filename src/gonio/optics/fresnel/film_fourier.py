@@ -25,27 +25,29 @@ from .film_amplitudes import Amplitude, Complex, channels_of_k, faces
 
 
 def _of_unit(height: float, place: float, variance: float) -> tuple[float, float, float]:
-    """A Gaussian, its height scaled so that the integral of y is 1."""
+    """A Gaussian whose height is scaled so that y integrates to 1."""
     return height * math.sqrt(2.0 * math.pi * variance) / 1.0685e-7, place, variance
 
 
 Curve: TypeAlias = tuple[tuple[float, float, float], ...]
 
-# Fits of the color-matching functions over wave numbers as sums of Gaussians (Belcour2017, supplemental code): height,
-# center and variance
+# Fits of the color-matching functions, as functions of the wave number, by sums of Gaussians (Belcour2017, supplemental
+# code): height, center and variance
 CURVES: tuple[Curve, Curve, Curve] = (
     (_of_unit(5.4856e-13, 1.6810e6, 4.3278e9), _of_unit(9.7470e-14, 2.2399e6, 4.5282e9)),
     (_of_unit(4.4201e-13, 1.7953e6, 9.3046e9),),
     (_of_unit(5.2481e-13, 2.2084e6, 6.6121e9),),
 )
-HARMONICS = 3  # the next is r^4 of the first, and the color-matching functions average it out
+HARMONICS = 3  # the next is |r12 r23|^3 times the first, and the color-matching functions average it out
 WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted for an equal-energy spectrum
 
 
 @function
 def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
-    """Belcour2017, eq. 6 to 10, with the mean term per RGB channel; the harmonics with red, green and blue indices are
-    used for x, y and z."""
+    """The color of R by Belcour2017, eq. 6 to 10.
+
+    The mean term is computed per RGB channel; the harmonics of x, y and z use the red, green and blue indices.
+    """
     etas, ks = channels(eta), channels_of_k(k, eta)
     if len(etas) != 3:
         luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, *CURVES[1][0])
@@ -78,7 +80,7 @@ def _band(
     place: float,
     variance: float,
 ) -> Band:
-    """Mean of both polarizations for a color-matching function fitted by one Gaussian."""
+    """Mean of the two polarizations for a color-matching function fitted by one Gaussian."""
     return _through([(height, place, variance)], cos_i, eta, k, film_eta, thickness)
 
 
@@ -96,7 +98,7 @@ def _band_of_two(
     other_place: float,
     other_variance: float,
 ) -> Band:
-    """Mean of both polarizations for a color-matching function fitted by two Gaussians."""
+    """Mean of the two polarizations for a color-matching function fitted by two Gaussians."""
     fits = [(height, place, variance), (other_height, other_place, other_variance)]
     return _through(fits, cos_i, eta, k, film_eta, thickness)
 
@@ -109,7 +111,7 @@ def _through(
     film_eta: Scalar,
     thickness: Scalar,
 ) -> Band:
-    """Mean of both polarizations for a sum of Gaussians, each given by height, center and variance."""
+    """Mean of the two polarizations for a sum of Gaussians, each given by height, center and variance."""
     film = faces(cos_i, eta, k, film_eta, thickness)
     mean, wave = zeros_like(cos_i), zeros_like(cos_i)
     trips: list[Amplitude] = []  # one round trip through the film, without its phase
@@ -124,7 +126,7 @@ def _through(
         sizes.append(bounced - passed)
     path = film.way * 2e-9
     bells = [_bell(path, place, variance) for _, place, variance in fits]
-    # on a path n times as long the phase is n-fold, and the attenuation has the n^2-th power
+    # a path n times as long multiplies the phase by n and raises the attenuation to the power n^2
     waves = [bell.turn for bell in bells]
     powers = trips
     for order in range(1, HARMONICS + 1):
@@ -142,7 +144,7 @@ def _through(
 
 
 class Bell(NamedTuple):
-    """The Fourier transform of a Gaussian over wave numbers: an attenuated wave.
+    """The Fourier transform of a Gaussian in the wave number: an attenuated wave.
 
     turn  the phase factor
     left  the attenuation

@@ -1,4 +1,4 @@
-"""The effect of a smooth interface on polarization, in real numbers: its Mueller matrix divided by the first entry.
+"""The effect of a smooth interface on polarization, in real numbers: its Mueller matrix divided by its first entry.
 
 In the frame of the plane of incidence, with Q = s minus p, it is ((1, d, 0, 0), (d, 1, 0, 0), (0, 0, c, -s),
 (0, 0, s, c)), d^2 + c^2 + s^2 = 1: `gonio.optics.fresnel.waves` has the underlying amplitudes.
@@ -14,11 +14,11 @@ V = TypeVar("V", Scalar, Spectrum)
 
 
 class Diattenuation(NamedTuple, Generic[V]):
-    """The ratio of s to p after an interface.
+    """The relation of s to p after an interface.
 
-    d  (R_s - R_p) / (R_s + R_p); for refracted light with T
-    c  cosine of the phase between them, times 2 sqrt(R_s R_p) / (R_s + R_p)
-    s  its sine, likewise
+    d  (R_s - R_p) / (R_s + R_p); for refracted light, T in place of R
+    c  cosine of the phase between s and p, times 2 sqrt(R_s R_p) / (R_s + R_p)
+    s  sine of this phase, times the same factor
     """
 
     d: V
@@ -28,25 +28,25 @@ class Diattenuation(NamedTuple, Generic[V]):
 
 @function
 def reflected_by_metal(cos_i: Scalar, eta: Spectrum, k: Spectrum) -> Diattenuation[Spectrum]:
-    """For an index n = eta + i k: with w = sqrt(n^2 - sin^2) = a + i b it follows from
+    """Reflection at an index n = eta + i k, with w = sqrt(n^2 - sin^2) = a + i b, by
     r_p / r_s = -(cos w - sin^2) / (cos w + sin^2)."""
     sin2 = 1.0 - sqr(cos_i)
     t, product = sqr(eta) - sqr(k) - sin2, eta * k  # a^2 - b^2 and a b
     w2 = sqrt(maximum(fma(t, t, 4.0 * sqr(product)), 1e-30))
-    larger = sqrt(maximum(0.5 * (w2 + abs(t)), 1e-24))  # of a and b; the smaller would cancel
+    larger = sqrt(maximum(0.5 * (w2 + abs(t)), 1e-24))  # the larger of a and b; the smaller would cancel
     other = product / larger
     return _reflected(cos_i, w2, where(t > 0.0, larger, other), where(t > 0.0, other, larger))
 
 
 @function
 def reflected_by_glass(cos_i: Scalar, eta: Scalar) -> Diattenuation[Scalar]:
-    """For a real index, from either side; beyond the critical angle w is imaginary, and only the phases differ."""
+    """Reflection at a real index, from either side; beyond the critical angle only the phases differ."""
     t = fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))
     return _reflected(cos_i, abs(t), safe_sqrt(t), safe_sqrt(-t))
 
 
 def _reflected(cos_i: Scalar, w2: V, a: V, b: V) -> Diattenuation[V]:
-    """From w, given by its squared absolute value, its real part and its imaginary part."""
+    """Reflection at a surface with w = a + i b and w2 = |w|^2."""
     sin2 = 1.0 - sqr(cos_i)
     p = maximum(sqr(cos_i) * w2 + sqr(sin2), 1e-30)
     twice = 2.0 * cos_i * sin2
@@ -55,7 +55,7 @@ def _reflected(cos_i: Scalar, w2: V, a: V, b: V) -> Diattenuation[V]:
 
 @function
 def refracted(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Diattenuation[Scalar]:
-    """For light that enters glass: T_p / T_s = 1 / cos^2(theta_i - theta_t), with no phase between them."""
+    """Refraction into glass: T_p / T_s = 1 / cos^2(theta_i - theta_t), with no phase between s and p."""
     g = cos_i * cos_t + (1.0 - sqr(cos_i)) / eta
     both = 1.0 / (1.0 + sqr(g))
     return Diattenuation((sqr(g) - 1.0) * both, 2.0 * g * both, zeros_like(g))

@@ -1,4 +1,4 @@
-"""The complete Fresnel equations: amplitudes, phases and Mueller matrices of both polarizations, in NumPy.
+"""The complete Fresnel equations: amplitudes, phases and Mueller matrices for s and p polarization, in NumPy.
 
 Fields vary as exp(-i omega t), so an absorbing medium has n = eta + i k with k >= 0. With w = n cos_t =
 sqrt(n^2 - sin^2), the root that decays into the surface (Born1999, sec. 1.5 and 14.2; Hecht2017, sec. 4.6):
@@ -6,7 +6,7 @@ sqrt(n^2 - sin^2), the root that decays into the surface (Born1999, sec. 1.5 and
     r_s = (cos - w) / (cos + w)              t_s = 2 cos / (cos + w)
     r_p = (n^2 cos - w) / (n^2 cos + w)      t_p = 2 n cos / (n^2 cos + w)
 
-s points along normal x direction, and p is s rotated toward the surface, on both rays: at normal incidence r_p = -r_s.
+On either ray s points along normal x direction, and p is s rotated toward the surface: at normal incidence r_p = -r_s.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Waves: TypeAlias = NDArray[np.complex128]
 
 
 class Interface(NamedTuple):
-    """The response of a smooth interface to a plane wave: arrays of the common shape of angle, eta and k.
+    """The response of a smooth interface to a plane wave, as arrays of the broadcast shape of angle, eta and k.
 
     r_s, r_p      complex amplitudes of the reflected field relative to the incident one
-    t_s, t_p      those of the refracted field; in a metal just below the surface
+    t_s, t_p      those of the refracted field, in a metal just below the surface
     R_s, R_p, R   reflectances: fractions of the power; R, their mean, is that of unpolarized light
-    T_s, T_p, T   transmittances, R + T = 1; in a metal the absorbed fraction
+    T_s, T_p, T   transmittances, R + T = 1; for a metal the absorbed fractions
     phase_s, phase_p  phase lag of the reflected field, radians in (-pi, pi]: the angle of r_s and r_p
     brewster      angle of the smallest R_p, radians: arctan(eta) where k = 0, with R_p = 0; for a metal the
                   pseudo-Brewster angle
@@ -63,7 +63,7 @@ class Interface(NamedTuple):
         """Mueller matrix of the refraction, (..., 4, 4), in power, as in `mi.mueller.specular_transmission`."""
         cross = self.t_s * np.conj(self.t_p)
         size = np.abs(cross)
-        # beam width and index change both parts by the same factor: sqrt(T_s T_p) with the phase between them
+        # beam width and index scale s and p by the same factor: sqrt(T_s T_p) with the phase between them
         turn = np.divide(cross, size, out=np.ones_like(cross), where=size > 0.0)
         return mueller(self.T_s, self.T_p, np.sqrt(np.maximum(self.T_s * self.T_p, 0.0)) * turn)
 
@@ -76,14 +76,14 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
         go.fresnel(np.radians(60), eta=1 / 1.5).phase_s          # from inside glass, beyond the critical angle
 
     theta   angle of incidence from the normal, radians, 0 to pi/2
-    eta     real part of the index on the far side over the index on the near side, > 0: glass from inside is 1 / 1.5
+    eta     real part of the index on the far side divided by that on the near side, > 0; 1 / 1.5 from inside glass
     k       imaginary part, >= 0; sign convention n = eta + i k, exp(-i omega t)
     The three are numbers or arrays that broadcast. Returns an `Interface`. Raises InputError for values out of range.
     Not for thin films, nor for light that arrives through an absorbing medium.
     """
     angle, eta, k = (_real(x, name) for x, name in ((theta, "theta"), (eta, "eta"), (k, "k")))
     if np.any((angle < 0.0) | (angle > np.pi / 2 * (1.0 + 1e-15))):
-        raise InputError("an angle outside 0 to pi/2", "fresnel: theta", "give radians from the normal")
+        raise InputError("an angle is outside 0 to pi/2", "fresnel: theta", "give radians from the normal")
     check_index(eta, k, "fresnel")
     brewster = brewster_angle(eta, k)
     try:
@@ -112,7 +112,7 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
 
 
 def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
-    """The angle of the smallest R_p, radians: arctan(eta) for k = 0; for a metal by a cubic in sin^2.
+    """The angle of the smallest R_p, radians: arctan(eta) for k = 0; for a metal, from a cubic equation in sin^2.
 
     With e = n^2 and u = sin^2: 2 (|e|^2 + Re e) u^3 + |e|^2 (|e|^2 - 3) u^2 - 2 |e|^4 u + |e|^4 = 0
     (HumphreysOwen1961).
@@ -124,7 +124,7 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
     if np.any(metal):
         e = (eta[metal] + 1j * k[metal]) ** 2
         size = np.abs(e) ** 2
-        companion = np.zeros((*e.shape, 3, 3))  # of the polynomial in 1 / u, whose leading coefficient is never 0
+        companion = np.zeros((*e.shape, 3, 3))  # matrix of the cubic in 1 / u, whose leading coefficient is never 0
         companion[..., 1, 0] = companion[..., 2, 1] = 1.0
         for row, coefficient in enumerate((2.0 * (size + e.real), size * (size - 3.0), -2.0 * size**2)):
             companion[..., row, 2] = -coefficient / size**2
@@ -136,8 +136,11 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
 
 
 def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
-    """The Mueller matrix, (..., 4, 4), of an interface that does not mix s and p, from the power fractions of both and
-    the product of their amplitudes, the first times the conjugate of the second."""
+    """The Mueller matrix, (..., 4, 4), of an interface that does not mix s and p.
+
+    along_s, along_p  fractions of the power
+    cross             amplitude of s times the conjugate of that of p
+    """
     half_sum, half_difference, zero = 0.5 * (along_s + along_p), 0.5 * (along_s - along_p), 0.0 * along_s
     rows = [
         [half_sum, half_difference, zero, zero],
@@ -165,5 +168,5 @@ def _real(value: ArrayLike, name: str) -> Reals:
     except (TypeError, ValueError):
         raise InputError(f"{value!r} given, a number or an array expected", f"fresnel: {name}") from None
     if not np.all(np.isfinite(array)):
-        raise InputError("a value that is not finite", f"fresnel: {name}")
+        raise InputError("a value is not finite", f"fresnel: {name}")
     return array

@@ -16,8 +16,8 @@ class Masking(Part):
 
     The first line of a member's docstring is its title in the manual.
 
-    smith  whether G follows from the distribution's slopes, as Smith's does; False: it sets in as slowly as a rational
-           function of the cosine. The axes of energy-compensation tables depend on it
+    smith  whether G follows from the distribution's slopes, as Smith's does; if not, it falls off as slowly as a
+           rational function of the cosine. The axes of energy-compensation tables depend on it
     """
 
     name: ClassVar[str] = ""
@@ -39,11 +39,11 @@ class Masking(Part):
         raise self.lacks("no `reflected`", "reflected(self, ndf, wo, wi, m, alpha)")
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G of directions on opposite sides, m the refracting normal; by default as `reflected`."""
+        """G of directions on opposite sides, m the refracting normal; by default `reflected`."""
         return self.reflected(ndf, wo, wi, m, alpha)
 
     def onset(self, alpha: Scalar) -> Scalar:
-        """The cosine at which masking sets in for an isotropic width; alpha for Smith's."""
+        """The cosine at which masking sets in for an isotropic width; alpha for Smith's terms."""
         return alpha
 
 

@@ -26,7 +26,7 @@ class SchlickIBL(Masking):
         return schlick_g1(wo, k) * schlick_g1(wi, k)
 
     def onset(self, alpha: Scalar) -> Scalar:
-        """2 k: for small k, Gs is 2/3 there."""
+        """2 k, where Gs is 2/3 for small k."""
         return 2.0 * self.k(alpha)
 
     def k(self, alpha: Scalar) -> Scalar:

@@ -11,8 +11,8 @@ from .base import Masking
 class SmithCorrelated(Masking):
     """Smith with correlated heights (Heitz2014).
 
-    Masking and shadowing depend on the same facet height. A ray that leaves through the other side needs a low facet
-    where the first ray needs a high one: transmission is Euler's beta function, not 1 / (1 + L(wo) + L(wi)).
+    Masking and shadowing depend on the same facet height. A transmitted ray needs a low facet where the first ray needs
+    a high one, so G in transmission is Euler's beta function, not 1 / (1 + L(wo) + L(wi)).
     """
 
     name = "smith-correlated"

@@ -20,7 +20,7 @@ class VGroove(Masking):
         return v_groove(wo, wi, m)
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """max(0, G1(wo) + G1(wi) - 1): what one direction sees is masked from below for the other (Heitz2014b)."""
+        """max(0, G1(wo) + G1(wi) - 1): one direction sees the top of a facet, the other its bottom (Heitz2014b)."""
         return maximum(_visible_fraction(wo, m) + _visible_fraction(wi, m) - 1.0, 0.0)
 
 

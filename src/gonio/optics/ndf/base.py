@@ -35,15 +35,15 @@ class NDF(Part):
     """Distribution of microfacet normals with widths alpha = (alpha_x, alpha_y).
 
     A member must define `D`; a member that is one surface, stretched by alpha, derives from `Stretched`. Without closed
-    forms, `Lambda`, `sample` and visible normals come from tables computed once from D (`tabulated`), 1 + Lambda within
-    1e-4. The tables require a D that is isotropic at equal widths, and at unequal widths either is the stretched
-    surface or ignores alpha.y. All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a
-    direction v may lie on either side, Smith's terms depend on |v.z|. The first line of a member's docstring is its
-    title in the manual.
+    forms, `Lambda`, `sample` and visible normals come from tables computed once from D (`tabulated`), with 1 + Lambda
+    within 1e-4. The tables require a D that is isotropic at equal widths and, at unequal widths, either is the
+    stretched surface or ignores alpha.y. All methods take unit vectors of the local frame. m lies above the surface
+    (m.z > 0); a direction v may lie on either side, since Smith's terms depend on |v.z|. The first line of a member's
+    docstring is its title in the manual.
 
     long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that masking is noticeable at all
-                 angles (GGX); False: it is confined to within a few alpha of grazing. The axes of energy-compensation
-                 tables depend on it: their error is 1e-4, with the wrong choice 2e-3 (long) to 8e-3
+                 angles (GGX); if not, it is confined to within a few alpha of grazing. The axes of energy-compensation
+                 tables depend on it: their error is 1e-4, but 2e-3 if it is wrongly True and 8e-3 if wrongly False
     """
 
     name: ClassVar[str] = ""
@@ -72,9 +72,7 @@ class NDF(Part):
         if widths != "equal" or x is y or backend.is_drjit(x) or backend.is_drjit(y):
             return
         if not np.array_equal(np.asarray(x), np.asarray(y)):
-            what = (
-                f"two widths, at which D of {type(self).__name__} is neither one surface stretched nor free of alpha.y"
-            )
+            what = f"two widths given, but D of {type(self).__name__} neither stretches one surface nor ignores alpha.y"
             hint = f"give one width, or write Lambda(self, v, alpha) and sample(self, u1, u2, alpha); see {GUIDE}"
             raise InputError(what, where, hint)
 
@@ -96,11 +94,11 @@ class NDF(Part):
 
     @function
     def Lambda(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's Lambda, masked over visible projected area (Heitz2014); from a table if there is no closed form."""
+        """Smith's Lambda, the ratio of masked to visible projected area (Heitz2014); by default from a table."""
         return self._visible_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
     def _visible_area(self, v: Direction, alpha: Pair) -> Scalar:
-        """Projected area of the facets that face v, from a table; never less than the surface's."""
+        """Projected area of the facets that face v, from a table; at least that of the surface."""
         tables = tabulated.tables_of(self)
         stretched = stretch(v, tables.pair(alpha))
         length = norm(stretched)
@@ -114,7 +112,7 @@ class NDF(Part):
         return 1.0 / (1.0 + self.Lambda(v, alpha))
 
     def G1_customary(self, v: Direction, alpha: Pair) -> Scalar:
-        """The G1 of `smith-separable`: exact, unless the field customarily uses a fit."""
+        """The G1 of `smith-separable`: exact, unless a fit is customary."""
         return self.G1(v, alpha)
 
     # ------------------------------------------------------------------ visible normals
@@ -126,7 +124,7 @@ class NDF(Part):
 
     @property
     def falls_slowly(self) -> bool:
-        """`long_tailed`, or what the table shows if Lambda is tabulated."""
+        """`long_tailed`, or the same property of the table if Lambda is tabulated."""
         return self.long_tailed or (self._tabulates_area and tabulated.tables_of(self).long_tailed)
 
     @property
@@ -134,16 +132,15 @@ class NDF(Part):
         return type(self).Lambda is NDF.Lambda
 
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal visible from v (v.z >= 0), from tables; if `sample` is defined but not this method, one of all
-        normals."""
+        """A normal visible from v (v.z >= 0), from tables; any normal if `sample` is defined but not this method."""
         return self._visible(v, u1, u2, alpha) if self.tabulated else self.sample(u1, u2, alpha)
 
     @function
     def _visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A visible normal, by v.m = v.z m.z + v_h.m_h with h the component along the surface.
+        """A visible normal, by v.m = v.z m.z + v_h.m_h, with h the component along the surface.
 
-        A fraction of the samples has the density D m.z, the others D max(0, v_h.m_h), the limit at grazing v. Where
-        v_h.m_h < 0 this exceeds the visible area, so that up to a sixth of the samples fail.
+        A fraction of the samples has the density D m.z, the others D max(0, v_h.m_h), the limit for grazing v. Where
+        v_h.m_h < 0 the sum exceeds the visible area, so that up to a sixth of the samples fail.
         """
         stretched = stretch(v, tabulated.tables_of(self).pair(alpha))
         level = safe_sqrt(stretched.x * stretched.x + stretched.y * stretched.y)
@@ -158,7 +155,7 @@ class NDF(Part):
         return where(grazing, steep, self._sloped(tabulated.ALL, u1, c, s, alpha))
 
     def _sloped(self, column: int, u: Scalar, c: Scalar, s: Scalar, alpha: Pair) -> Direction:
-        """The normal in the azimuth (c, s) of the unstretched surface whose slope is the quantile u."""
+        """The normal at the azimuth (c, s) of the unstretched surface whose slope is the quantile u, then stretched."""
         tables = tabulated.tables_of(self)
         low, high = safe_sqrt(u), safe_sqrt(1.0 - u)
         tau = tables.read(column, alpha, low / (low + high))
@@ -171,7 +168,7 @@ class NDF(Part):
         return abs(dot(v, m)) * self.visible_per_cosine(v, m, alpha)
 
     def visible_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """`pdf_visible` over |v.m|: the cosine cancels in the density of what is mirrored at m (Walter2007, eq. 14)."""
+        """`pdf_visible` divided by |v.m|, which cancels in the density of mirrored directions (Walter2007, eq. 14)."""
         density = self._visible_pdf(v, m, alpha) if self.tabulated else self.pdf(m, alpha)
         return safe_div(density, abs(dot(v, m)))
 
@@ -189,7 +186,7 @@ class NDF(Part):
         return self.sample_visible(v, u1, u2, alpha)
 
     def bounded_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of `sample_bounded` over |v.m|."""
+        """Density of `sample_bounded` divided by |v.m|."""
         return self.visible_per_cosine(v, m, alpha)
 
 
@@ -206,8 +203,8 @@ class Stretched(NDF):
     """A stretch-invariant distribution: a surface of width 1, its slopes scaled by alpha (Heitz2014, sec. 5.3).
 
     A member describes the surface of width 1 by `density` and, if there are closed forms, `area`, `slope` and
-    `visible_normal`; otherwise tables serve as for any `NDF`. `density` and `area` are called with vectors of any
-    length: with D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm they are homogeneous of degree -4 and 1, so stretching
+    `visible_normal`; otherwise tables are used as for any `NDF`. `density` and `area` are called with vectors of any
+    length: as D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm they are homogeneous of degree -4 and 1, so stretching
     is a linear map without a Jacobian.
     """
 
@@ -225,7 +222,7 @@ class Stretched(NDF):
         return "" if own else "density(self, n)"
 
     def density(self, n: Direction) -> Scalar:
-        """D at width 1, times |n|^-4: density of the slopes (-n_x / n_z, -n_y / n_z) over n_z^4."""
+        """D at width 1, times |n|^-4: the density of the slopes (-n_x / n_z, -n_y / n_z) divided by n_z^4."""
         raise self.lacks("no `density`", "density(self, n)")
 
     def area(self, v: Direction) -> Scalar:
@@ -233,7 +230,7 @@ class Stretched(NDF):
         raise self.lacks("no `area`", "area(self, v)")
 
     def slope(self, u: Scalar) -> Scalar:
-        """The length of slope, at width 1, below which a fraction u of the surface lies."""
+        """The slope tan(theta_m), at width 1, below which a fraction u of the surface lies."""
         raise self.lacks("no `slope`", "slope(self, u)")
 
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
@@ -266,17 +263,17 @@ class Stretched(NDF):
 
     @function
     def Lambda(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's Lambda: masked over visible projected area (Heitz2014); 0 at the normal, within rounding."""
+        """Smith's Lambda: the ratio of masked to visible projected area (Heitz2014); 0 up to rounding at the normal."""
         return self.projected_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
     @function
     def G1(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's masking of one direction, 1 / (1 + Lambda): visible area over all area that faces v."""
+        """Smith's masking of one direction, 1 / (1 + Lambda): the visible fraction of the area that faces v."""
         return abs(v.z) / self.projected_area(v, alpha)
 
     @function
     def sample(self, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal with density D(m) m.z: a slope in any direction, stretched."""
+        """A normal with density D(m) m.z: a slope in a uniformly distributed direction, stretched."""
         if self.tabulated:
             return super().sample(u1, u2, alpha)
         r = self.slope(u1)
@@ -292,7 +289,7 @@ class Stretched(NDF):
 
     @function
     def visible_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of visible normals over |v.m|: D over the area that v sees (Heitz2014b), finite at grazing."""
+        """Density of visible normals divided by |v.m|: D / (area that v sees) (Heitz2014b); finite at grazing."""
         if not self._has_visible:
             return super().visible_per_cosine(v, m, alpha)
         return self.D(m, alpha) / self.projected_area(v, alpha)

@@ -42,13 +42,13 @@ class Beckmann(Stretched):
     @function
     def density(self, n: Direction) -> Scalar:
         """exp(-tan^2) / (pi n_z^4)."""
-        # beyond tan^2 = 1000 exp is 0 even in float64, while n_z^4 underflows float32
+        # beyond tan^2 = 1000, exp is 0 even in float64, and n_z^4 underflows in float32
         over = 1.0 / maximum(sqr(n.z), 1e-3 * sin2(n))
         return exp(-sin2(n) * over) * sqr(over) * ops.inv_pi
 
     @function
     def area(self, v: Direction) -> Scalar:
-        """|v.z| (1 + erf a) / 2 + sin exp(-a^2) / (2 sqrt(pi)), a = cot (Heitz2014): the slopes below a, over sin."""
+        """|v.z| (1 + erf a) / 2 + sin exp(-a^2) / (2 sqrt(pi)), a = cot (Heitz2014): sin times `gaussian_ramp`."""
         sin, a = _sine_and_cotangent(v)
         return sin * gaussian_ramp(a)
 
@@ -68,8 +68,8 @@ class Beckmann(Stretched):
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """Visible slopes of the unit Gaussian (Heitz2014b, sec. 3 and 5).
 
-        Along v the slope x has the cumulative density c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
-        x = cot. It is inverted to 5e-8 from a guess by two steps, the first in b = erf x (Jakob2014). Across v the
+        Along v the slope x has the cumulative distribution c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
+        x = cot. Two steps from an initial guess, the first in b = erf x, invert it to 5e-8 (Jakob2014). Across v the
         slope is Gaussian.
         """
         sin_v, cos_v = sqrt(sin2(v)), maximum(v.z, 1e-6)
@@ -78,7 +78,7 @@ class Beckmann(Stretched):
         cos_phi = where(at_normal, 1.0, v.x / where(at_normal, 1.0, sin_v))
         sin_phi = where(at_normal, 0.0, v.y / where(at_normal, 1.0, sin_v))
 
-        # the slope is below cot; erf(4) is 1 within float32
+        # the slope is below cot; erf(4) is 1 in float32
         cot = minimum(1.0 / maximum(tan_v, 1e-6), 4.0)
         b_high, b_low = erf(cot), -B_LIMIT
         target = u1 * (0.5 * (1.0 + b_high) + tan_v * exp(-sqr(cot)) * (0.5 / SQRT_PI))
@@ -94,7 +94,7 @@ class Beckmann(Stretched):
         curvature = -0.25 * SQRT_PI * tan_v / maximum(gauss, 1e-12)
         b = clamp(b - move / clamp(1.0 - move * curvature / maximum(facing, 2e-4), 0.5, 2.0), b_low, b_high)
 
-        # Newton's step in x with erf x = b; far in the tail and at the cotangent, where c is flat, it is rounding
+        # Newton's step in x with erf x = b; far in the tail and at the cotangent, where c is flat, it is rounding error
         x = erfinv(b)
         gauss = exp(-sqr(x)) * (1.0 / SQRT_PI)
         facing = 1.0 - x * tan_v

@@ -37,7 +37,7 @@ class GGX(Stretched):
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi |n|^4), a hemisphere's, from all three components: with n_z alone it would cancel at the peak."""
+        """1 / (pi |n|^4), a hemisphere's density, from all three components: n_z alone would cancel at the peak."""
         return ops.inv_pi / sqr(dot(n, n))
 
     @function
@@ -52,7 +52,7 @@ class GGX(Stretched):
 
     @function
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """The half vector with a uniformly distributed point of a spherical cap (Dupuy2023)."""
+        """The half vector of v and a uniformly distributed point on a spherical cap (Dupuy2023)."""
         return self._from_cap(v, v.z, u1, u2)
 
     def _from_cap(self, v: Direction, depth: Scalar, u1: Scalar, u2: Scalar) -> Direction:
@@ -73,7 +73,7 @@ class GGX(Stretched):
 
     @function
     def bounded_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of `sample_bounded` over |v.m|: D over the area of this part of the cap (Eto2023)."""
+        """Density of `sample_bounded` divided by |v.m|: D divided by the area of this part of the cap (Eto2023)."""
         stretched = stretch(v, alpha)
         depth = self._bound(v, alpha) * abs(v.z)
         return self.D(m, alpha) / (0.5 * (depth + norm(stretched)))

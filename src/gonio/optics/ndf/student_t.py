@@ -19,7 +19,7 @@ class StudentT(Stretched):
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), expanded by n_z^6 so that nothing vanishes at grazing."""
+        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), as a quotient whose denominator does not vanish at grazing."""
         z2 = sqr(n.z)
         spread = z2 + 0.5 * sin2(n)
         return ops.inv_pi * z2 / (spread * sqr(spread))
@@ -28,9 +28,9 @@ class StudentT(Stretched):
     def area(self, v: Direction) -> Scalar:
         """(h + |v.z|)^2 / (4 h) with h^2 = v.z^2 + 2 sin^2.
 
-        Smith's int_cot^inf (x cot^-1 - 1) P(x) dx, P(x) = 3 / (4 s) (1 + x^2 / s^2)^(-5/2) with s^2 = 2 the density of
-        slopes along v: Lambda = c^3 / (4 t) - 1/2 + 3/4 (t c - (t c)^3 / 3) for t = cot / s and c = 1 / sqrt(1 + t^2),
-        which is |v.z| / h = t c substituted into the above.
+        From Smith's Lambda = int_cot^inf (x / cot - 1) P(x) dx, where P(x) = 3 / (4 s) (1 + x^2 / s^2)^(-5/2), s^2 = 2,
+        is the density of slopes along v: Lambda = c^3 / (4 t) - 1/2 + 3/4 (t c - (t c)^3 / 3) for t = cot / s and
+        c = 1 / sqrt(1 + t^2), and |v.z| / h = t c.
         """
         z = abs(v.z)
         h = sqrt(sqr(z) + 2.0 * sin2(v))

@@ -1,17 +1,17 @@
 """Smith's Lambda and samples of normals from D alone, by tables that are computed once.
 
-With the length of slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with such a
-slope. A direction v sees the area
+With the slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with such a slope. A
+direction v sees the area
 
     int D(m) max(0, v.m) dm = int P(s) a(s) ds,   a(s) = int max(0, |v.z| + s sin theta_v cos phi) dphi / (2 pi),
 
 with a in closed form, so one quadrature over s is enough (trapezoidal in log s; Heitz2014, sec. 3 and 4). Slopes are
-measured in units of w, twice the area that a grazing direction sees; for GGX, w = alpha. The area over |v'|, with
+measured in units of w, twice the area that a grazing direction sees; for GGX, w = alpha. The area divided by |v'|, with
 v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes 1 + Lambda is
 within 1e-5 of the closed forms of GGX, Beckmann and Student-T, and within 1e-4 for distributions whose shape depends on
 the width, such as GTR.
 
-Normals are sampled by tables of the inverse of int P ds, and of int s P ds for the slopes seen at grazing angles.
+Normals are sampled from tables of the inverse of int P ds and, for the slopes seen at grazing angles, of int s P ds.
 """
 
 from __future__ import annotations
@@ -30,24 +30,25 @@ from ...ops import Direction, Pair, Scalar, Table, inset, lookup, sqrt, vec2
 Floats: TypeAlias = NDArray[np.float64]
 Density: TypeAlias = Callable[[Floats, Floats], Floats]
 
-NODES = 256  # of the projected area over v'.z / |v'|, and of the inverse functions
+NODES = 256  # of the projected area as a function of v'.z / |v'|, and of the inverse functions
 ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; finer steps, at which w is stored
-MIN_ROOT, MAX_SLOPE = 0.1, 1e6  # fourth root of the smallest width; slopes beyond have a share of D / 1e6 of the area
-STEEP = 100.0  # slope (89.4 degrees) from which on a rise of D is that of a clamped cosine, not of another lobe
+MIN_ROOT, MAX_SLOPE = 0.1, 1e6  # fourth root of the smallest width; larger slopes cover about D / 1e6 of the area
+STEEP = 100.0  # slope (89.4 degrees) beyond which a rise of D is due to a clamped cosine, not another lobe
 STEP, LOWEST, HIGHEST = 0.01, -16.0, 30.0  # of log s
 SAME = 1e-4  # fraction of the surface on which two equal densities may differ
 PAIRS = ((0.1, 0.4), (0.6, 0.2), (0.05, 0.9))  # unequal widths at which D is tested
-AZIMUTHS = np.arange(7) * (2.0 * np.pi / 7.0) + 0.35  # not multiples of 90 degrees, at which lobes may be equal
+AZIMUTHS = np.arange(7) * (2.0 * np.pi / 7.0) + 0.35  # no multiples of 90 degrees, at which lobes may be equal
 AREA, ALL, GRAZING = range(3)  # columns
 
 
 class Tables(NamedTuple):
     """The tables of a distribution, for all widths.
 
-    values   over (fourth root of the width, node), or over nodes only if all widths are one stretched surface: the
-             area over |v'|; tau = s / (1 + s), s in units of w, by g(fraction of the normals), and by g(fraction of
-             the area that a grazing direction sees). g(u) = sqrt(u) / (sqrt(u) + sqrt(1 - u)) refines both ends
-    scale    w / alpha, over the same widths; a plain number if it is constant
+    values   by (fourth root of the width, node), or by node alone if all widths are one stretched surface: the area
+             divided by |v'|; tau = s / (1 + s), s in units of w, as a function of g(fraction of the normals); and tau
+             as a function of g(fraction of the area that a grazing direction sees). g(u) = sqrt(u) / (sqrt(u) +
+             sqrt(1 - u)) refines both ends
+    scale    w / alpha, at the same widths; a plain number if it is constant
     widths   the meaning of two widths: "stretched" along x and y, "first" if alpha_y is ignored, "equal" if neither
              holds
     """
@@ -76,8 +77,11 @@ class Tables(NamedTuple):
 
     @property
     def long_tailed(self) -> bool:
-        """Whether Lambda falls off so slowly that it is noticeable near the normal. At the tested angle 0.8 % of the
-        area is masked for GGX, 1e-6 for Gaussian slopes, 1e-3 for Student-T with gamma = 3."""
+        """Whether Lambda falls off so slowly that it is noticeable near the normal.
+
+        At the tested angle 0.8 % of the area is masked for GGX, 1e-6 for Gaussian slopes, and 1e-3 for Student-T with
+        gamma = 3.
+        """
         near = self.values.values[..., AREA].reshape(-1, NODES)[:, NODES // 8]
         return bool(np.median(near) - (1.0 - (NODES // 8 / (NODES - 1.0)) ** 2) > 4e-3)
 
@@ -87,7 +91,7 @@ def _row_of(alpha: Pair, count: int) -> Scalar:
 
 
 class HasDensity(Protocol):
-    """The input of the tables: a distribution with D."""
+    """The source of the tables: a distribution with D."""
 
     name: ClassVar[str]
 
@@ -101,8 +105,11 @@ class HasDensity(Protocol):
 
 
 def tables_of(ndf: HasDensity) -> Tables:
-    """The tables of a distribution. They are computed on first use and stored in its class, so that they are discarded
-    when a user's file is run again. Raises InputError if D is not finite or lacks the required symmetry."""
+    """The tables of a distribution, computed on first use.
+
+    They are stored in its class, so that they are discarded when a user's file is run again. Raises InputError if D is
+    not finite or lacks the required symmetry.
+    """
     cls = type(ndf)
     if "_tables" not in vars(cls):
         cls._tables = {}  # type: ignore[attr-defined]
@@ -142,11 +149,11 @@ def _build(ndf: HasDensity) -> Tables:
     widths = np.linspace(MIN_ROOT, 1.0, ROWS) ** 4
     rows = [row for width in widths if (row := _row(density, float(width), log_s)) is not None]
     if not rows:
-        what = f"D of {type(ndf).__name__} is not finite, or negative, or 0, at every width"
+        what = f"at every width, D of {type(ndf).__name__} is 0, negative or not finite"
         raise InputError(what, ndf.place("D"), "int D(m) m.z dm over the upper hemisphere must be 1")
     middle = rows[len(rows) // 2]
     if abs(middle.area - 1.0) > 1e-3:
-        text = f"int D(m) m.z dm is {middle.area:.4g} at alpha = {middle.width:.3g} where 1 is expected"
+        text = f"int D(m) m.z dm is {middle.area:.4g} at alpha = {middle.width:.3g}, 1 expected"
         warnings.warn(f"{ndf.place('D')}: {text}", GonioWarning, stacklevel=3)
     kind = _meaning(ndf, density, [row.width for row in rows[:: max(len(rows) // 4, 1)]])
     scale = middle.w / middle.width
@@ -154,7 +161,7 @@ def _build(ndf: HasDensity) -> Tables:
     stem = ndf.name or type(ndf).__name__
     if alike and all(abs(row.w / row.width - scale) < SAME * scale for row in rows):
         return Tables(Table(f"normals_{stem}", _columns(middle.shares[None], log_s)[0]), scale, kind)
-    # a width at which D has a gap, such as (alpha^2 - 1) / log(alpha^2) at 1, uses the shape of the nearest width
+    # where D is undefined at a width, as (alpha^2 - 1) / log(alpha^2) is at 1, the shape of the nearest width is used
     shares = np.stack([min(rows, key=lambda row: abs(row.width - width)).shares for width in widths])
     from scipy.interpolate import CubicSpline  # slow to import and rarely needed
 
@@ -166,7 +173,7 @@ def _build(ndf: HasDensity) -> Tables:
 
 
 def _columns(shares: Floats, log_s: Floats) -> Floats:
-    """AREA, ALL and GRAZING at each node, for rows of shares."""
+    """AREA, ALL and GRAZING at each node, for rows of fractions of the surface."""
     return np.stack([_areas(shares, log_s), _inverses(shares, log_s), _inverses(shares * np.exp(log_s), log_s)], -1)
 
 
@@ -212,9 +219,9 @@ def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
 
 
 def _clamped(shares: Floats, s: Floats) -> int:
-    """The index from which on normals are excluded because a cosine is clamped in D, as in
-    tan^2 = (1 - c^2) / max(c^2, 1e-7), so that D diverges at the horizon. They cover a negligible fraction of the
-    surface, but their slopes would dominate the projected area and hence Lambda."""
+    """The index of the first normal that is excluded because a cosine is clamped in D, as in
+    tan^2 = (1 - c^2) / max(c^2, 1e-7), so that D diverges at the horizon. Such normals cover a negligible fraction of
+    the surface, but their slopes would dominate the projected area and hence Lambda."""
     steep = int(np.argmax(s > STEEP))
     moment = shares[steep:] * s[steep:]
     least = np.minimum.accumulate(moment)
@@ -246,7 +253,7 @@ def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
 
 
 def _areas(shares: Floats, log_s: Floats) -> Floats:
-    """The projected area over |v'| at each node of v'.z / |v'|."""
+    """The projected area divided by |v'| at each node of v'.z / |v'|."""
     x = 1.0 - np.linspace(0.0, 1.0, NODES)[:, None] ** 2
     long = np.exp(log_s) * np.sqrt(1.0 - x * x)
     over = np.maximum(long, np.maximum(x, 1e-300))
@@ -255,7 +262,7 @@ def _areas(shares: Floats, log_s: Floats) -> Floats:
 
 
 def _inverses(shares: Floats, log_s: Floats) -> Floats:
-    """tau of the slope below which a fraction of the surface lies, by g."""
+    """tau of the slope below which a fraction of the surface lies, at nodes of g(fraction)."""
     tau = 1.0 / (1.0 + np.exp(-log_s))
     columns = []
     for row in shares:

@@ -1,5 +1,5 @@
-"""The shader languages, one file each. To add one, add a file to this folder, an entry point of a package, or a
-registered class: `gonio.members`.
+"""The shader languages, one file each. To add one, add a file to this folder, an entry point in a package, or a
+registered class; see `gonio.members`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the languages share that write a material as a self-contained Python file."""
+"""The base of the languages that write a material as a self-contained Python file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OWN = """
 
 
 class Python(Language):
-    """A Python file; `imports` makes the functions of its arrays known under the names of the vocabulary."""
+    """A Python file; `imports` provides the functions of its array library under the names of the vocabulary."""
 
     suffix = ".py"
     standalone = True

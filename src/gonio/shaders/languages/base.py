@@ -18,9 +18,9 @@ class Language:
     compare              operation -> template of a comparison of vectors; absent if the operators apply to vectors
     choice               templates of `where`: for a scalar mask, and for a mask per component; {prefix} begins names
     helpers              functions that the templates call: name -> lines, written where a text needs them
-    spread               template of a float, {1}, converted to a vector type, {0}
-    spreads              such templates of single types, where they differ
-    truth                false and true
+    spread               template of a float {1} converted to a vector type {0}
+    spreads              such templates for individual types, if different
+    truth                the words for false and true
     swizzles             whether `v.xy` selects several components
     mix                  name of linear interpolation
     native               functions of the vocabulary that the language provides itself
@@ -32,11 +32,11 @@ class Language:
     whole_members        whether braces that initialize a struct may name whole vectors and arrays
     end                  the end of a statement
     single               whether all values are float32
-    standalone           whether a text is a file that runs by itself (`python_file.py`), not a part of a program
+    standalone           whether a text is a file that runs by itself (`python_file.py`), not part of a program
     groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
     methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
-    tables               the usual form of the files of tables, of `table_files.FORMATS`
+    tables               the default format of table files, one of `table_files.FORMATS`
     """
 
     family: ClassVar[Family[Language]]
@@ -92,7 +92,7 @@ class Language:
         return PREFERRED.get(name, name + "_") if name in self.reserved else name
 
     def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
-        """(type, name) that declare an array."""
+        """(type, name) of the declaration of an array."""
         return type_, f"{name}[{count}]"
 
     def array(self, type_: str, parts: list[str]) -> str:
@@ -124,7 +124,7 @@ class Language:
         return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
-        """All declarations, as the language needs them around."""
+        """All declarations, wrapped as the language requires."""
         return list(lines)
 
     def binding(self, name: str, dimension: int, place: int) -> list[str]:
@@ -136,10 +136,10 @@ class Language:
         raise NotImplementedError(f"{type(self).__name__} has no fetch")
 
     def texel(self, table: str, places: list[str], channels: int, shape: Sequence[int], prefix: str) -> str:
-        """The channels of a texel, 1, 2 or 4.
+        """The channels of a texel: 1, 2 or 4 of them.
 
-        shape   numbers of texels along each axis, as `places`
-        prefix  begins the names of helpers
+        shape   number of texels along each axis, in the order of `places`
+        prefix  start of the names of helpers
         """
         return self.fetch(table, places) + {1: ".r", 2: ".rg", 4: ""}[channels]
 

@@ -12,7 +12,7 @@ _MORE = """
 
 
 class Godot(GLSL):
-    """Godot's language: GLSL ES 3.00 without overloads, with its own constants and hints of textures."""
+    """Godot's language: GLSL ES 3.00 without overloads, with its own constants and texture hints."""
 
     name = "godot"
     title = "Godot 4"

@@ -48,7 +48,7 @@ class HLSL(Language):
         "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
     }
     choice = ("{0} ? {1} : {2}", "{prefix}choose({0}, {1}, {2})")
-    # `select` exists since HLSL 2021, whose ?: no longer chooses component by component
+    # `select` exists since HLSL 2021, in which ?: no longer selects component by component
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "choose": (
             "float3 {name}(bool3 mask, float3 a, float3 b) {{",
@@ -84,5 +84,5 @@ class HLSL(Language):
         return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
 
     def offset(self, end: int, size: int) -> int:
-        """Packed, except that a vector does not cross a row of 16 bytes."""
+        """Packed, except that a vector does not cross a 16-byte row."""
         return end if end % 16 + size <= 16 else end + -end % 16

@@ -66,6 +66,6 @@ class MSL(Language):
         return f"{table}.read(uint{len(places)}({', '.join(places)}), 0)"
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
-        """Everything inside a struct."""
+        """All declarations, inside a struct."""
         inside = [f"    {line}" if line else "" for line in lines]
         return [f"struct {prefix}Shader {{", *inside, "};"]

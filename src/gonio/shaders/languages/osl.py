@@ -49,8 +49,8 @@ class OSL(Language):
         "bvec3": "vector",
     }
     truth = ("0", "1")
-    # exp and atan2 of renderers are fast forms, with an error of up to 232 units in the last place (OpenImageIO,
-    # fmath.h); logb of any number and exp2 of a whole one are exact
+    # renderers compute exp and atan2 by fast approximations, with errors of up to 232 units in the last place
+    # (OpenImageIO, fmath.h); logb of any number and exp2 of an integer are exact
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,
         "exp": "{prefix}exponential({0})",
@@ -68,8 +68,8 @@ class OSL(Language):
         "not": "(1.0 - {0})",
     }
     choice = ("{0} ? {1} : {2}", "select({2}, {1}, {0})")
-    # a table's rows are stored twice, the second time in reverse order, so that both conventions of renderers on which
-    # row of a picture has t = 0 read the same texel (`table_files.py`)
+    # a table's rows are stored twice, the second time in reverse order, so that the same texel is read whichever row of
+    # an image has t = 0 in a renderer (`table_files.py`)
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "exponential": (
             "// e^x = 2^n e^r: |r| <= log(2) / 2, by Taylor's series.",
@@ -126,7 +126,7 @@ class OSL(Language):
     parameters_change = False
     struct_literal = False
     array_literal = False
-    whole_members = False  # OSL 1.14 compiles them to code that stops
+    whole_members = False  # OSL 1.14 compiles such braces to code that aborts
     swizzles = False
     tables = "exr-mirrored"
 
@@ -150,7 +150,7 @@ class OSL(Language):
         return f"{prefix}read_{kind}({table}, {x}, {row}, {width}, {height * (depth[0] if depth else 1)})"
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
-        """With the headers of OSL that declare the types in use."""
+        """The lines, after the OSL headers that declare the types in use."""
         text = "\n".join(line for line in lines if not line.lstrip().startswith("//"))
         headers = [f'#include "{name}.h"' for name in ("vector2", "vector4") if f"{name}" in text]
         return [*headers, "", *lines] if headers else list(lines)

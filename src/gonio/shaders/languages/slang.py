@@ -12,7 +12,7 @@ _MORE = """
 
 
 class Slang(HLSL):
-    """Slang: HLSL, with some more reserved names."""
+    """Slang: HLSL with more reserved names."""
 
     name = "slang"
     title = "Slang"

@@ -80,7 +80,7 @@ class TSL(Language):
         return f"{table}.load(ivec{len(places)}({', '.join(places)}))"
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
-        """With the imports of the names that occur."""
+        """The lines, after imports of the names that occur."""
         text = "\n".join(lines)
         nodes, textures = (
             [name for name in names if re.search(rf"\b{name}\(", text)] for names in (_NODES.split(), _TEXTURES)

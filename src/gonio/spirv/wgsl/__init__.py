@@ -1,5 +1,5 @@
-"""WGSL to a module: words (`tokens`), grammar (`parser`), Bevy's directives (`preprocessor`, `sources`), and
-instructions (`translation`). A text is untrusted: depth, words and numbers are bounded, and nothing runs.
+"""Translation of WGSL to a module: tokens (`tokens`), grammar (`parser`), Bevy's directives (`preprocessor`,
+`sources`), and instructions (`translation`). A text is untrusted: depth, tokens and numbers are bounded.
 """
 
 from .translation import translated as translated

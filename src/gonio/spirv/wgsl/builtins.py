@@ -1,4 +1,4 @@
-"""WGSL's own functions as instructions."""
+"""WGSL's built-in functions as instructions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from .emitter import Emitter, Value
 from .types import BOOL, FLOAT, INT, UINT, Type, vector
 
-# functions of floats, component by component: their numbers in GLSL.std.450
+# functions of floats, applied component by component: their numbers in GLSL.std.450
 _FLOATS = {
     "acos": 17, "acosh": 23, "asin": 16, "asinh": 22, "atan": 18, "atanh": 24, "atan2": 25, "ceil": 9, "cos": 14,
     "cosh": 20, "degrees": 12, "exp": 27, "exp2": 29, "floor": 8, "fma": 50, "fract": 10, "inverseSqrt": 32,
@@ -17,7 +17,7 @@ _FLOATS = {
 _COUNTS = {"atan2": 2, "fma": 3, "mix": 3, "pow": 2, "smoothstep": 3, "step": 2, "min": 2, "max": 2, "clamp": 3}
 # functions of floats, signed and unsigned integers
 _NUMBERS = {"abs": (4, 5, 0), "sign": (6, 7, 0), "min": (37, 39, 38), "max": (40, 42, 41), "clamp": (43, 45, 44)}
-# of vectors: number, how many arguments are vectors, whether the result is a number
+# functions of vectors: number, count of vector arguments, whether the result is a scalar
 _GEOMETRIC = {
     "length": (66, 1, True), "distance": (67, 2, True), "cross": (68, 2, False), "normalize": (69, 1, False),
     "faceForward": (70, 3, False), "reflect": (71, 2, False), "refract": (72, 2, False),
@@ -31,7 +31,7 @@ _BITS = {
 
 
 def refused(name: str) -> str:
-    """What a function without meaning for a BSDF is, "" for other names."""
+    """A description of a function that has no meaning for a BSDF; "" for other names."""
     if name in _DERIVATIVES:
         return f"a screen-space derivative ({name})"
     if name.startswith("atomic"):
@@ -50,7 +50,7 @@ def refused(name: str) -> str:
 
 
 def called(emitter: Emitter, name: str, values: list[Value]) -> Value | None:
-    """The value of a function of WGSL, None if it has none of that name."""
+    """The value of a call of a built-in function; None if there is none of that name."""
     if name in _FLOATS or name in _NUMBERS:
         return _elementwise(emitter, name, values)
     if name in _GEOMETRIC:
@@ -62,7 +62,7 @@ def called(emitter: Emitter, name: str, values: list[Value]) -> Value | None:
         _count(emitter, name, values, count)
         return made(emitter, values)
     if what := refused(name):
-        raise emitter.error(what, "a BSDF is a function of directions and parameters alone")
+        raise emitter.error(f"{what} is not supported", "a BSDF is a function of directions and parameters alone")
     return None
 
 
@@ -72,10 +72,10 @@ def _count(emitter: Emitter, name: str, values: list[Value], count: int) -> None
 
 
 def _shape(emitter: Emitter, name: str, values: list[Value]) -> Type:
-    """The type of a result: the vectors' among the values, which must agree."""
+    """The type of a result: that of the vectors among the values, which must agree."""
     vectors = {value.type for value in values if value.type.kind == "vector"}
     if len(vectors) > 1 or any(value.type.kind == "matrix" for value in values):
-        raise emitter.error(f"{name} of {', '.join(str(value.type) for value in values)}", "vectors of one length")
+        raise emitter.error(f"{name} of {', '.join(str(value.type) for value in values)}", "use vectors of one length")
     return vectors.pop() if vectors else values[0].type
 
 
@@ -102,7 +102,7 @@ def _geometric(emitter: Emitter, name: str, values: list[Value]) -> Value:
     type = _shape(emitter, name, values[:count])
     plain = type.kind != "vector" and name not in ("length", "distance")
     if plain or (name == "cross" and type.length != 3):
-        raise emitter.error(f"{name} of {type}", "vectors")
+        raise emitter.error(f"{name} of {type}", "use vectors")
     return emitter.standard(number, type.scalar if scalar else type, *[value.id for value in values])
 
 
@@ -110,7 +110,7 @@ def _dot(emitter: Emitter, values: list[Value]) -> Value:
     values = emitter.together(values, "dot")
     type = _shape(emitter, "dot", values)
     if type.kind != "vector":
-        raise emitter.error(f"dot of {type}", "vectors")
+        raise emitter.error(f"dot of {type}", "use vectors")
     return emitter.emit("Dot", type.scalar, *[value.id for value in values])
 
 
@@ -118,14 +118,14 @@ def _select(emitter: Emitter, values: list[Value]) -> Value:
     no, yes = emitter.together(values[:2], "select")
     mask = values[2]
     if no.type != yes.type or mask.type.scalar != BOOL or mask.type not in (BOOL, no.type.of(BOOL)):
-        raise emitter.error(f"select of {', '.join(str(value.type) for value in values)}", "select(no, yes, mask)")
+        raise emitter.error(f"select of {', '.join(str(value.type) for value in values)}", "use select(no, yes, mask)")
     return emitter.emit("Select", no.type, mask.id, yes.id, no.id)
 
 
 def _reduced(name: str) -> Callable[[Emitter, list[Value]], Value]:
     def made(emitter: Emitter, values: list[Value]) -> Value:
         if values[0].type.scalar != BOOL:
-            raise emitter.error(f"{name.lower()} of {values[0].type}", "vectors of bool")
+            raise emitter.error(f"{name.lower()} of {values[0].type}", "use vectors of bool")
         return emitter.emit(name, BOOL, values[0].id) if values[0].type.kind == "vector" else values[0]
 
     return made
@@ -139,7 +139,7 @@ def _saturate(emitter: Emitter, values: list[Value]) -> Value:
 def _transpose(emitter: Emitter, values: list[Value]) -> Value:
     type = values[0].type
     if type.kind != "matrix":
-        raise emitter.error(f"transpose of {type}", "a matrix")
+        raise emitter.error(f"transpose of {type}", "use a matrix")
     transposed = Type("matrix", (vector(type.scalar, type.length),), type.parts[0].length)
     return emitter.emit("Transpose", transposed, values[0].id)
 
@@ -147,7 +147,7 @@ def _transpose(emitter: Emitter, values: list[Value]) -> Value:
 def _determinant(emitter: Emitter, values: list[Value]) -> Value:
     type = values[0].type
     if type.kind != "matrix" or type.length != type.parts[0].length:
-        raise emitter.error(f"determinant of {type}", "a square matrix")
+        raise emitter.error(f"determinant of {type}", "use a square matrix")
     return emitter.standard(33, type.scalar, values[0].id)
 
 
@@ -170,7 +170,7 @@ def bitcast(emitter: Emitter, type: Type, value: Value) -> Value:
     """bitcast<type>(value)."""
     value = emitter.with_concrete_type(value)
     if not value.type.numbers or value.type.of(FLOAT) != type.of(FLOAT) or BOOL in (value.type.scalar, type.scalar):
-        raise emitter.error(f"bitcast<{type}> of {value.type}", "32-bit numbers of one shape")
+        raise emitter.error(f"bitcast<{type}> of {value.type}", "use 32-bit numbers of one shape")
     if {value.type.scalar, type.scalar} <= {INT, UINT}:
         return emitter.cast(value, type.scalar)
     return value if value.type == type else emitter.emit("Bitcast", type, value.id)
@@ -186,7 +186,7 @@ def _texture(emitter: Emitter, name: str, values: list[Value]) -> Value:
     if name == "textureLoad":
         _count(emitter, name, values, 3)
         return emitter.emit("ImageFetch", color, texture.id, emitter.with_concrete_type(values[1]).id)
-    if len(values) not in (_MIPS[name], _MIPS[name] + 1):  # one more is an offset in texels
+    if len(values) not in (_MIPS[name], _MIPS[name] + 1):  # an additional one is an offset in texels
         raise emitter.error(f"{name} of {len(values)} values", f"it takes {_MIPS[name]}")
     if len(values) > _MIPS[name]:
         raise emitter.error(f"{name} with an offset, or of an array of textures", "add it to the coordinates")

@@ -1,4 +1,4 @@
-"""Values of a type from their parts: f32(x), vec3f(a, b), mat3x3(...), array(...), and structs."""
+"""Values constructed from parts: f32(x), vec3f(a, b), mat3x3(...), array(...), and structs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def constructed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
 
 
 def inferred(emitter: Emitter, name: str, values: list[Value]) -> Value:
-    """vec3(...), mat3x3(...) or array(...), whose numbers have the type of the values."""
+    """vec3(...), mat3x3(...) or array(...), with the scalar type of the values."""
     if not values:
         raise emitter.error(f"{name}() without a type", f"{name}<f32>()" if name != "array" else "array<f32, 2>()")
     if name == "array":
@@ -44,7 +44,7 @@ def inferred(emitter: Emitter, name: str, values: list[Value]) -> Value:
 
 
 def _composed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
-    emitter.type_id(type)  # refuses what is too large
+    emitter.type_id(type)  # refuses types that are too large
     return emitter.emit("CompositeConstruct", type, *[value.id for value in values])
 
 
@@ -68,7 +68,7 @@ def _matrix(emitter: Emitter, type: Type, values: list[Value]) -> Value:
     if all(value.type.kind == "vector" for value in values) and len(values) == type.length:
         return _composed(emitter, type, [emitter.converted(value, column) for value in values])
     if len(values) != type.length * column.length:
-        raise emitter.error(f"{len(values)} values for {type}", "its columns, or all numbers")
+        raise emitter.error(f"{len(values)} values for {type}", "give its columns, or all numbers")
     numbers = [emitter.converted(value, type.scalar) for value in values]
     rows = column.length
     return _composed(

@@ -1,4 +1,4 @@
-"""Instructions of a module in the making: types and constants by id, blocks, and what is known folded at once."""
+"""Construction of a module: types and constants by id, and blocks of instructions, with constants folded."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Value(NamedTuple):
 
 
 class Emitter:
-    """A module with the function that is being written.
+    """A module under construction, with the function that is being written.
 
-    where, line  of the text, for instructions and errors
+    where, line  file and line of the text, for instructions and errors
     structs      name of a struct -> names and types of its members
     """
 
@@ -43,16 +43,16 @@ class Emitter:
         self._last, self._leaves = STANDARD, 0
         self._ids: dict[Type, int] = {}
         self._constants: dict[tuple[Type, str], int] = {}
-        self._abstract: dict[int, Type] = {}  # constants whose type is abstract
+        self._abstract: dict[int, Type] = {}  # constants of abstract type
         self._machine = Machine(self.module)
 
     def fresh(self) -> int:
-        """An id that nothing has."""
+        """An unused id."""
         self._last += 1
         return self._last
 
     def error(self, what: str, hint: str = "") -> InputError:
-        """The error at the present line."""
+        """The error at the current line."""
         return refuse(what, hint, f"{self.where}:{self.line}")
 
     # ------------------------------------------------------------------ types and constants
@@ -110,19 +110,19 @@ class Emitter:
         return int(number) if type.kind == "abstract int" else number
 
     def zero(self, type: Type) -> Value:
-        """The value of a type whose every number is 0."""
+        """The value of a type with all numbers 0."""
         return self.constant(self.module.zero(self.type_id(type)), type)
 
     def known(self, value: Value) -> Number | None:
-        """The number of a constant, None for other values."""
+        """The number of a constant; None for other values."""
         return self.module.constants.get(value.id)
 
     # ------------------------------------------------------------------ instructions
 
     def emit(self, name: str, type: Type, *operands: int, literals: int = 0) -> Value:
-        """An instruction's value, computed now if all operands are constants.
+        """An instruction's value, folded if all operands are constants.
 
-        literals  how many of the last operands are numbers, not ids
+        literals  how many of the last operands are literal numbers, not ids
         """
         first, last = 2 * (name == "ExtInst"), len(operands) - literals
         if all(id in self.module.constants for id in operands[first:last]):
@@ -132,26 +132,26 @@ class Emitter:
         return self.always(name, concrete(type), *operands[:first], *with_concrete_type, *operands[last:])
 
     def _with_concrete_type(self, id: int) -> int:
-        """An operand whose type is not abstract."""
+        """An operand converted to a concrete type."""
         return self.with_concrete_type(Value(id, self._abstract[id])).id if id in self._abstract else id
 
     def standard(self, number: int, type: Type, *operands: int) -> Value:
-        """A function of GLSL.std.450."""
+        """The value of a function of GLSL.std.450."""
         return self.emit("ExtInst", type, STANDARD, number, *operands)
 
     def always(self, name: str, type: Type, *operands: int) -> Value:
-        """An instruction's value, never computed now."""
+        """An instruction's value, never folded."""
         one = Instruction(name, self.type_id(type), self.fresh(), operands, self.line, self.where)
         self._append(one)
         return Value(one.result, type)
 
     def do(self, name: str, *operands: int) -> None:
-        """An instruction without a value."""
+        """Append an instruction without a value."""
         self._append(Instruction(name, 0, 0, operands, self.line, self.where))
 
     def _append(self, one: Instruction) -> None:
         if self.block is None:
-            raise self.error("no constant expression", "outside functions numbers must be constants")
+            raise self.error("not a constant expression", "outside functions numbers must be constants")
         self.block.instructions.append(one)
 
     def variable(self, type: Type) -> Value:
@@ -169,7 +169,7 @@ class Emitter:
     # ------------------------------------------------------------------ conversions
 
     def converted(self, value: Value, type: Type, what: str = "a value") -> Value:
-        """A value as a type that is asked for: literals take it, other types must be equal."""
+        """A value of a required type: literals are converted to it, other values must have it."""
         if value.type == type:
             return value
         number = self.known(value)
@@ -178,11 +178,11 @@ class Emitter:
         raise self.error(f"{what} of type {value.type} where {type} is expected", f"convert it: {type}(...)")
 
     def with_concrete_type(self, value: Value) -> Value:
-        """A value whose type is not abstract."""
+        """A value converted to a concrete type."""
         return self.converted(value, concrete(value.type))
 
     def together(self, values: Sequence[Value], what: str, floats: bool = False) -> list[Value]:
-        """Values with the same type of numbers. Raises InputError if theirs differ."""
+        """Values converted to a common scalar type. Raises InputError if there is none."""
         scalar = values[0].type.scalar
         for value in values:
             joined = common(scalar, value.type.scalar) if value.type.numbers else None
@@ -216,7 +216,7 @@ class Emitter:
             return self.emit("ConvertIToF", target, value.id)
         if source == FLOAT:
             return self.emit("ConvertFToI", target, value.id)
-        return self.emit("CopyObject", target, value.id)  # integers that vary have no bits
+        return self.emit("CopyObject", target, value.id)  # integers that are not constant have no bits
 
 
 def _filled(type: Type, number: Any) -> Number:
@@ -224,7 +224,7 @@ def _filled(type: Type, number: Any) -> Number:
 
 
 def _fits(source: Type, target: Type) -> bool:
-    """Whether a literal's type may become another."""
+    """Whether a literal's type may be converted to another."""
     if (source.kind, source.length) == (target.kind, target.length) and source.kind in ("vector", "matrix", "array"):
         return source.parts == target.parts or _fits(source.parts[0], target.parts[0])
     return source in (ABSTRACT_FLOAT, ABSTRACT_INT) and common(source, target) == target

@@ -18,7 +18,7 @@ _LETTERS = {letter: place for letters in ("xyzw", "rgba") for place, letter in e
 
 
 class Place(NamedTuple):
-    """A variable or a part of one: a pointer, the type behind it, and which components of a swizzle."""
+    """A variable or a part of one: a pointer, the type it points to, and the components of a swizzle."""
 
     pointer: int
     type: Type
@@ -34,7 +34,7 @@ class Signature(NamedTuple):
 
 
 class Names(Protocol):
-    """What is declared outside functions."""
+    """The declarations outside functions."""
 
     def value(self, unit: Unit, name: str, line: int) -> Value | Place | None: ...
 
@@ -44,7 +44,7 @@ class Names(Protocol):
 
 
 class Expressions:
-    """Expressions of one file. `scopes` hold what a function declares, the innermost last."""
+    """Expressions of one file. `scopes` hold the declarations in a function, innermost last."""
 
     def __init__(self, emitter: Emitter, names: Names, unit: Unit) -> None:
         self.emitter, self.names, self.unit = emitter, names, unit
@@ -69,7 +69,7 @@ class Expressions:
         if isinstance(node, Unary) and node.sign == "&":
             place = self.place(node.inside)
             if place is None or place.swizzle:
-                raise self.emitter.error("'&' of what is no variable", "var")
+                raise self.emitter.error("'&' of a value that is not a variable", "declare it with var")
             return Value(place.pointer, Type("pointer", (place.type,), 7))
         place = self.place(node)
         if place is not None:
@@ -77,7 +77,7 @@ class Expressions:
         return self._part(node)
 
     def _part(self, node: Expression) -> Value:
-        """A name of a value, or a part of a value."""
+        """The value of a name, or a part of a value."""
         if isinstance(node, Name):
             named = self._named(node)
             assert isinstance(named, Value)
@@ -96,12 +96,12 @@ class Expressions:
                     "CompositeExtract", item, base.id, self._inside(int(number), base.type), literals=1
                 )
             return self.emitter.emit("VectorExtractDynamic", item, base.id, index.id)
-        raise self.emitter.error("'*' of what is no pointer")
+        raise self.emitter.error("'*' of a value that is not a pointer")
 
     # ------------------------------------------------------------------ variables
 
     def place(self, node: Expression) -> Place | None:
-        """The variable, or its part, that an expression names; None for values."""
+        """The variable, or the part of one, that an expression names; None for values."""
         self.emitter.line = node.line
         if isinstance(node, Name):
             named = self._named(node)
@@ -145,12 +145,12 @@ class Expressions:
         return Place(pointer.id, type)
 
     def loaded(self, place: Place) -> Value:
-        """The value of a variable now."""
+        """The current value of a variable."""
         composite = self.emitter.always("Load", place.type, place.pointer)
         return self._shuffled(composite, place.swizzle) if place.swizzle else composite
 
     def store(self, place: Place, value: Value) -> None:
-        """Change a variable; of a swizzle its components."""
+        """Assign to a variable, or to the components of a swizzle."""
         if not place.swizzle:
             self.emitter.do("Store", place.pointer, self.emitter.converted(value, place.type).id)
             return
@@ -178,7 +178,7 @@ class Expressions:
         index = self.emitter.with_concrete_type(self.value(node.index))
         self.emitter.line = node.line
         if index.type not in (INT, UINT):
-            raise self.emitter.error(f"an index of type {index.type}", "an integer: i32(...)")
+            raise self.emitter.error(f"an index of type {index.type}", "convert it: i32(...)")
         return index
 
     def _item(self, type: Type) -> Type:
@@ -188,7 +188,7 @@ class Expressions:
 
     def _inside(self, index: int, type: Type) -> int:
         if not 0 <= index < type.length:
-            raise self.emitter.error(f"the index {index} into {type}", f"0 to {type.length - 1}")
+            raise self.emitter.error(f"the index {index} into {type}", f"use 0 to {type.length - 1}")
         return index
 
     def _field(self, type: Type, name: str) -> tuple[int, Type]:
@@ -226,7 +226,7 @@ class Expressions:
         return operations.binary(self.emitter, sign, left, value)
 
     def _short(self, sign: str, left: Value, right: Expression, line: int) -> Value:
-        """left && right: a right side that calls functions of the shader runs only where it decides."""
+        """`&&` or `||`, whose right side runs only where needed if it calls functions of the shader."""
         emitter = self.emitter
         before, label = emitter.block, emitter.fresh()
         assert before is not None and emitter.function is not None
@@ -267,7 +267,9 @@ class Expressions:
             made = lambda values: builtins.called(self.emitter, name, values)  # noqa: E731
             if what := builtins.refused(name):
                 self.emitter.line = node.line
-                raise self.emitter.error(what, "a BSDF is a function of directions and parameters alone")
+                raise self.emitter.error(
+                    f"{what} is not supported", "a BSDF is a function of directions and parameters alone"
+                )
         values = [self.value(one) for one in node.arguments]
         self.emitter.line = node.line
         result = made(values)
@@ -304,12 +306,12 @@ def _literal(emitter: Emitter, text: str) -> Value:
         try:
             value = float.fromhex(digits) if hexadecimal else float(digits)
         except (ValueError, OverflowError):
-            raise emitter.error(f"'{text}' is no number") from None
+            raise emitter.error(f"'{text}' is not a number") from None
         return emitter.constant(value, FLOAT if suffix == "f" else ABSTRACT_FLOAT)
     try:
         number = int(digits, 16 if hexadecimal else 10)
     except ValueError:
-        raise emitter.error(f"'{text}' is no number") from None
+        raise emitter.error(f"'{text}' is not a number") from None
     if number >= 1 << (64 if not suffix else 32):
-        raise emitter.error(f"the number {text[:40]}", "32 bits")
+        raise emitter.error(f"the number {text[:40]} does not fit in 32 bits")
     return emitter.constant(number, {"i": INT, "u": UINT, "": ABSTRACT_INT}[suffix])

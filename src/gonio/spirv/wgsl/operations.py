@@ -1,4 +1,4 @@
-"""WGSL's operators: which instruction each is, for which types."""
+"""WGSL's operators: the instruction of each, by the types of its operands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _INTEGERS = (INT, UINT, ABSTRACT_INT)
 
 
 def binary(emitter: Emitter, sign: str, left: Value, right: Value) -> Value:
-    """left sign right. Raises InputError for types that the operator does not take."""
+    """`left sign right`. Raises InputError for types that the operator does not accept."""
     if sign in ("<<", ">>"):
         return _shift(emitter, sign, left, right)
     left, right = emitter.together([left, right], f"'{sign}'")
@@ -64,9 +64,9 @@ def _check(emitter: Emitter, sign: str, left: Value, right: Value, accepted: tup
 
 
 def _broadcast(emitter: Emitter, sign: str, left: Type, right: Type) -> Type:
-    """The shape of both, where a scalar meets a vector."""
+    """The common shape of two operands, with a scalar broadcast to a vector."""
     if left.kind == "vector" and right.kind == "vector" and left.length != right.length:
-        raise emitter.error(f"'{sign}' of {left}, {right}", "vectors of one length")
+        raise emitter.error(f"'{sign}' of {left}, {right}", "use vectors of one length")
     return left if left.kind == "vector" else right
 
 

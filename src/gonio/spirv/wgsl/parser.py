@@ -1,4 +1,4 @@
-"""WGSL's grammar, by recursive descent: words to declarations. Depth is bounded; time grows with the words alone."""
+"""A recursive-descent parser of WGSL: tokens to declarations. Depth is bounded; time depends on the tokens alone."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .syntax import (
 )
 from .tokens import MAX_NESTING, Words
 
-# binary operations from the weakest; comparisons do not chain, which is not checked
+# binary operators, the weakest first; comparisons do not chain, which is not checked
 _LEVELS = (("||",), ("&&",), ("|",), ("^",), ("&",), ("==", "!="), ("<", ">", "<=", ">="), ("<<", ">>"), ("+", "-"),
            ("*", "/", "%"))  # fmt: skip
 _STRENGTH = {sign: level for level, signs in enumerate(_LEVELS) for sign in signs}
@@ -132,7 +132,7 @@ class _Parser(Words):
 
     def declared(self, kind: str, line: int) -> Declared:
         space = ""
-        if kind == "var" and self.word.text == "<":  # no name comes before, so that it is no list of arguments
+        if kind == "var" and self.word.text == "<":  # not after a name, so it does not open a list of type arguments
             self.take()
             space = self.name()
             while not self.accept(">"):
@@ -171,7 +171,7 @@ class _Parser(Words):
     # ------------------------------------------------------------------ expressions
 
     def expression(self, level: int = 0) -> Expression:
-        """An expression of binary operations at least as strong as `level`."""
+        """An expression of binary operators at least as strong as `level`."""
         left = self.unary()
         while (strength := _STRENGTH.get(self.sign(), -1)) >= level:
             rest = []
@@ -184,7 +184,7 @@ class _Parser(Words):
         return left
 
     def sign(self) -> str:
-        """The operation that comes next; `>` is a word of its own."""
+        """The next operator, whose `>` are separate tokens."""
         word = self.word
         if word.kind != "sign":
             return ""

@@ -1,9 +1,9 @@
-"""Bevy's directives in a WGSL text: #ifdef and its kin, #define, #import and #define_import_path.
+"""Bevy's directives in a WGSL text: #ifdef and related ones, #define, #import and #define_import_path.
 
     #import bevy_pbr::lighting as lighting
     #import bevy_pbr::{utils::PI, pbr_types::{A, B as C}}
 
-Lines that are left out become empty, so that lines keep their numbers.
+Omitted lines become empty, which preserves line numbers.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from ..values import refuse
 
-MAX_DEPTH = 64  # of conditions within one another
+MAX_DEPTH = 64  # of nested conditions
 _DIRECTIVE = re.compile(r"\s*#\s*([a-z_]+)\b(.*)", re.DOTALL)
 _VALUE = re.compile(r"#\{(\w+)\}|#([A-Z]\w*)")
 _PATH = re.compile(r'"[^"\n]+"(?:::\w+)*|\w+(?:::\w+)*')
@@ -27,11 +27,11 @@ _ORDERS: dict[str, Callable[[Any, Any], Any]] = {
 
 @dataclass
 class Preprocessed:
-    """The text that is left.
+    """The text after preprocessing.
 
-    path      by which others import it, "" if it has none
+    path      the path by which others import it, "" if it has none
     imports   name in this file -> path
-    lines     name in this file -> the line of its import
+    lines     name in this file -> line of its import
     """
 
     text: str = ""
@@ -41,7 +41,7 @@ class Preprocessed:
 
 
 class _Conditions:
-    """The conditions around a line: for each whether its branch holds, and whether one held before."""
+    """The conditions around a line: for each, whether its branch is active, and whether an earlier one was."""
 
     def __init__(self, defines: dict[str, str]) -> None:
         self.defines = defines
@@ -51,10 +51,10 @@ class _Conditions:
         return all(now for now, _ in self.stack)
 
     def take(self, word: str, rest: str, place: str) -> bool:
-        """Whether a directive is a condition, which is then taken."""
+        """Process a directive if it is a condition; returns whether it is."""
         if word in ("ifdef", "ifndef", "if"):
             if len(self.stack) >= MAX_DEPTH:
-                raise refuse(f"more than {MAX_DEPTH} #if within one another", "", place)
+                raise refuse(f"more than {MAX_DEPTH} nested #if", "", place)
             now = self.test(word, rest, place)
             self.stack.append((now, now))
         elif word == "else":
@@ -76,7 +76,7 @@ class _Conditions:
         if word == "if":
             match = re.fullmatch(r"(\w+)\s*(==|!=|>=|<=|>|<)\s*(-?\w+)", rest)
             if match is None:
-                raise refuse(f"#if {rest[:40]}", "NAME == VALUE", place)
+                raise refuse(f"#if {rest[:40]} is not supported", "write #if NAME == VALUE", place)
             if match[1] not in self.defines:
                 return False
             given = (self.defines[match[1]], match[3])
@@ -87,7 +87,7 @@ class _Conditions:
 
 
 def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preprocessed:
-    """The text with its directives carried out. Raises InputError, with file and line."""
+    """The text after its directives. Raises InputError, with file and line."""
     if "#" not in text:
         return Preprocessed(text)
     known, result = dict(defines), Preprocessed()
@@ -110,7 +110,7 @@ def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preproces
             pending = ""
         lines.append(expanded)
     if pending or conditions.stack:
-        raise refuse("a directive without an end", "#endif, or }", f"{where}:{start or len(lines)}")
+        raise refuse("a directive is not closed", "add #endif or }", f"{where}:{start or len(lines)}")
     result.text = "\n".join(lines)
     return result
 
@@ -123,11 +123,11 @@ def _other(word: str, rest: str, defines: dict[str, str], result: Preprocessed, 
         defines[name] = value.strip()
     else:
         known = "#import, #define, #ifdef, #ifndef, #if, #else, #endif, #define_import_path"
-        raise refuse(f"the directive #{word}", known, place)
+        raise refuse(f"unknown directive #{word}", f"known: {known}", place)
 
 
 def _expanded(line: str, defines: Mapping[str, str], place: str) -> str:
-    """A line with the values of its names; comments, in which a # may be that of an address, stay as they are."""
+    """A line with #NAME replaced by values; comments, in which a # may be part of a URL, are unchanged."""
     code, slashes, comment = line.partition("//")
     return _VALUE.sub(lambda one: _value(one, defines, place), code) + slashes + comment
 

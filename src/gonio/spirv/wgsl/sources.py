@@ -1,4 +1,4 @@
-"""The files of a WGSL shader: its own, and those that it imports by Bevy's #import, from named folders only."""
+"""The files of a WGSL shader: its own, and those that it imports by Bevy's #import, only from named folders."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .preprocessor import preprocessed
 from .syntax import Assertion, Declaration
 
 MAX_FILES = 256
-MAX_TEXT = 4 << 20  # characters of all files
-MAX_FOLDER = 4096  # entries of a folder in which imports are looked for
+MAX_TEXT = 4 << 20  # characters in all files
+MAX_FOLDER = 4096  # entries of a folder that is searched for imports
 _IMPORT_PATH = re.compile(r"^[ \t]*#[ \t]*define_import_path[ \t]+([\w:]+)", re.MULTILINE)
 
 
 @dataclass
 class Unit:
-    """One file: its declarations, and what it imports, name -> path."""
+    """One file: its declarations, and its imports, name -> path."""
 
     where: str
     path: str
@@ -32,7 +32,7 @@ class Unit:
 
 
 class Sources:
-    """The files of a shader, read when a name of theirs is used first."""
+    """The files of a shader, each of which is read when one of its names is first used."""
 
     def __init__(self, text: str, where: str, defines: Mapping[str, str], folders: Sequence[Path]) -> None:
         self.defines, self.folders = defines, [folder.resolve() for folder in folders]
@@ -45,7 +45,7 @@ class Sources:
             self._known[self.main.path] = self.main
 
     def find(self, unit: Unit, name: str, line: int) -> tuple[Unit, Declaration] | None:
-        """The declaration of a name as a file sees it, None if the file has none; `a::b` as its imports say.
+        """The declaration that a name has in a file, None if there is none; `a::b` is resolved by the file's imports.
 
         Raises InputError, with file and line, for an import that is not found.
         """

@@ -30,7 +30,7 @@ class Body(Expressions):
     def __init__(self, emitter: Emitter, names: Names, unit: Unit, signature: Signature) -> None:
         super().__init__(emitter, names, unit)
         self.signature = signature
-        self.targets: list[tuple[int, int | None]] = []  # where break and continue lead, the innermost last
+        self.targets: list[tuple[int, int | None]] = []  # labels for break and continue, innermost last
 
     def write(self, function: Function) -> ModuleFunction:
         """The function's blocks."""
@@ -102,7 +102,7 @@ class Body(Expressions):
             self.scopes[-1][node.name] = Place(pointer.id, value.type)
             return
         if value is None or (node.kind == "const" and self.emitter.known(value) is None):
-            raise self.emitter.error(f"{node.kind} {node.name} without a known value", "let")
+            raise self.emitter.error(f"{node.kind} {node.name} without a known value", "use let, with a value")
         self.scopes[-1][node.name] = value if node.kind == "const" else self.emitter.with_concrete_type(value)
 
     def _assign(self, node: Assign) -> None:
@@ -111,7 +111,7 @@ class Body(Expressions):
             return
         place = self.place(node.target)
         if place is None:
-            raise self.emitter.error("an assignment to what is no variable", "var")
+            raise self.emitter.error("an assignment to a value that is not a variable", "declare it with var")
         value = self.value(node.value)
         self.emitter.line = node.line
         if node.sign != "=":
@@ -125,7 +125,7 @@ class Body(Expressions):
             value = self.value(node.value)
             self.emitter.line = node.line
             self.emitter.do("ReturnValue", self.emitter.converted(value, self.signature.result, "a result").id)
-        self.emitter.start(self.emitter.fresh())  # what follows is never reached
+        self.emitter.start(self.emitter.fresh())  # later statements are never reached
 
     def _jump(self, node: Jump) -> None:
         if node.kind == "discard":
@@ -144,7 +144,7 @@ class Body(Expressions):
         value = self.value(node)
         self.emitter.line = node.line
         if value.type != BOOL:
-            raise self.emitter.error(f"a condition of type {value.type}", "bool")
+            raise self.emitter.error(f"a condition of type {value.type}, bool expected")
         return value
 
     def _if(self, node: If) -> None:
@@ -181,7 +181,7 @@ class Body(Expressions):
             emitter.do("Branch", body)
         emitter.start(body)
         self.targets.append((end, after))
-        self.scopes.append({})  # what the body declares is seen by what continues it
+        self.scopes.append({})  # declarations of the body are visible in the continuing part
         for one in node.body.statements:
             self.run(one)
         self.targets.pop()
@@ -200,7 +200,7 @@ class Body(Expressions):
         emitter = self.emitter
         selector = emitter.with_concrete_type(self.value(node.selector))
         if selector.type not in (INT, UINT):
-            raise emitter.error(f"switch on {selector.type}", "an integer")
+            raise emitter.error(f"switch on {selector.type}, an integer expected")
         end = emitter.fresh()
         labels = [emitter.fresh() for _ in node.cases]
         default, targets = end, list[int]()
@@ -211,7 +211,7 @@ class Body(Expressions):
                     continue
                 number = emitter.known(emitter.converted(self.value(one), selector.type, "a case"))
                 if number is None:
-                    raise emitter.error("a case that is no constant")
+                    raise emitter.error("a case that is not a constant")
                 targets += [int(number) & 0xFFFFFFFF, label]
         emitter.do("SelectionMerge", end, 0)
         emitter.do("Switch", selector.id, default, *targets)

@@ -1,4 +1,4 @@
-"""The parts of a WGSL text: expressions, statements and declarations, each with its line."""
+"""The syntax tree of a WGSL text: expressions, statements and declarations, each with its line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class Node:
-    """Any part of a text."""
+    """A node of the syntax tree."""
 
     line: int
 
@@ -19,14 +19,14 @@ class Expression(Node):
 
 @dataclass(slots=True)
 class Literal(Expression):
-    """A number or `true`, as it is written."""
+    """A number or `true`, as written."""
 
     text: str
 
 
 @dataclass(slots=True)
 class Name(Expression):
-    """A name, `a::b` too, with the arguments in `<>` of a type."""
+    """A name, possibly `a::b`, with the arguments of a type in `<>`."""
 
     text: str
     arguments: list[Expression] = field(default_factory=list)
@@ -66,7 +66,7 @@ class Unary(Expression):
 
 @dataclass(slots=True)
 class Chain(Expression):
-    """A chain of binary operations from the left, (first sign right) sign right ..., so that long sums are not deep."""
+    """A left-associative chain of binary operations, (first sign right) sign right ..., which keeps long sums flat."""
 
     first: Expression
     rest: list[tuple[str, Expression, int]]  # sign, right operand, line
@@ -79,16 +79,16 @@ class Statement(Node):
 
 @dataclass(slots=True)
 class Block(Statement):
-    """{ ... }."""
+    """A block, { ... }."""
 
     statements: list[Statement]
 
 
 @dataclass(slots=True)
 class Declared(Statement):
-    """let, var, const or override, in a function or outside.
+    """let, var, const or override, inside or outside a function.
 
-    space  "uniform", "private", ..., of module-scope variables
+    space  "uniform", "private", ..., for variables in module scope
     """
 
     kind: str
@@ -109,7 +109,7 @@ class Assign(Statement):
 
 @dataclass(slots=True)
 class Evaluate(Statement):
-    """A call whose result is dropped."""
+    """A call whose result is ignored."""
 
     value: Expression
 
@@ -123,7 +123,7 @@ class If(Statement):
 
 @dataclass(slots=True)
 class Loop(Statement):
-    """Any loop: initial statement, condition, body, what continues it, and the condition that then ends it."""
+    """Any loop: initial statement, condition, body, continuing statements, and the condition that then ends it."""
 
     start: Statement | None
     condition: Expression | None
@@ -134,7 +134,7 @@ class Loop(Statement):
 
 @dataclass(slots=True)
 class Switch(Statement):
-    """switch: (selectors, block); a selector None is `default`."""
+    """switch: (selectors, block); None as a selector is `default`."""
 
     selector: Expression
     cases: list[tuple[list[Expression | None], Block]]
@@ -183,7 +183,7 @@ class Struct(Node):
 
 @dataclass(slots=True)
 class Alias(Node):
-    """Another name of a type."""
+    """Another name for a type."""
 
     name: str
     type: Expression

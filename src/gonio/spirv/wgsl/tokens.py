@@ -1,8 +1,8 @@
-"""The words of a WGSL text, with their lines.
+"""The tokens of a WGSL text, with their lines.
 
     tokens("let x = 2.0f;", "a.wgsl")   let, x, =, 2.0f, ;
 
-`<` and `>` around the arguments of a type are told from comparisons by the specification's own rule: a `<` after a
+`<` and `>` around the arguments of a type are distinguished from comparisons by the specification's rule: a `<` after a
 name opens a list if a `>` follows at the same depth of brackets before the expression ends.
 """
 
@@ -16,7 +16,7 @@ from ...errors import InputError
 from ..values import refuse
 
 MAX_TOKENS = 400_000  # of a file
-MAX_NESTING = 64  # brackets and blocks within one another
+MAX_NESTING = 64  # nested brackets and blocks
 
 _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f\v\u0085\u200e\u200f\u2028\u2029]+|//[^\n]*)
@@ -32,9 +32,9 @@ _COMMENT = re.compile(r"/\*|\*/|\n")
 
 
 class Token(NamedTuple):
-    """One word: kind is "name", "number", "sign", "open" and "close" (of a list of a type's arguments), or "end".
+    """A token; kind is "name", "number", "sign", "open" or "close" (of a list of type arguments), or "end".
 
-    joined  whether the next word follows without a space, as in `>>`
+    joined  whether the next token follows without a space, as in `>>`
     """
 
     kind: str
@@ -44,12 +44,12 @@ class Token(NamedTuple):
 
 
 def tokens(text: str, where: str) -> list[Token]:
-    """The words of a text. Raises InputError, with file and line, for other characters, and for too many words."""
+    """The tokens of a text. Raises InputError, with file and line, for invalid characters and too many tokens."""
     result: list[Token] = []
     for token in _words(text, where):
         result.append(token)
         if len(result) > MAX_TOKENS:
-            raise refuse(f"more than {MAX_TOKENS} words", "a shader is shorter", f"{where}:{token.line}")
+            raise refuse(f"more than {MAX_TOKENS} words", "shorten the shader", f"{where}:{token.line}")
     _mark_lists(result)
     line = result[-1].line if result else 1
     return [*result, Token("end", "the end of the file", line)]
@@ -60,7 +60,7 @@ def _words(text: str, where: str) -> Iterator[Token]:
     while at < len(text):
         match = _TOKEN.match(text, at)
         if match is None:
-            raise refuse(f"the character {text[at]!r}", "WGSL has none such", f"{where}:{line}")
+            raise refuse(f"unknown character {text[at]!r}", "WGSL does not use it", f"{where}:{line}")
         kind, at = str(match.lastgroup), match.end()
         if kind == "line":
             line += 1
@@ -73,12 +73,12 @@ def _words(text: str, where: str) -> Iterator[Token]:
 
 
 def _after_comment(text: str, at: int, where: str) -> tuple[int, int]:
-    """Where a block comment ends, and its line ends; comments nest."""
+    """The position after a block comment, and the number of line ends in it; comments nest."""
     depth, lines = 1, 0
     while depth:
         match = _COMMENT.search(text, at)
         if match is None:
-            raise refuse("a comment without an end", "*/", where)
+            raise refuse("a comment is not closed", "add */", where)
         depth += {"/*": 1, "*/": -1}.get(match[0], 0)
         lines += match[0] == "\n"
         at = match.end()
@@ -86,8 +86,8 @@ def _after_comment(text: str, at: int, where: str) -> tuple[int, int]:
 
 
 def _mark_lists(result: list[Token]) -> None:
-    """Mark the `<` and `>` that enclose lists of a type's arguments."""
-    pending: list[tuple[int, int]] = []  # place of `<`, depth of brackets
+    """Mark the `<` and `>` that enclose lists of type arguments."""
+    pending: list[tuple[int, int]] = []  # position of `<`, depth of brackets
     depth = 0
     for place, token in enumerate(result):
         text = token.text
@@ -111,7 +111,7 @@ def _mark_lists(result: list[Token]) -> None:
 
 
 class Words:
-    """The words of a text, taken one by one."""
+    """The tokens of a text, consumed one by one."""
 
     def __init__(self, text: str, where: str) -> None:
         self.where, self.words, self.at, self.depth = where, tokens(text, where), 0, 0
@@ -147,5 +147,5 @@ class Words:
     def deeper(self) -> None:
         self.depth += 1
         if self.depth > MAX_NESTING:
-            what = f"more than {MAX_NESTING} brackets or blocks within one another"
+            what = f"more than {MAX_NESTING} nested brackets or blocks"
             raise refuse(what, "name the parts by let", f"{self.where}:{self.word.line}")

@@ -1,10 +1,10 @@
-"""A WGSL shader as a module: what is declared outside functions, translated when it is used first.
+"""A WGSL shader as a module, in which declarations outside functions are translated when first used.
 
-Functions of the shader's own file are all translated, those of imported files where they are called. A function with
-constructs that are not read is refused where it is called, so that a file may contain anything else.
+All functions of the shader's own file are translated, those of imported files when they are called. A function with
+unsupported constructs is refused only where it is called, so that a file may contain any.
 
-An `override` of f32 without a value in `defines` is a uniform with a default; one that depends on such an override is
-computed before any function runs. Other overrides are constants, since loops and array lengths may depend on them.
+An `override` of type f32 without a value in `defines` is a uniform with a default; one that depends on such an override
+is computed before any function runs. Other overrides are constants, since loops and array lengths may depend on them.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from .statements import Body
 from .syntax import Alias, Assign, Block, Declared, Expression, Function, Name, Struct, names_in
 from .types import FLOAT, MATRICES, NAMED, REFUSED, TEXTURES, VECTORS, VOID, Type, concrete, matrix, vector
 
-MAX_INSIDE = 32  # declarations that need one another
-# SPIR-V's numbers of where a variable lives
+MAX_INSIDE = 32  # depth of declarations that depend on one another
+# SPIR-V's storage classes
 _SPACES = {"uniform": 2, "storage": 12, "push_constant": 9, "immediate": 9, "private": 6, "": 0}
 
 
@@ -35,9 +35,9 @@ def translated(
     """The module of a WGSL text.
 
     where    name of the file, for messages
-    defines  of #ifdef, and values of `override`
-    folders  where #import may read
-    read     gets the files that are imported
+    defines  names for #ifdef, and values of `override`
+    folders  folders from which #import may read
+    read     receives the files that are imported
     Raises InputError, with file and line.
     """
     try:
@@ -47,11 +47,11 @@ def translated(
             read += sources.read
         return module
     except RecursionError:
-        raise refuse("expressions too deep within one another", "name the parts by let", where) from None
+        raise refuse("expressions are nested too deeply", "name the parts by let", where) from None
 
 
 class _Translation:
-    """What is declared outside functions, by file and name."""
+    """The declarations outside functions, by file and name."""
 
     def __init__(self, sources: Sources) -> None:
         self.sources, self.emitter = sources, Emitter()
@@ -70,7 +70,7 @@ class _Translation:
                     self.signature(main, one.name, one.line)
                 elif isinstance(one, Declared) and one.kind == "var":
                     self.value(main, one.name, one.line)
-            except InputError:  # refused where it is used
+            except InputError:  # refused only where it is used
                 continue
         for assertion in main.assertions:
             held = Expressions(self.emitter, self, main).value(assertion.condition)
@@ -95,10 +95,10 @@ class _Translation:
             made.parameters.append((id, self.emitter.type_id(type)))
         return made
 
-    # ------------------------------------------------------------------ what expressions ask
+    # ------------------------------------------------------------------ look-ups by expressions
 
     def value(self, unit: Unit, name: str, line: int) -> Value | Place | None:
-        """The constant or variable of a name, None if there is none."""
+        """The constant or variable of a name; None if there is none."""
         home, declared = self.sources.find(unit, name, line) or (unit, None)
         if not isinstance(declared, Declared):
             return None
@@ -110,7 +110,7 @@ class _Translation:
         return self._values[key]
 
     def signature(self, unit: Unit, name: str, line: int) -> Signature | None:
-        """The function of a name, None if there is none."""
+        """The function of a name; None if there is none."""
         home, function = self.sources.find(unit, name, line) or (unit, None)
         if not isinstance(function, Function):
             return None
@@ -126,7 +126,7 @@ class _Translation:
         return self._signatures[key]
 
     def type(self, unit: Unit, expression: Expression) -> Type | None:
-        """The type that an expression names, None if it names none."""
+        """The type that an expression names; None if it does not name one."""
         if not isinstance(expression, Name):
             return None
         name, arguments = expression.text, expression.arguments
@@ -136,7 +136,8 @@ class _Translation:
         if declared is None and arguments:
             return self._generated(unit, expression)
         if declared is None and (name in REFUSED or name.startswith("texture_")):
-            raise refuse(REFUSED.get(name, f"the texture type {name}"), "", f"{unit.where}:{expression.line}")
+            what = REFUSED.get(name, f"the texture type {name}")
+            raise refuse(f"{what} is not supported", "", f"{unit.where}:{expression.line}")
         home, one = self.sources.find(unit, name, expression.line) or (unit, None)
         if not isinstance(one, Struct | Alias):
             return None
@@ -155,7 +156,7 @@ class _Translation:
         type = self.type(unit, expression)
         if type is None:
             name = expression.text if isinstance(expression, Name) else "an expression"
-            raise refuse(f"'{name}' is no type", "declare it", f"{unit.where}:{expression.line}")
+            raise refuse(f"'{name}' is not a type", "declare it", f"{unit.where}:{expression.line}")
         return type
 
     def _generated(self, unit: Unit, node: Name) -> Type | None:
@@ -163,34 +164,34 @@ class _Translation:
         if name in VECTORS or name in MATRICES:
             scalar = self._asked(unit, arguments[0])
             if len(arguments) != 1 or scalar.kind not in ("float", "int", "uint", "bool"):
-                raise refuse(f"{name}<{scalar}>", f"{name}<f32>", place)
+                raise refuse(f"{name}<{scalar}> is not supported", f"use {name}<f32>", place)
             return vector(scalar, VECTORS[name]) if name in VECTORS else matrix(scalar, *MATRICES[name])
         if name == "array":
             item = self._asked(unit, arguments[0])
             if len(arguments) != 2:
-                raise refuse("an array without a length", "array<f32, 4>", place)
+                raise refuse("an array without a length", "write array<f32, 4>", place)
             return Type("array", (item,), self._length(unit, arguments[1], place))
         if name in ("ptr", "ref") and len(arguments) >= 2:
             return Type("pointer", (self._asked(unit, arguments[1]),), 7)
         if name in TEXTURES:
             if self._asked(unit, arguments[0]) != FLOAT:
-                raise refuse(f"{name} of integers", f"{name}<f32>", place)
+                raise refuse(f"{name} of integers is not supported", f"use {name}<f32>", place)
             return Type("texture", (), TEXTURES[name])
         if name in REFUSED or name.startswith("texture_"):
-            raise refuse(REFUSED.get(name, f"the texture type {name}"), "", place)
+            raise refuse(f"{REFUSED.get(name, f'the texture type {name}')} is not supported", "", place)
         return None
 
     def _length(self, unit: Unit, expression: Expression, place: str) -> int:
         value = Expressions(self.emitter, self, unit).value(expression)
         length = self.emitter.known(value)
         if not isinstance(length, int) or isinstance(length, bool) or length < 1:
-            raise refuse("an array whose length is not a constant", "const", place)
+            raise refuse("an array whose length is not a constant", "declare it with const", place)
         return length
 
     def _struct(self, unit: Unit, one: Struct) -> Type:
         names = tuple(member.name for member in one.members)
         if len(set(names)) != len(names) or not names:
-            raise refuse(f"struct {one.name} without members, or with two of one name", "", f"{unit.where}:{one.line}")
+            raise refuse(f"struct {one.name} has no members, or two of the same name", "", f"{unit.where}:{one.line}")
         types = tuple(self._asked(unit, member.type) for member in one.members)
         title = self._title(unit, one.name)
         self.emitter.structs[title] = names, types
@@ -204,7 +205,7 @@ class _Translation:
         if one.value is None:
             if one.kind == "override" and asked == FLOAT:
                 return self._parameter(unit, one, None)
-            hint = f"defines = {{ {one.name} = '...' }} in the adapter"
+            hint = f"add defines = {{ {one.name} = '...' }} to the adapter"
             raise self.emitter.error(f"{one.kind} {one.name} without a value", hint)
         value = Expressions(self.emitter, self, unit).value(one.value)
         if one.kind == "override" and (asked or concrete(value.type)) == FLOAT:
@@ -212,7 +213,7 @@ class _Translation:
         return self.emitter.converted(value, asked, f"'{one.name}'") if asked is not None else value
 
     def _parameter(self, unit: Unit, one: Declared, default: Value | None) -> Place:
-        """An override of f32 as a uniform."""
+        """An override of type f32 as a uniform."""
         module, id = self.emitter.module, self.emitter.fresh()
         pointer = self.emitter.type_id(Type("pointer", (FLOAT,), _SPACES[""]))
         module.variables[id] = Instruction("Variable", pointer, id, (_SPACES[""],), one.line, unit.where)
@@ -222,13 +223,13 @@ class _Translation:
         return Place(id, FLOAT)
 
     def _derived(self, unit: Unit, one: Declared) -> bool:
-        """Whether the value of an override depends on one that is a uniform, and is not given."""
+        """Whether an override is not given and depends on one that is a uniform."""
         if one.kind != "override" or one.value is None or one.name in self.sources.defines:
             return False
         return any(isinstance(self.value(unit, name, one.line), Place) for name in sorted(names_in(one.value)))
 
     def _computed(self, unit: Unit, one: Declared) -> Place:
-        """A variable for an override, and the function that assigns it, after those on which it depends."""
+        """A variable for an override, assigned by a function after the overrides on which it depends."""
         assert one.value is not None
         type = self._asked(unit, one.type) if one.type is not None else FLOAT
         place = Place(self.emitter.fresh(), type)
@@ -247,7 +248,7 @@ class _Translation:
         try:
             number = float(text) if type == FLOAT else text == "true" if type.kind == "bool" else int(text)
         except ValueError:
-            raise self.emitter.error(f"{one.name} = '{text}' is no {type}", "defines in the adapter") from None
+            raise self.emitter.error(f"{one.name} = '{text}' is not of type {type}", "see `defines`") from None
         return self.emitter.constant(number, type)
 
     def _variable(self, unit: Unit, one: Declared) -> Place:
@@ -260,7 +261,7 @@ class _Translation:
         else:
             raise self.emitter.error(f"var {one.name} without type and value")
         if one.space not in _SPACES or (not one.space and type.kind not in ("texture", "sampler")):
-            raise self.emitter.error(f"a variable in '{one.space}'", f"one of {', '.join(filter(None, _SPACES))}")
+            raise self.emitter.error(f"a variable in '{one.space}'", f"use one of {', '.join(filter(None, _SPACES))}")
         id, module = self.emitter.fresh(), self.emitter.module
         space = _SPACES[one.space]
         operands: tuple[int, ...] = (space,)
@@ -273,7 +274,7 @@ class _Translation:
 
 
 class _Entered:
-    """A declaration while it is translated: refuses one that needs itself, and restores the place for messages."""
+    """A translation: refuses declarations that depend on themselves, and restores the place for messages."""
 
     def __init__(self, translation: _Translation, key: tuple[str, str], unit: Unit, line: int) -> None:
         self.translation, self.key, self.unit, self.line = translation, key, unit, line
@@ -283,9 +284,9 @@ class _Entered:
     def __enter__(self) -> None:
         inside, place = self.translation._inside, f"{self.unit.where}:{self.line}"
         if self.key in inside:
-            raise refuse(f"'{self.key[1]}' needs itself", "", place)
+            raise refuse(f"'{self.key[1]}' depends on itself", "", place)
         if len(inside) >= MAX_INSIDE:
-            raise refuse(f"more than {MAX_INSIDE} declarations that need one another", "", place)
+            raise refuse(f"more than {MAX_INSIDE} declarations that depend on one another", "", place)
         inside.append(self.key)
         emitter = self.translation.emitter
         emitter.where, emitter.line, emitter.block = self.unit.where, self.line, None

@@ -1,4 +1,4 @@
-"""WGSL's types, and how literals take the type of what they meet."""
+"""WGSL's types, and the conversion of literals to the types of other operands."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 
 class Type(NamedTuple):
-    """A type. Literals have abstract ones, which become those of their partners.
+    """A type. Literals have abstract types, which become those of the other operands.
 
     kind    "float", "int", "uint", "bool", "abstract float", "abstract int", "vector", "matrix", "array", "struct",
             "pointer", "texture", "sampler" or "void"
-    parts   the types inside: of components, columns, items, or what a pointer points to
-    length  of components, columns or items; dimensions of a texture
-    name    of a struct
+    parts   the types of components, columns or items, or of the target of a pointer
+    length  number of components, columns or items; dimensions of a texture
+    name    name of a struct
     """
 
     kind: str
@@ -22,7 +22,7 @@ class Type(NamedTuple):
 
     @property
     def scalar(self) -> Type:
-        """The type of the numbers inside scalars, vectors and matrices."""
+        """The scalar type of a scalar, vector or matrix."""
         return self.parts[0].scalar if self.kind in ("vector", "matrix") else self
 
     @property
@@ -31,7 +31,7 @@ class Type(NamedTuple):
         return self.scalar.kind in _SCALARS
 
     def of(self, scalar: Type) -> Type:
-        """The same shape of other numbers."""
+        """The same shape with another scalar type."""
         return self._replace(parts=(self.parts[0].of(scalar),)) if self.kind in ("vector", "matrix") else scalar
 
     def __str__(self) -> str:
@@ -77,13 +77,13 @@ def _short() -> dict[str, Type]:
 
 NAMED = SCALARS | _short() | {"sampler": SAMPLER}
 TEXTURES = {"texture_1d": 1, "texture_2d": 2, "texture_3d": 3}
-# names that need arguments, or have them guessed from the values of a constructor
+# names that need type arguments, or have them inferred from the values of a constructor
 VECTORS = {f"vec{n}": n for n in (2, 3, 4)}
 MATRICES = {f"mat{c}x{r}": (c, r) for c in (2, 3, 4) for r in (2, 3, 4)}
 
 
 def common(a: Type, b: Type) -> Type | None:
-    """The scalar type that two scalar types take together, None if there is none."""
+    """The common type of two scalar types; None if there is none."""
     if a == b:
         return a
     for one, other in ((a, b), (b, a)):
@@ -95,7 +95,7 @@ def common(a: Type, b: Type) -> Type | None:
 
 
 def concrete(type: Type) -> Type:
-    """The type that a literal's takes where nothing else is asked."""
+    """The type that an abstract type becomes if no other is required."""
     if type.kind == "array":
         return type._replace(parts=(concrete(type.parts[0]),))
     if not type.numbers:

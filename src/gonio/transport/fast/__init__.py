@@ -7,8 +7,8 @@
     light_grid       chooses among several lights by the light that each sends to a cell of the scene
     by_shape         uses one material for thousands that differ in numeric parameters only
 
-GONIO_FAST=0 in the environment disables all of it: renders are slower, and their pictures are equal within the noise
-(bit-identical for scenes with nothing to accelerate).
+GONIO_FAST=0 in the environment disables all of it: renders are then slower, with pictures that are equal within the
+noise (bit-identical for scenes with nothing to accelerate).
 """
 
 from __future__ import annotations

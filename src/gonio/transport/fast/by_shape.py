@@ -31,9 +31,9 @@ _NO_TEXTURE = ("absorption", "priority")  # properties of the interior, which ca
 class Group:
     """Materials of one structure.
 
-    prototype  the plugin of the first
-    rows       per material, the values of the properties that may differ
-    shapes     per shape name, the index of its material
+    prototype  the plugin of the first material
+    rows       values of the properties that may differ, one mapping per material
+    shapes     index of each shape's material, by the shape's name
     """
 
     prototype: PluginDict
@@ -42,7 +42,7 @@ class Group:
     textures: dict[Place, Texture] = field(default_factory=dict)
 
     def plugin(self, mi: ModuleType) -> PluginDict:
-        """One material for all shapes of the group; call `bind` once these are in a scene."""
+        """One material for all shapes of the group; call `bind` once the shapes are in a scene."""
         _register(mi)
         for place, first in self.rows[0].items():
             if any(row[place] != first for row in self.rows):
@@ -52,7 +52,7 @@ class Group:
         return _replaced(self.prototype, self.textures)
 
     def bind(self, numbers: Mapping[str, int]) -> None:
-        """Tell the textures the number of each shape in kernels."""
+        """Bind the textures, given the number that identifies each shape in kernels."""
         size = 1 + max(numbers.values())
         row = np.zeros(size, np.intp)
         row[[numbers[name] for name in self.shapes]] = list(self.shapes.values())
@@ -61,7 +61,7 @@ class Group:
 
 
 def structure(plugin: PluginDict) -> Hashable:
-    """Equal for plugins that differ only in numbers; None for one with other values, such as an image."""
+    """A key that is equal for plugins that differ only in numbers; None for a plugin with an image or the like."""
     parts: list[Hashable] = []
     for name, value in plugin.items():
         if isinstance(value, dict) and value["type"] != "rgb":
@@ -139,11 +139,11 @@ def _texture_class(mi: ModuleType) -> OfVariant:
 
         @property
         def span(self) -> NDArray[np.float64]:
-            """The least and the largest value."""
+            """The smallest and the largest values, (2, 1) or (2, 3)."""
             return np.array([self.rows.min(axis=0), self.rows.max(axis=0)])
 
         def bind(self, row: NDArray[np.intp]) -> None:
-            """Set the row of each shape, by its number in kernels."""
+            """Set the row of each shape, indexed by the shape's number in kernels."""
             self.table = own(mi.Float, self.rows[row].ravel().astype(np.float32))
 
         def is_spatially_varying(self) -> bool:

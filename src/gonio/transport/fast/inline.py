@@ -1,8 +1,8 @@
 """Intersections of rays with a few simple shapes, in the kernel itself.
 
-A call of Embree from a kernel, and its callbacks for each sphere, take longer than the formulas of a dozen spheres and
-flat shapes, which are vectorized like the rest of the kernel. Scenes of balls on a floor render 1.4 to 1.8 times as
-fast this way. Scenes with more shapes, or others, use Mitsuba.
+A call to Embree from a kernel, with its callbacks for each sphere, takes longer than the formulas for a dozen spheres
+and flat shapes, which are vectorized like the rest of the kernel. Scenes of balls on a floor render 1.4 to 1.8 times as
+fast this way. Scenes with more shapes, or with shapes of other kinds, use Mitsuba.
 
 Rectangles, disks and triangles share one formula: the ray intersects the plane z = 0 of the shape's frame, and the
 point (x, y) there is inside or not. Two triangles of a mesh that form a parallelogram are one shape.
@@ -29,8 +29,8 @@ COST_OF_FLAT = 2
 
 # float32 must distinguish a sphere's far side from the side that a ray has just left: the distance from the surface is
 # known to some 2e-7 of the radius and of the center's distance from the origin, and a ray starts off the surface by
-# 9e-5 of (unit + |p|), see `Offsets`. For spheres larger than so many times that, Mitsuba is used, which computes in 64
-# bits.
+# 9e-5 (unit + |p|), see `Offsets`. If (radius + distance from the origin) / (unit + |p|) exceeds this ratio, Mitsuba
+# traces the sphere, in 64 bits.
 MAX_SPHERE = 50.0
 
 MESHES = ("Mesh", "OBJMesh", "PLYMesh", "SerializedMesh", "Cube")
@@ -72,7 +72,7 @@ _INSIDE: dict[str, Inside] = {
 
 
 class Inline:
-    """The shapes of a scene at construction time; `of` decides whether it applies to them."""
+    """The shapes of a scene at construction time; use `of`, which returns None for shapes that are not supported."""
 
     def __init__(self, mi: ModuleType, scene: Scene, spheres: list[Sphere], flats: list[Flat]):
         self.mi = mi
@@ -92,10 +92,11 @@ class Inline:
 
     @staticmethod
     def of(mi: ModuleType, scene: Scene, to_world: Callable[[Shape], list[float]], unit: float) -> Inline | None:
-        """None if Mitsuba must be used: for many shapes, unsupported ones, or on a GPU, which has ray tracing hardware.
+        """The shapes of a scene, or None if Mitsuba must trace them: many shapes, unsupported ones, or any on a GPU,
+        which has ray tracing hardware.
 
         to_world  returns a shape's placement, 16 numbers row by row
-        unit      of the distances at which rays begin, see `Offsets`
+        unit      `Offsets.unit` of the scene
         """
         shapes = scene.shapes()
         if "llvm" not in mi.variant() or not 0 < sum(map(_cost, shapes)) <= MAX_COST:
@@ -174,8 +175,8 @@ class Inline:
         return t, x, y, _INSIDE[flat.kind](x, y) & (t > 0) & (t < most)
 
     def _placed(self, flat: Flat, x: Float, y: Float, hits: Mask, face: UInt, place: Point) -> tuple[UInt, Point]:
-        """Face index and uv as Mitsuba defines them: for meshes the weights of the second and third corner, for disks
-        x, y. For other shapes they follow from the point (`Surfaces`)."""
+        """Face index and uv as Mitsuba defines them: for meshes, the weights of the second and third corner; for disks,
+        x and y. For other shapes they follow from the point (`Surfaces`)."""
         mi = self.mi
         if flat.kind == "disk":
             return face, dr.select(hits, mi.Point2f(x, y), place)
@@ -206,7 +207,7 @@ def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | Non
     if kind == "disk" and (oblique or abs(across @ along) > FLAT * size):
         return None  # Mitsuba treats disks with oblique axes differently
     frame = frame.copy()
-    frame[:3, 2] = normal / np.sqrt(size)  # scaled like the other axes; its own direction does not matter
+    frame[:3, 2] = normal / np.sqrt(size)  # scaled like the other axes
     with np.errstate(all="ignore"):
         inverse = np.linalg.inv(frame)
     if not np.all(np.isfinite(inverse.astype(np.float32))):
@@ -215,7 +216,7 @@ def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | Non
 
 
 def _of_mesh(shape: int, mesh: Shape) -> Iterator[Flat]:
-    """The triangles of a mesh, pairs that form a parallelogram as one. Degenerate triangles are omitted."""
+    """The triangles of a mesh; two that form a parallelogram are one shape. Degenerate triangles are omitted."""
     corners = np.array(mesh.vertex_positions_buffer(), float).reshape(-1, 3)
     faces = np.array(mesh.faces_buffer()).reshape(-1, 3).astype(int)
     left = list(range(len(faces)))
@@ -241,8 +242,8 @@ def _of_mesh(shape: int, mesh: Shape) -> Iterator[Flat]:
 def _partners(
     corners: Matrix, faces: NDArray[np.int_], first: int, others: list[int]
 ) -> Iterator[tuple[int, int, int]]:
-    """Faces that form a parallelogram with `first`: (face, corner of `first` opposite to it, its own opposite
-    corner)."""
+    """Faces that form a parallelogram with `first`: (face, position in `first` of the corner opposite the shared edge,
+    index of the face's own opposite corner)."""
     for second, turn in itertools.product(others, range(3)):
         a, b, c = (int(faces[first][(turn + k) % 3]) for k in range(3))
         rest = set(map(int, faces[second])) - {b, c}

@@ -1,7 +1,7 @@
 """Rectangles and balls of uniform radiance in tables: one formula per kind samples all of them.
 
-With calls from the kernel, as for other kinds of light, lamps cost a tenth of a render; and Mitsuba samples its own
-balls by positions in 32 bits, which makes one of 4 mm at a distance of 3 m 2 % too bright.
+Called from the kernel, as other kinds of light are, lamps would take a tenth of the render time. Mitsuba also samples
+its balls by positions in 32 bits, which makes a ball of 4 mm at a distance of 3 m 2 % too bright.
 """
 
 from __future__ import annotations
@@ -82,10 +82,10 @@ class LampTable:
         return result
 
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
-        """A direction toward a lamp: uniform in the solid angle of a ball, on the area of a rectangle.
+        """A direction toward a lamp: uniform in solid angle for a ball, by area for a rectangle.
 
-        Sampling rectangles by solid angle would reduce the error with several near lamps by 6 %, but takes 25 % more
-        time: a path that hits a lamp has to compute the solid angle again.
+        Sampling rectangles by solid angle would reduce the error with several near lamps by 6 % but take 25 % more
+        time: a path that hits a lamp would have to compute the solid angle again.
         """
         result: DirectionSample | None = None
         for here, view in self._views(row, it.p):
@@ -94,7 +94,7 @@ class LampTable:
         return result
 
     def pdf(self, row: OfVariant, origin: Point, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point that a ray hits at `distance` under |cosine|."""
+        """Density (1/sr) of `sample` toward a point that a ray hits at `distance`, where |cos| is `cosine`."""
         result = self.mi.Float(0)
         for here, view in self._views(row, origin):
             result = dr.select(here, view.pdf(distance, cosine), result)
@@ -108,7 +108,7 @@ class LampTable:
 
 
 class TabledLamps(Lamps):
-    """Lamps of which some, or all, are sampled from a table; the others by calls of Mitsuba's emitters."""
+    """Lamps sampled from a table where it has them, otherwise by calls to Mitsuba's emitters."""
 
     table: LampTable
     index_of_pointer: UInt | None
@@ -123,10 +123,10 @@ class TabledLamps(Lamps):
         pointers: OfVariant,
         index_of_pointer: UInt | None,
     ) -> TabledLamps | None:
-        """None if no lamp fits into a table.
+        """The lamps of a scene; None if no lamp fits into a table.
 
         pointers          Dr.Jit's pointers to the emitters
-        index_of_pointer  the emitters' index by the number of that pointer, if there are several
+        index_of_pointer  index of each emitter, by the number of its pointer; None for a single emitter
         """
         table = LampTable(surfaces.mi, emitters, pointers)
         if not table.kinds:

@@ -1,7 +1,7 @@
 """Chooses one of many lamps by position.
 
-The scene's box is divided into cells. Each has a table of the lamps' probabilities: the unoccluded light that each
-lamp sends to the cell, which accounts for distance and orientation, plus a uniform part.
+The scene's bounding box is divided into cells. Each has a table of the lamps' probabilities: a part proportional to the
+unoccluded light that each lamp sends to the cell, which accounts for distance and orientation, plus a uniform part.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class LightGrid:
         index = dr.arange(mi.UInt32, n * POINTS)
         cell = index // POINTS
         corner = mi.Point3f(cell % self.cells, (cell // self.cells) % self.cells, cell // self.cells**2)
-        # multiples of powers of the inverse of x^4 = x + 1 mod 1 (R3 sequence, M. Roberts): evenly spread and
+        # multiples mod 1 of 1/x, 1/x^2 and 1/x^3, where x^4 = x + 1 (R3 sequence, M. Roberts): evenly spread and
         # deterministic
         inside = mi.Point3f(*(_fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
         it = dr.zeros(mi.SurfaceInteraction3f, n * POINTS)
@@ -67,7 +67,7 @@ class LightGrid:
     def _row(self, p: Point) -> UInt:
         mi = self.mi
         at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
-        # NaN, which passes through a clip, becomes 2^32 - 1 on processors without AVX-512
+        # NaN, which `clip` preserves, becomes 2^32 - 1 on processors without AVX-512
         x, y, z = (dr.minimum(mi.UInt32(v), self.cells - 1) for v in at)
         return x + self.cells * (y + self.cells * z)
 

@@ -1,9 +1,9 @@
 """Surfaces of many spheres or rectangles, without a call per shape.
 
-Mitsuba computes the surface of the shape that was hit by a virtual call, which Dr.Jit traces once per shape: 0.1 ms
-each, at every vertex of the program. For many spheres or rectangles the placements are therefore in one array, each
-lane reads that of the shape it has hit, and the formula appears in the kernel once. Other shapes are called as before.
-Meshes need no table: those of equal material are merged.
+Mitsuba computes the surface at a hit by a virtual call to the shape, which Dr.Jit traces once per shape: 0.1 ms each,
+at every vertex of the program. For many spheres or rectangles, the placements are therefore stored in one array: each
+lane reads that of the shape that it has hit, and the formula appears in the kernel once. Other shapes are called as
+before. Meshes need no table, since those of equal material are merged.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Placements:
 
     @staticmethod
     def of(mi: ModuleType, scene: Scene, least: int) -> Placements | None:
-        """None if there are fewer than `least` shapes of each supported kind."""
+        """The placements of a scene; None if it has fewer than `least` shapes of each supported kind."""
         shapes = scene.shapes()
         kinds = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
         kinds = {kind: members for kind, members in kinds.items() if len(members) >= least}
@@ -82,7 +82,7 @@ class Placements:
         return self._finished(result, hit, ray)
 
     def _placed(self, formula: Formula, hit: Hit, ray: Ray, placement: OfVariant) -> SurfaceInteraction:
-        """The surface by a formula of the shape with the given placement."""
+        """The surface of a shape with the given placement, computed by `formula`."""
         mi = self.mi
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.t = hit.t
@@ -106,18 +106,18 @@ Formula = Callable[[ModuleType, SurfaceInteraction, Hit, Ray, list[Vector], OfVa
 
 
 def _of_spheres(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Columns 0 to 2: the axes, as long as the radius; 3: the center, and 1, or -1 where the normal points inward."""
+    """Packed spheres. Columns 0 to 2: axes, as long as the radius; 3: center, and 1, or -1 if the normal is inward."""
     placement = to_world.copy()
     placement[:, 3, 3] = sign
     return placement
 
 
 def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: list[Vector], sign: OfVariant) -> None:
-    """A sphere's surface: u is the azimuth about its z axis from x, v from z, both in [0, 1]."""
+    """A sphere's surface: u is the azimuth about its z axis from x, v the angle from z, both scaled to [0, 1]."""
     x, y, z, center = column
     radius = dr.norm(x)
     normal = dr.normalize(ray(hit.t) - center)
-    si.p = dr.fma(normal, radius, center)  # project onto the sphere, which the rounded distance misses
+    si.p = dr.fma(normal, radius, center)  # project onto the sphere, since the distance along the ray is rounded
     local = mi.Vector3f(dr.dot(normal, x), dr.dot(normal, y), dr.dot(normal, z)) / radius
     azimuth = dr.atan2(local.y, local.x)
     azimuth = dr.select(azimuth < 0, azimuth + 2 * dr.pi, azimuth)
@@ -137,7 +137,7 @@ def _angle_from_z(v: Vector) -> OfVariant:
 
 
 def _of_rectangles(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Columns 0, 1: dp_du and dp_dv; 2: the unit normal; 3: the center."""
+    """Packed rectangles. Columns 0 and 1: dp_du and dp_dv; 2: unit normal; 3: center."""
     placement = to_world.copy()
     placement[:, :3, :2] *= 2  # from [-1, 1] to [0, 1]
     normal = np.cross(to_world[:, :3, 0], to_world[:, :3, 1])

@@ -29,7 +29,7 @@ class RectangleLight(Lamps):
     def of(
         cls, surfaces: Surfaces, emitters: Sequence[Emitter], scene_indices: UInt, environment: int
     ) -> RectangleLight | None:
-        """None if the only light is not a rectangle."""
+        """The light of a scene with a single one; None if it is not a rectangle."""
         rectangle = rectangle_of(surfaces.mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
         if rectangle is None:
             return None

@@ -1,8 +1,8 @@
-"""Integrators: the quantity that a picture shows, in passes that add up to a bit-identical picture.
+"""Integrators, which determine the quantity that a picture shows. Renders run in passes; their sizes do not matter.
 
     >>> render = Render(mi.load_dict(scene), Settings("path", max_depth=5))
     >>> while render.done < 256:
-    ...     render.advance(16)          # stop here whenever you like: render.image() is the picture so far
+    ...     render.advance(16)          # stop at any time: render.image() is the picture so far
     >>> picture = render.image()        # (height, width, 3) float32, row 0 on top
 
 An integrator is one file in this folder, an entry point of the group "gonio.integrators", or a class that a program

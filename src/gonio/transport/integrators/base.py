@@ -32,12 +32,12 @@ class Settings:
     """Options of a render.
 
     integrator  the name of an `Integrator`
-    max_depth   for integrators that take a depth: the longest path in segments, so that N gives N - 1 shaded vertices
+    max_depth   for integrators that take a depth: maximum path length in segments; N allows N - 1 shaded vertices
     sampler     a name of `SAMPLERS`
-    seed        any integer of 32 bits; the same seed gives the same picture to the bit
+    seed        an integer of 32 bits; the same seed gives a bit-identical picture
     ambient     scene-wide ambient radiance (r, g, b): every shaded vertex adds `ambient` times the BSDF's own
                 attribute "ambient", if it has one (Phong's ka)
-    radius      factor of the initial radius that an integrator that blurs would choose
+    radius      factor applied to the default initial radius of an integrator that blurs
     measures    whether such an integrator also measures its blur
     """
 
@@ -61,7 +61,7 @@ class Settings:
 
     @property
     def program(self) -> type[Integrator]:
-        """The integrator's class. InputError for an unknown name."""
+        """The integrator's class. Raises InputError for an unknown name."""
         return Integrator.family.get(self.integrator)
 
 
@@ -82,17 +82,17 @@ class Integrator:
             def show(self, si, key, index):
                 return self.mi.Color3f(si.t)
 
-    A subclass implements `show`, which gets one surface, or `sample`, which may trace rays; one that follows light
-    derives from `LightTransport` or from `Path`. Its parameters and the scene's must reach the kernel as data
-    (`dr.opaque`), not as Python numbers; otherwise a changed value compiles again.
+    A subclass implements `show`, which gets one surface, or `sample`, which may trace rays; a subclass that follows
+    light derives from `LightTransport` or from `Path`. Its parameters and the scene's must reach the kernel as data
+    (`dr.opaque`), not as Python numbers; otherwise each changed value recompiles the kernel.
 
     name           value of `--integrator` and of a scene's "integrator"
-    takes_depth    whether `Settings.max_depth` applies: then a scene must give maxDepth
+    takes_depth    whether `Settings.max_depth` applies; if so, a scene must give maxDepth
     samples_lobes  whether BSDFs are sampled in addition to the lights
     splats         whether a sample adds to pixels other than its own, as integers of size `unit` (`Sums.splats`)
-    blurs          whether it has a bias that vanishes with the number of samples, which must then be equal for all
-                   pixels
-    shrinking      exponent of the number of samples by which the radius of a blur goes to 0
+    blurs          whether it has a bias that vanishes as the number of samples grows; this number must then be equal
+                   for all pixels
+    shrinking      exponent of the number of samples in the radius of the blur, negative
     measured       how many numbers it computes per sample besides the color, see `differences`
 
     data, settings, mi  the scene's data (`SceneData`), the options, and Mitsuba with its variant
@@ -103,7 +103,7 @@ class Integrator:
     takes_depth: ClassVar[bool] = False
     splats: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
-    unit: float = 1.0  # radiance of one unit of its splats
+    unit: float = 1.0  # radiance of one unit of the splats
     shrinking: ClassVar[float] = 0.0
     samples_lobes: ClassVar[bool] = True
     measured: int = 0
@@ -114,10 +114,10 @@ class Integrator:
     # ------------------------------------------------------------------ a subclass implements one of these two
 
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
-        """The color (r, g, b) of the surface that a sample hits; ignored where it hits none.
+        """The color (r, g, b) of the surface that a sample hits. Also runs on lanes without a hit; ignored there.
 
-        key, index  of the pixel and of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in [0, 1), and
-                    `self.direction_pair(...)` two for a direction
+        key, index  key of the pixel and index of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in
+                    [0, 1), and `self.direction_pair(...)` two for a direction
         """
         raise NotImplementedError(f"{type(self).__name__} has neither show nor sample")
 
@@ -132,11 +132,11 @@ class Integrator:
     # ------------------------------------------------------------------ provided by this class
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """`Render.differences`, from the mean of `measured` over so many samples: (height, width, `measured`)."""
+        """The result of `Render.differences`, from the mean of the measured numbers over `samples` samples."""
         return []
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Samples [first, last) divided into kernel launches; each prepares its data before it is returned."""
+        """Samples [first, last) divided into kernel launches; the data of each is prepared before it is yielded."""
         yield first, last
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
@@ -150,11 +150,11 @@ class Integrator:
         return dr.while_loop(state, lambda i, _: i < last, step, mode="symbolic", label="samples")[1]
 
     def first_hit(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Ray, Radiance, Hit]:
-        """A sample's camera ray, its weight, and the first surface that it meets."""
+        """A sample's camera ray, its weight, and its first hit."""
         return self.data.first_hit(pixel, key, index)
 
     def pair(self, key: UInt, index: UInt, dimension: UInt) -> tuple[Float, Float]:
-        """Two numbers in [0, 1) for a decision of a sample, numbered from FIRST_FREE on."""
+        """Two numbers in [0, 1) for one decision of a sample; `dimension` identifies the decision, from FIRST_FREE."""
         return self.data.pair(key, index, dimension)
 
     def direction_pair(self, key: UInt, index: UInt, dimension: UInt) -> tuple[Float, Float]:
@@ -177,7 +177,7 @@ class Integrator:
         return self.data.surfaces
 
     def advice(self) -> str:
-        """Advice to a user who chose it for this scene; "" if there is none."""
+        """Advice to a user who chose this integrator for this scene; "" if there is none."""
         return ""
 
 

@@ -22,15 +22,15 @@ from .base import Picture, Settings
 from .light_transport import FIRST_VERTEX, ROULETTE, PathState, VertexNumbers
 from .path import Path
 
-INNER = 0.25  # fraction of the radius, for the comparison that measures blur
+INNER = 0.25  # fraction of the radius used for the comparison that measures blur
 
 
 @dataclass
 class CausticPath:
     """A path with the state of its current chain of mirrors and smooth glass.
 
-    lobe    pdf over cosine by which the last lobe before the chain chose its direction; 0 if there was none
-    counts  fraction of the light behind the chain that the path contributes, the rest being left to particles
+    lobe    pdf / cosine with which the last lobe before the chain was sampled; 0 if there was none
+    counts  fraction of the light behind the chain that the path contributes; particles contribute the rest
     blur    excess of the particles' light over that of the close ones; None if it is not measured
     """
 
@@ -44,15 +44,15 @@ class CausticPath:
 class Caustics(Path):
     """Path tracing, with a photon map for the light that mirrors and smooth glass cast on other surfaces.
 
-    Light that mirrors or glass cast on a surface is found by paths from the camera if the lamps are large, by particles
-    from the lamps if they are small; both are weighted by their probability of finding it. A particle contributes
-    within a radius that shrinks, so the picture is blurred by about a pixel at first and converges to a sharp one
-    (consistent, not unbiased); all other light is that of `path`.
+    Light that mirrors or glass cast on a surface is sampled by paths from the camera if the lamps are large, and by
+    particles from the lamps if they are small; both are weighted by their probability of sampling it. A particle
+    contributes within a radius that shrinks, so the picture is blurred by about a pixel at first and converges to a
+    sharp one (consistent, not unbiased); all other light is computed as by `path`.
 
     The weights: a path that leaves a surface with density p toward mirrors and hits the lamp behind them has density
-    p / cos over étendue, and N particles that come from there the other way have g N pi r^2, where g is their density
-    at the lamp; mirrors and lenses change the width of the beam equally for both. Georgiev2012 introduced merging as
-    one more way to sample a path.
+    p / cos with respect to étendue. N particles that take the same chain from the lamp have g N pi r^2, where g is
+    their density at the lamp; mirrors and lenses change the width of the beam equally for both. Georgiev2012 introduced
+    vertex merging as another technique to sample a path.
 
     Lamps that the camera sees directly through mirrors and glass are sampled by a retrace, see `delta_retrace`.
     """
@@ -63,7 +63,7 @@ class Caustics(Path):
 
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
-        self.last_ray_apart = self.one_bounce = False  # its light is weighted against the particles
+        self.last_ray_apart = self.one_bounce = False  # the light of the last ray is weighted against the particles
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         self.retraces = False
         if self.merging:
@@ -75,7 +75,7 @@ class Caustics(Path):
         return ""
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Groups of samples that share a map; the map is made before they are returned."""
+        """Groups of samples that share a map; the map is built before they are yielded."""
         if not self.merging:
             yield from super().stages(first, last)
             return
@@ -83,7 +83,7 @@ class Caustics(Path):
             number = first // SAMPLES_PER_MAP
             self.maps.prepare(number)
             for read in (self.maps.density, self.maps.current):
-                copy_arrays(read)  # in every stage after the sums, so that kernels are equal
+                copy_arrays(read)  # copied after the sums in every stage, so that the kernels are identical
             end = min(last, (number + 1) * SAMPLES_PER_MAP)
             yield first, end
             first = end
@@ -148,7 +148,7 @@ class Caustics(Path):
         light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
         gathered = self.direct_light(vertex, light, light_value, light_pdf, active)
 
-        # Light of particles, weighted against paths that go behind mirrors
+        # Light of particles, weighted against paths that continue through mirrors
         photons, excess, counts = self.gather_photons(state, vertex, u, active)
         gathered = gathered + dr.select(active, photons, 0)
         radiance = radiance + throughput * gathered
@@ -165,7 +165,7 @@ class Caustics(Path):
         return self.after_bounce(state, path, vertex, bs, counts, blur), features
 
     def values(self, state: CausticPath) -> list[Float]:
-        """[r, g, b] of a complete sample, and its blur by the even maps and by the odd ones."""
+        """[r, g, b] of a complete sample, and its blur as measured with the even maps and with the odd maps."""
         path = state.path
         values = [*self.data.rgb(path.radiance, path.ray.wavelengths)]
         if not self.measured:
@@ -174,10 +174,10 @@ class Caustics(Path):
         blur = [*self.data.rgb(state.blur, path.ray.wavelengths)]
         return [*values, *(dr.select(odd, 0, v) for v in blur), *(dr.select(odd, v, 0) for v in blur)]
 
-    # ------------------------------------------------------------------ the parts of a vertex
+    # ------------------------------------------------------------------ the steps at a vertex
 
     def emission_weight(self, state: CausticPath, vertex: Vertex, emitted: Radiance) -> Float:
-        """Weight of the lamp that a path hits by way of mirrors, against the particles or a retrace."""
+        """MIS weight of the lamp that a path hits through mirrors, against the particles or a retrace."""
         path, sources = state.path, self.maps.particles.sources
         lit = path.active & (path.pdf == 0) & dr.any(emitted != 0)
         behind = lit & (state.lobe > 0)
@@ -191,13 +191,13 @@ class Caustics(Path):
         self, state: CausticPath, vertex: Vertex, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Radiance, Float]:
         """(light of the particles at a vertex, its excess over that of the close ones, the fraction of the light behind
-        mirrors that the path counts from there on)."""
+        mirrors that the path contributes from there on)."""
         mi, maps, si, path = self.mi, self.maps, vertex.si, state.path
         photons = maps.current
         if vertex.crossing is not None:
             active = active & vertex.crossing.surface
         active = active & mi.has_flag(vertex.bsdf.flags(), mi.BSDFFlags.Smooth)
-        # A path that arrived here by mirrors is weighted against second particles, which continue from first ones.
+        # A path that arrived here through mirrors is weighted against particles stored at their second surface.
         by_mirrors = (state.lobe > 0) & (path.pdf == 0)
         counts = dr.select(by_mirrors, maps.path_weight(state.lobe, maps.etendue_density(si.p)), 1)
 
@@ -250,7 +250,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ blur
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """The difference to a picture with INNER of the radius, by the even maps and by the odd ones."""
+        """Differences from a picture with INNER times the radius: one from the even maps, one from the odd maps."""
         if not self.measured:
             return []
         rounds, rest = divmod(samples, 2 * SAMPLES_PER_MAP)

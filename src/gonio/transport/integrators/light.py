@@ -19,8 +19,8 @@ class Light(LightTransport):
     """Particle tracing from the lamps, with every vertex connected to the camera: a reference for `path`.
 
     Light that leaves mirrors and smooth glass toward the camera is missing, since no connection to the camera is
-    possible there. A sample of the picture is as many particles as it has pixels. Splats are added up as integers,
-    whose sum does not depend on the order.
+    possible there. One sample per pixel amounts to as many particles as the picture has pixels. Splats are added up as
+    integers, whose sum does not depend on the order.
     """
 
     name = "light"

@@ -11,7 +11,7 @@
     trace         the first hit of that ray
 
 A vertex costs one call of its BSDF, which evaluates it toward a light and samples the next direction, and a shadow ray
-unless its contribution is zero.
+unless the light's contribution is zero.
 """
 
 from __future__ import annotations
@@ -31,13 +31,14 @@ from ..scattering import Vertex, keep_hero
 from ..scene_data import SceneData
 from .base import Integrator, Settings
 
-# Russian roulette begins at this depth, as in Mitsuba's `path`: before it, paths are rarely dim enough to pay.
+# Russian roulette begins at this depth, as in Mitsuba's `path`: before it, the throughput is rarely low enough for
+# roulette to pay off.
 ROULETTE_DEPTH = 5
-# Survival probability over the throughput. Early termination costs more than it saves: with a factor of 1, rough glass
-# has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
+# Ratio of the survival probability to the throughput. Early termination costs more than it saves: with a factor of 1,
+# rough glass has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
 SURVIVAL = 4.0
 
-# Dimensions of a path: each vertex uses VERTEX_DIMENSIONS of them.
+# Sample dimensions of a path: each vertex uses VERTEX_DIMENSIONS of them.
 FIRST_VERTEX = FIRST_FREE
 LIGHT, DIRECTION, LOBE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 
@@ -46,18 +47,18 @@ LIGHT, DIRECTION, LOBE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 class PathState:
     """The state of a path, one per lane."""
 
-    index: UInt  # of the sample
+    index: UInt  # index of the sample
     depth: UInt  # vertices passed so far: 0 at the first hit
-    ray: Ray  # the next segment, and
-    hit: Hit  # its first intersection
+    ray: Ray  # the next segment
+    hit: Hit  # first intersection of `ray`
     throughput: Radiance
     eta: Float  # product of the relative indices along the path
-    pdf: Float  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
-    solid_angle: Float  # LightSample.solid_angle at its origin
-    radiance: Radiance  # accumulated so far
+    pdf: Float  # density with which the BSDF sampled `ray`, 1/sr; 0 for camera rays and delta lobes
+    solid_angle: Float  # LightSample.solid_angle at the origin of `ray`
+    radiance: Radiance  # radiance accumulated so far
     hero_only: UInt  # 1 if the path continues with its first wavelength alone
-    inside: UInt  # the media that contain it, see `media.py`
-    active: Mask  # False once it has ended: by its depth, by zero throughput, in `roulette`, or in `trace`
+    inside: UInt  # the media that contain `ray`, see `media.py`
+    active: Mask  # False once the path has ended: by its depth, by zero throughput, in `roulette`, or in `trace`
 
 
 @dataclass
@@ -75,7 +76,7 @@ class LightTransport(Integrator):
     """An integrator that follows light along paths: subclasses implement `bounce` and loop over it.
 
     samples_lights  whether vertices sample the lights
-    samples_lobes   whether they sample all lobes of the BSDF; delta lobes are always followed
+    samples_lobes   whether vertices sample all lobes of the BSDF; delta lobes are always followed
     """
 
     samples_lights: ClassVar[bool] = True
@@ -91,7 +92,7 @@ class LightTransport(Integrator):
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
-        """The longest path in segments; 2 is direct light."""
+        """Maximum path length in segments; 2 is direct light."""
         return 2
 
     def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
@@ -108,7 +109,7 @@ class LightTransport(Integrator):
     def camera_path(
         self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True, wavelength: Float | None = None
     ) -> PathState:
-        """A sample's path up to its first hit, on lanes that begin one."""
+        """A sample's path up to its first hit, on the lanes `begins`."""
         ray, weight, hit = self.data.first_hit(pixel, key, index, begins, wavelength)
         return self._path(index, ray, hit, self.mi.Spectrum(weight), self.data.begins_path(hit))
 
@@ -139,7 +140,7 @@ class LightTransport(Integrator):
         """The random numbers of the vertex at the path's hit."""
         mi, data, index = self.mi, self.data, path.index
         dimension = path.depth * VERTEX_DIMENSIONS + FIRST_VERTEX
-        pair = data.direction_pair if self.lights.has_environment else data.pair  # over the sphere, or on a lamp
+        pair = data.direction_pair if self.lights.has_environment else data.pair  # on the sphere, or on a lamp
         roulette, photons = sampler.independent_pair(key, index, dimension + ROULETTE)
         return VertexNumbers(
             light=mi.Point2f(*pair(key, index, dimension + LIGHT)),
@@ -152,8 +153,8 @@ class LightTransport(Integrator):
     # ------------------------------------------------------------------ the steps at a vertex
 
     def intersect(self, path: PathState) -> tuple[Vertex, Radiance]:
-        """The surface at the hit that `camera_path` or `trace` has found, and the path's throughput there after
-        absorption by media on the way. It traces no ray."""
+        """The surface at the path's hit, which `camera_path` or `trace` has computed, and the throughput there after
+        absorption by media along the ray. Traces no ray."""
         return self.data.vertex(path.hit, path.ray, path.inside, path.throughput, path.active)
 
     def emitted(self, path: PathState, vertex: Vertex) -> Radiance:
@@ -173,11 +174,10 @@ class LightTransport(Integrator):
     def sample_bsdf(
         self, vertex: Vertex, light: LightSample | None, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-        """(BSDF times cosine toward the light, the pdf of that direction, a sampled direction, the weight of that).
+        """(BSDF times cosine toward the light, the pdf of that direction, a BSDF sample, its weight).
 
-        One call of the BSDF gives them all where both are needed.
-
-        Without a light the first two are 0; if only lights are sampled, the last two are 0.
+        If both pairs are needed, one call of the BSDF computes them all. Without a light the first two are 0; if only
+        lights are sampled, the last two are 0.
         """
         mi, scattering = self.mi, self.scattering
         value, pdf = mi.Spectrum(0), mi.Float(0)
@@ -218,8 +218,8 @@ class LightTransport(Integrator):
         return dr.select(active, reflected * self.ambient.eval(si, active), 0)
 
     def keep_hero(self, path: PathState, vertex: Vertex, throughput: Radiance, active: Mask) -> tuple[Radiance, UInt]:
-        """Where a surface disperses, the throughput of the first wavelength only; also whether the path is limited to
-        it."""
+        """(throughput, limited to the first wavelength where a surface disperses; whether the path is limited to
+        it)."""
         if not self.disperses:
             return throughput, path.hero_only
         here = active & ((vertex.bsdf.flags() & DISPERSES) != 0)
@@ -229,7 +229,7 @@ class LightTransport(Integrator):
         self, path: PathState, vertex: Vertex, bs: BSDFSample, light: LightSample | None, active: Mask
     ) -> PathState:
         """The path with a ray in the sampled direction (Mitsuba's `spawn_ray`, see `bridge.faults.ray_offset`). `path`
-        has the vertex's radiance, and the throughput after it."""
+        already includes the vertex's radiance and the throughput after it."""
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         active = active & dr.any(path.throughput != 0) & (self.samples_lobes | delta)
@@ -262,7 +262,7 @@ class LightTransport(Integrator):
         return replace(path, hit=hit, active=active)
 
     def light_along(self, path: PathState, active: Mask) -> Radiance:
-        """The light along the path's ray times the throughput, if nothing else of the surface is needed."""
+        """The light along the path's ray times the throughput, for rays whose first surface is not needed otherwise."""
         if self.media.known:
             path = self.trace(replace(path, active=active))
             vertex, throughput = self.intersect(path)

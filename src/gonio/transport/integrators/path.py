@@ -25,9 +25,10 @@ class Path(LightTransport):
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
         depth = self.depth(settings)
-        # The last ray can only find light. With one bounce, or if the only lamp is a rectangle, the vertex before adds
-        # its light (`light_along`). Otherwise it is a ray like the others, since media attenuate it or any of
-        # several lights may be its first hit; handled apart, it would add a second ray and its surface to each vertex.
+        # The last ray can only contribute emission. With one bounce, or if the only lamp is a rectangle, the vertex
+        # before it adds this light (`light_along`). Otherwise it is a ray like the others, since media attenuate it or
+        # any of several lights may be its first hit; a separate case would add a second ray and its surface to each
+        # vertex.
         self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
         # paths of one vertex need no loop over vertices: `Integrator.accumulate` loops over samples alone
         self.one_bounce = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
@@ -42,8 +43,8 @@ class Path(LightTransport):
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
         """Add samples [first, last) of every pixel to the sums: one flat loop over the vertices of all of them.
 
-        A lane whose path has ended begins its next one at once, instead of idling until the longest of the 16 paths
-        around it has ended.
+        A lane whose path has ended starts its next path at once, instead of idling until the longest of the 16 paths in
+        its vector has ended.
         """
         if self.one_bounce:
             return super().accumulate(pixel, key, first, last, sums)

@@ -1,11 +1,11 @@
-"""Progressive rendering: rounds of samples that are added to a film (`Sums`), and its development into a picture.
+"""Progressive rendering: passes of samples that are added to a film (`Sums`), and its development into a picture.
 
 Performance:
 
 - One lane holds one pixel, and one kernel iterates over samples [first, first + count) of it, adding them up in
   registers. Memory does not grow with samples; first, count, seed, camera and every parameter of the scene are
   data of the kernel, so nothing is recompiled when they change.
-- Lanes are pixels in 4 x 4 tiles: the vector unit's 16 rays stay coherent and hit the same objects.
+- Lanes are pixels in 4 x 4 tiles, so that the 16 rays of a vector are coherent and mostly hit the same objects.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ TILE = 4
 
 LANES = "lanes"  # key of a state: samples per lane
 
-SHARE = 16  # a lane's share of samples is in sixteenths of the mean
+SHARE = 16  # a lane's number of samples is given in sixteenths of the mean
 
-# Before the first pass all lanes read one zero, since writing a zero for each lane of a large film takes as long as its
-# first sample. There is more than one zero, since Dr.Jit makes a different kernel for arrays with one entry.
+# In the first pass all lanes read the same zero, since writing a zero for each lane of a large film takes as long as
+# its first sample. The array has several entries, since Dr.Jit makes a different kernel for arrays with one entry.
 NOTHING = 16
 
 
@@ -49,7 +49,7 @@ class Render:
     scene     a loaded Mitsuba scene; its parameters may change between renders, not between passes
     sensor    the camera; None is the scene's first. Its film gives the size; the pixel filter is a box
     aovs      also average albedo and normal of the first hit, for the denoiser
-    share     samples per lane if the mean over the picture is SHARE; None: equally many for all
+    share     relative number of samples per lane, with a mean of SHARE over the picture; None: equal for all
     """
 
     features = 0  # number of values that a subclass adds up besides the radiance
@@ -78,15 +78,15 @@ class Render:
         self._order = tiles(self.width, self.height)
         self._pixel = own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
-        # A newly loaded camera and a moved one hold the same numbers in arrays of different order, which would give two
-        # kernels; this call puts both into the second state.
+        # A newly loaded camera and one that was moved hold the same numbers in arrays created in different order, which
+        # would give two kernels; this call puts both into the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.paused(), denormals_rounded():
             self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
     def _nothing(self, lanes: int) -> Sums:
-        """Sums over zero samples."""
+        """Sums of zero samples."""
         features = 6 if self.aovs else self.features
         return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
@@ -105,13 +105,13 @@ class Render:
     def advance(self, count: int) -> None:
         """Render `count` more samples of every pixel; returns when they are done.
 
-        Sums are in 64 bits and in the order of the samples: passes of any size add up to the same bits, and an
+        Sums have 64 bits and are added in the order of the samples: passes of any size give bit-identical sums. An
         interrupted pass leaves the picture unchanged.
         """
         if count < 1:
             raise InputError(f"{count} samples requested", "advance", "1 or more")
         mi = self.mi
-        # Dr.Jit would record each loop again without its invariant variables: LLVM eliminates these anyway.
+        # Dr.Jit would record each loop a second time without its invariant variables; LLVM eliminates these anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
         with dr.suspend_grad(), garbage.paused(), interruptible(), unchanged, denormals_rounded():
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
@@ -154,7 +154,7 @@ class Render:
         return {**self._sums.arrays(), **ahead}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from the sums of so many samples, to the same bits. Raises ValueError for those of another film."""
+        """Resume from the sums of `done` samples, with bit-identical results. Raises ValueError for another film's."""
         lanes = state.get(LANES)
         if lanes is not None and (lanes.shape != (len(self._pixel),) or lanes.dtype != np.uint32):
             raise ValueError("samples of other lanes")
@@ -164,7 +164,7 @@ class Render:
             self._lanes = own(self.mi.UInt32, lanes)
 
     def select(self, lanes: slice) -> None:
-        """Render these lanes only, from the first sample: a part of the picture, to be assembled by the caller."""
+        """Restart with these lanes only: a part of the picture, which the caller assembles."""
         self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
@@ -179,15 +179,15 @@ class Render:
         return picture
 
     def differences(self) -> list[NDArray[np.float32]]:
-        """The difference to a less blurred picture, as several estimates with independent samples; [] for an integrator
-        without blur. Unbiased, but noisy; (height, width, 3) each."""
+        """Several estimates, from independent samples, of the difference from a less blurred picture: unbiased but
+        noisy, (height, width, 3) each. [] for an integrator without blur."""
         return self._integrator.differences(self._mean(self._sums.radiance[3:]), self.done)
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).
 
-        Albedo is the mean of the BSDF's sampling weight, that is the fraction of uniform illumination that reaches the
-        camera: a metal has its color, a mirror and glass have about 1.
+        Albedo is the mean of the BSDF's sampling weight, that is, the fraction of uniform illumination that reaches the
+        camera: for a metal its color, for a mirror or glass about 1.
         """
         if not self.aovs:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
@@ -195,12 +195,12 @@ class Render:
 
     @property
     def invalid(self) -> int:
-        """How many values so far were not finite and were skipped; above 0 it indicates a defect of some BSDF or
+        """Number of values so far that were not finite and were skipped; any above 0 indicates a defect in a BSDF or
         light."""
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, channels: Sequence[Float]) -> NDArray[np.float32]:
-        """The sums of each channel divided by the samples, at their pixels."""
+        """The mean of each channel, (height, width, channels)."""
         mi = self.mi
         shape = (self.height, self.width, len(channels))
         if not self._begun:

@@ -18,9 +18,9 @@ class LightSample:
 
     ds           Mitsuba's direction sample: direction, distance, density in 1/sr
     target       the end point of the shadow ray
-    weight       radiance over density
+    weight       radiance divided by density
     delta        whether the light is a point or a parallel beam, which no BSDF sample can hit
-    solid_angle  solid angle of a rectangle that is sampled uniformly in it, else 0
+    solid_angle  solid angle of a rectangle that is sampled uniformly in solid angle, else 0
     """
 
     ds: DirectionSample
@@ -75,8 +75,8 @@ class LightSampler:
 def with_shadow_target(offsets: Offsets, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
     """A light sample whose shadow ray ends as far off the lamp's surface as it begins off that of `si`.
 
-    A ray that ended on the surface itself would let a round lamp occlude its own limb. At shorter distances positions
-    consist of rounding errors, so the weight is 0.
+    If the ray ended on the surface itself, a round lamp would occlude its own limb. At distances shorter than the
+    offset, positions consist of rounding errors, so the weight is 0.
     """
     mi, offset = offsets.mi, offsets.between(si.p, ds.p)
     normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point light has none

@@ -1,4 +1,4 @@
-"""All lights except the environment, sampled by calls of Mitsuba's emitters from the kernel."""
+"""All lights except the environment, sampled by calls to Mitsuba's emitters from the kernel."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Lamps(LightSampler):
         lamps = [emitter for i, emitter in enumerate(emitters) if i != environment]
         self.lone = lamps[0] if len(lamps) == 1 else None
         shape = emitters[0].get_shape() if len(emitters) == 1 else None
-        # Kernel data as well: the numbers of shapes depend on what other scenes exist.
+        # Also kernel data: the numbers of shapes depend on which other scenes exist.
         self.lone_shape = None if shape is None else dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
         dr.make_opaque(self.lone_shape)
         by_area = [must_sample_by_area(mi, emitter) for emitter in emitters]

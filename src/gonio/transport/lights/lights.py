@@ -40,7 +40,7 @@ class Lights:
     samplers  samplers of the environment and of the lamps: the fastest that support them (`fast/`)
     lamps     the sampler of all lights except the environment
 
-    mis_compensation  whether BSDFs are sampled too, which then sample the uniform part of an environment map
+    mis_compensation  whether BSDFs are sampled too, and then cover the uniform part of an environment map
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, mis_compensation: bool = False):
@@ -90,7 +90,8 @@ class Lights:
         return TabledLamps.of(*parts, pointers, self.index_of_pointer if self.count > 1 else None) or Lamps(*parts)
 
     def _probabilities(self) -> Float:
-        """Half uniform, half by the mean unoccluded light at 256 points distributed over the scene's bounding box.
+        """Probabilities of the lights: half uniform, half proportional to the mean unoccluded light at 256 points in
+        the scene's bounding box.
 
         The uniform half limits every light's weight to 2 n: a dim lamp next to an object may matter most there.
         """
@@ -99,7 +100,7 @@ class Lights:
         it = dr.zeros(mi.SurfaceInteraction3f, 256)
         box = self.scene.bbox()
         if box.valid():
-            # Multiples of powers of the inverse of x^4 = x + 1 mod 1 (R3 sequence, M. Roberts): even and deterministic.
+            # Multiples mod 1 of 1/x, 1/x^2, 1/x^3, where x^4 = x + 1 (R3 sequence, M. Roberts): even and deterministic.
             spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
             low, extents = mi.Point3f(box.min), mi.Vector3f(box.extents())
             dr.make_opaque(low, extents)  # kernel data: literals would give a kernel per scene size
@@ -136,8 +137,8 @@ class Lights:
         return radiance
 
     def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
-        """A direction toward a light: `u` in [0, 1)^2 chooses the light by x, and a point on it by the rescaled x and
-        by y.
+        """A direction toward a light. `u` is in [0, 1)^2: x selects the light; the rescaled x and y select a point on
+        it.
 
         With a separate number for the choice, each light would get a random subset of all points, which is as uneven as
         random points.
@@ -179,8 +180,8 @@ class Lights:
         """Weight of one of two sampling strategies (lights, BSDFs) with one sample each and densities `pdf` and
         `other`.
 
-        The power heuristic p^2 / (p^2 + q^2) (Veach1997); the balance heuristic p / (p + q) under a compensated
-        environment map, for which it has 5 to 10 % less error (Karlik2019).
+        The power heuristic p^2 / (p^2 + q^2) (Veach1997); for a compensated environment map the balance heuristic
+        p / (p + q), which has 5 to 10 % less error there (Karlik2019).
         """
         ratio = other / pdf  # ratio first: p^2 itself overflows for narrow lobes
         compensated = any(isinstance(sampler, VaryingEnvironment) for sampler in self.samplers)
@@ -189,12 +190,12 @@ class Lights:
 
     @property
     def shortens_last_ray(self) -> bool:
-        """Whether `along` needs no nearest surface, only a shadow ray if the ray points at the light."""
+        """Whether `along` does without the nearest surface, with only a shadow ray if the ray points at the light."""
         return isinstance(self.lamps, RectangleLight)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
-        """The light along a ray, with its density as in `pdf`: one pair, or several where lights do not occlude one
-        another, as in `foreground.py`. Anything else that the ray may hit is ignored."""
+        """(radiance along a ray, density as in `pdf`): one pair, or several if lights do not occlude one another, as in
+        `foreground.py`. Surfaces that do not emit contribute nothing."""
         if isinstance(self.lamps, RectangleLight):
             return [self.lamps.along(ray, solid_angle, active)]
         hit = self.surfaces.nearest(ray, active)
@@ -204,7 +205,8 @@ class Lights:
 
 
 class PowerChoice:
-    """The same probabilities everywhere: half uniform, half by the light that each lamp sends into the scene."""
+    """The same probabilities everywhere: half uniform, half proportional to the light that a lamp sends into the
+    scene."""
 
     def __init__(self, by_power: Choice) -> None:
         self._by_power = by_power

@@ -1,8 +1,8 @@
 """Directions toward an environment, with a density proportional to its luminance.
 
-A grid of cells, uniform in longitude and colatitude, holds the mean luminance of each; within a cell directions are
-uniform. If BSDFs are sampled too (multiple importance sampling), the grid holds the excess over the mean of the sphere:
-BSDF sampling covers the uniform part, and light sampling concentrates on the rest (Karlik2019).
+A grid, uniform in longitude and colatitude, holds one luminance per cell; within a cell, directions are uniform. If
+BSDFs are sampled too (multiple importance sampling), the grid holds the excess over the mean of the sphere: BSDF
+sampling covers the uniform part, and light sampling concentrates on the rest (Karlik2019).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ...bridge.types import Emitter, Float, Interaction, Mask, Point, Radiance, 
 
 # Cells in longitude, twice as many as in colatitude: as fine as the map, up to 0.35 degrees.
 MIN_WIDTH, MAX_WIDTH = 64, 1024
-MIN_PART = 0.05  # of its luminance that each cell retains: lobes may be sampled badly by their material
-SHORT = 16  # entries up to which a row is searched by bisection alone
-MAX_STEPS = 4  # per axis, at which a cell is evaluated: maps up to 4096 texels wide are read completely
+MIN_PART = 0.05  # fraction of its luminance that each cell retains, since some materials sample their lobes poorly
+SHORT = 16  # largest number of entries of a row that is searched by bisection alone
+MAX_STEPS = 4  # largest number of steps per axis in which a cell is evaluated; enough for maps 4096 texels wide
 
 
 class Sky:
@@ -36,7 +36,7 @@ class Sky:
         self.height = self.width // 2
         luminance = self._luminance(min(max(-(-texels // self.width), 2), MAX_STEPS))
         edges = np.cos(np.pi * np.arange(self.height + 1) / self.height)
-        angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / self.width)  # steradian of a cell
+        angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / self.width)  # solid angle of a cell, sr
         if compensated:
             mean = float(np.sum(luminance * angle) / (4.0 * np.pi))
             luminance = np.maximum(luminance - mean, MIN_PART * luminance)
@@ -58,7 +58,7 @@ class Sky:
 
     def _luminance(self, steps: int) -> NDArray[np.float64]:
         """Luminance of each cell, from (steps + 1)^2 points on its edges and inside: halfway between mean and maximum,
-        so that a cell which contains a part of a sun is not underestimated."""
+        so that a cell that contains part of a sun is not underestimated."""
         mi, high, wide = self.mi, steps * self.height, steps * self.width
         index = dr.arange(mi.UInt32, (high + 1) * wide)
         row = index // wide
@@ -96,7 +96,7 @@ class Sky:
         return dr.gather(mi.Float, self._density, row * self.width + column)
 
     def sample(self, it: Interaction, u: Point, active: Mask) -> tuple[Vector, Point, Float, Radiance]:
-        """(direction, a point far away in it, density in 1/sr, radiance from there)."""
+        """(direction, a distant point in that direction, density in 1/sr, radiance from there)."""
         mi = self.mi
         row, down = self._rows.of(mi.UInt32(0), u.y)
         column, along = self._columns.of(row, u.x)
@@ -112,8 +112,9 @@ class Sky:
 class Choice:
     """Inversion of cumulative sums, which run from 0 to 1 along each row.
 
-    For long rows a guide table holds, for each of as many equal intervals of [0, 1], the range of entries to search
-    (Chen1974): one or two for a sky with a sun, where bisection of the row needs nine steps.
+    For long rows, [0, 1] is divided into as many equal intervals as the row has entries, and a guide table holds the
+    range of entries to search for each interval (Chen1974): one or two for a sky with a sun, where bisection of the row
+    needs nine steps.
     """
 
     def __init__(self, mi: ModuleType, sums: NDArray[np.float64]) -> None:
@@ -128,7 +129,7 @@ class Choice:
             self.below = own(mi.UInt32, np.minimum(below, self.count - 1).astype(np.uint32).ravel())
 
     def of(self, row: UInt, u: Float) -> tuple[UInt, Float]:
-        """(the entry of a row that contains u in [0, 1], relative position within it)."""
+        """(the entry of a row that contains u in [0, 1], relative position of u within it)."""
         mi, begin = self.mi, row * self.count
         at = self._bisect(begin, u) if self.below is None else self._search(self.below, row, begin, u)
         start = dr.select(at > 0, dr.gather(mi.Float, self.sums, begin + dr.maximum(at, 1) - 1), 0.0)

@@ -9,9 +9,9 @@ import drjit as dr
 
 from ...bridge.types import Float, Mask, Point, Shape, Vector
 
-# Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 have an error of
-# 2.4e-7, so at 1e-3 sr the sampled position is accurate to 2.4e-4 of an edge, and solid angles bring no gain for such
-# distant lamps. Above: the point is almost in the rectangle (2 pi = 6.283), where 1/z0 loses precision.
+# Outside this range of solid angles (steradians) the area is sampled instead. Below: angles near pi in float32 have an
+# error of 2.4e-7, so at 1e-3 sr the sampled position is accurate to 2.4e-4 of an edge, and such distant lamps gain
+# nothing from solid angles. Above: the point is almost in the rectangle (2 pi = 6.283), where 1/z0 loses precision.
 SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
 
 # A point counts as on a ball if it is closer to it than these fractions of the radius and of its coordinates.
@@ -55,12 +55,12 @@ class Rectangle:
         return self.length0 * self.length1
 
     def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) toward a point at `distance` under |cosine|: uniform in the solid angle, or uniform by area if
-        `solid_angle` is 0."""
+        """Density (1/sr) toward a point at `distance`, where |cos| is `cosine`: uniform in the solid angle, or uniform
+        by area if `solid_angle` is 0."""
         return dr.select(solid_angle > 0, dr.rcp(solid_angle), self.pdf_by_area(distance, cosine))
 
     def pdf_by_area(self, distance: Float, cosine: Float) -> Float:
-        return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
+        return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # large at grazing angles, not inf
 
     def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
         """Intersection with a ray: (distance, (u, v) in [0, 1]^2, whether there is one)."""
@@ -78,8 +78,8 @@ class SphericalRectangle:
     u-coordinate follows from inverting the solid angle of a sub-rectangle, the v-coordinate from inverting the height
     on the sphere. If the solid angle is too small or too large for float32, the area is sampled instead.
 
-    `solid_angle` is accurate for small ones too: twice the sum of the two triangles' (Van Oosterom and Strackee 1983),
-    whose numerator is a product without cancellation, unlike the sum of four angles minus 2 pi.
+    `solid_angle` is accurate for small values too: twice the sum of the half angles of two triangles (Van Oosterom and
+    Strackee 1983), whose numerator is a product without cancellation, unlike the sum of four angles minus 2 pi.
     """
 
     def __init__(self, rectangle: Rectangle, origin: Point):
@@ -102,18 +102,18 @@ class SphericalRectangle:
         r00, r10 = dr.sqrt(xx0 + yy0 + zz), dr.sqrt(xx1 + yy0 + zz)
         r01, r11 = dr.sqrt(xx0 + yy1 + zz), dr.sqrt(xx1 + yy1 + zz)
         volume = -self.z0 * self.rectangle.area
-        # dot products of corner vectors: along an edge, and across the diagonal 10-01 that both triangles share
+        # dot products of corner vectors: along an edge, and across the diagonal 10-01, which both triangles share
         across = self.x0 * self.x1 + self.y0 * self.y1 + zz
         along_x0, along_x1 = self.x0 * self.x1 + yy0 + zz, self.x0 * self.x1 + yy1 + zz
         along_y0, along_y1 = xx0 + self.y0 * self.y1 + zz, xx1 + self.y0 * self.y1 + zz
         lower = r00 * r10 * r01 + along_x0 * r01 + along_y0 * r10 + across * r00
         upper = r11 * r10 * r01 + along_x1 * r10 + along_y1 * r01 + across * r11
-        # The two half angles a and b add as complex numbers, (lower + i volume)(upper + i volume): one atan2, not two.
-        # Each half angle is below pi/2 in sum with the other <= pi, so the sum stays inside atan2's branch.
+        # The two half angles are the arguments of complex numbers, whose product adds them: (lower + i volume)
+        # (upper + i volume) needs one atan2, not two. Their sum is at most pi, inside atan2's branch.
         return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the rectangle at `distance` under |cosine|."""
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, where |cos| is `cosine`."""
         return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
 
     def sample(self, u: Float, v: Float) -> Sample:
@@ -147,7 +147,7 @@ class RectangularArea:
     origin: Point
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the rectangle at `distance` under |cosine|."""
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, where |cos| is `cosine`."""
         return self.rectangle.pdf_by_area(distance, cosine)
 
     def sample(self, u: Float, v: Float) -> Sample:
@@ -162,8 +162,8 @@ class RectangularArea:
 
 @dataclass
 class Ball:
-    """A sphere in space: its center, its radius, the side of its normal (1 outward, -1 inward), and the axes of its
-    (u, v) if these are needed."""
+    """A sphere in space: its center, its radius, the side of its normal (1 outward, -1 inward), and, if needed, the
+    axes of its (u, v)."""
 
     center: Point
     radius: Float
@@ -191,12 +191,12 @@ class Ball:
 
 
 class SphericalCap:
-    """A ball as seen from a point: the cap of directions that it subtends, and directions uniform in it.
+    """A ball as seen from a point: the cap of directions that it subtends, and directions uniform in the cap.
 
     A point of the ball follows from its direction by the law of sines (PBRT4, sec. 6.2.4), which has no cancellation.
-    From the surface itself and from inside, points are uniform by area: from the inner side, the light sampled by a
-    diffuse surface is then the same for every point. From the outer side a ball does not see itself; a cap would give
-    it a distance of 0 in a direction made of rounding errors.
+    For origins on the surface and inside, points are uniform by area: a diffuse inner side then samples the same light
+    from every point. The outer side cannot illuminate itself; a cap would give it a distance of 0, in a direction that
+    consists of rounding errors.
     """
 
     def __init__(self, mi: ModuleType, ball: Ball, origin: Point):
@@ -216,7 +216,7 @@ class SphericalCap:
         return 2 * dr.pi * self.height
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the ball at `distance` under |cosine|."""
+        """Density (1/sr) of `sample` toward a point of the ball at `distance`, where |cos| is `cosine`."""
         area = 4 * dr.pi * dr.square(self.ball.radius)
         by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * area, 1e-30))
         return dr.select(self.outside, dr.rcp(self.solid_angle), by_area)

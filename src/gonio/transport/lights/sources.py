@@ -1,8 +1,9 @@
 """Emission of particles from the lamps.
 
-A particle is a ray from a lamp with the light that it carries, radiance over `density`. That density is one over
-*étendue*, 1/(m^2 sr), with the cosine at the lamp: light conserves its étendue at mirrors and, up to the square of the
-index, in glass, so the same number gives the density of particles on a surface behind them (`caustics.py`).
+A particle is a ray from a lamp with the flux that it carries: radiance divided by `density`. That density is with
+respect to *étendue*, 1/(m^2 sr), which includes the cosine at the lamp: étendue is conserved at mirrors and, up to the
+square of the index, in glass, so the same number gives the density of particles on a surface behind them
+(`caustics.py`).
 
 With `Targets`, particles are emitted only toward bounding spheres of certain shapes.
 """
@@ -36,7 +37,7 @@ from .lights import Lights
 from .solid_angles import is_sphere
 
 SURFACE, POINT, INFINITE = 0, 1, 2
-DELTA_DENSITY = 1e30  # of delta lamps; larger than the density of any other lamp, small enough to compute with
+DELTA_DENSITY = 1e30  # density of delta lamps: larger than that of any other lamp, small enough to compute with
 MAX_TARGETS = 8  # spheres that particles are aimed at; the kernel contains code for each
 
 
@@ -44,15 +45,15 @@ MAX_TARGETS = 8  # spheres that particles are aimed at; the kernel contains code
 class Particle:
     """A particle as it leaves a lamp.
 
-    origin     position, and direction; for a lamp at infinity a position outside the scene
-    direction
+    origin     start of the ray; for a lamp at infinity, a position outside the scene
+    direction  direction of the ray
     emitter    the lamp
     place      for a lamp with a surface, the point on it
     kind       SURFACE, POINT or INFINITE
-    flux       radiance over density; for a point light or a parallel beam, the limit of this
-    density    1/(m^2 sr), over étendue; DELTA_DENSITY for those two, which no other ray can hit
-    direct_weight  weight of the lamp for a camera that sees it directly: for a surface, one over its density by area;
-                   for infinity, the radiance over its density by solid angle
+    flux       radiance divided by density; for a point light or a parallel beam, the limit of this quotient
+    density    with respect to étendue, 1/(m^2 sr); DELTA_DENSITY for points and beams, which no other ray can hit
+    direct_weight  weight of the lamp for a camera that sees it directly: for a surface, 1 / (density by area); for a
+                   lamp at infinity, radiance divided by density by solid angle
     """
 
     origin: Point
@@ -77,7 +78,7 @@ class Targets:
         dr.make_opaque(self.center, self.radius)
 
     def _chosen(self, pick: Float) -> tuple[Point, Float, Float]:
-        """(center, radius, rescaled random number) of one of them."""
+        """(center, radius, rescaled random number) of a randomly selected sphere."""
         mi = self.mi
         number = dr.minimum(mi.UInt32(pick * self.count), self.count - 1)
         center, radius = self.center[0], self.radius[0]
@@ -109,13 +110,13 @@ class Targets:
         total = self.mi.Float(0)
         for center, radius in zip(self.center, self.radius, strict=True):
             axis, height, solid_angle = self._cone(origin, center, radius)
-            # 1 - cosine from the chord, which is accurate for narrow cones; slightly enlarged against rounding
+            # 1 - cosine from the chord, which is accurate for narrow cones; the cone is enlarged for rounding errors
             inside = dr.squared_norm(direction - axis) * 0.5 <= height * 1.0001
             total += dr.select(inside, dr.rcp(solid_angle), 0)
         return total / self.count
 
     def line(self, direction: Vector, pick: Float, u: Point) -> Point:
-        """A point that defines a line of that direction through one of the spheres, uniform over its disk."""
+        """A point on a line of that direction through one of the spheres, uniform on the sphere's disk."""
         center, radius, _ = self._chosen(pick)
         return center + self.mi.Frame3f(direction).to_world(_on_disk(self.mi, u) * radius)
 
@@ -130,7 +131,7 @@ class Targets:
 
 
 class Sources:
-    """The lamps of a scene as emitters of particles; `targets` None emits in all directions.
+    """The lamps of a scene as emitters of particles, in all directions if `targets` is None.
 
     Raises InputError for lamps that cannot emit particles.
     """
@@ -160,7 +161,7 @@ class Sources:
         return self.sensor.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), u)
 
     def sample(self, pick: Float, place: Point, aim: Float, way: Point, wavelengths: Sequence[Float]) -> Particle:
-        """A particle; `pick` chooses the lamp, `place` the point on it, `aim` and `way` the direction."""
+        """A particle; `pick` selects the lamp, `place` the point on it, `aim` and `way` the direction."""
         mi, lights = self.mi, self.lights
         if lights.count == 1:
             number, probability, emitter = mi.UInt32(0), mi.Float(1), mi.EmitterPtr(lights.emitters[0])
@@ -243,7 +244,7 @@ class Sources:
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
         if lights.lamps.spheres is not None:
-            # Light into a ball smaller than the ray's offset from the surface would start on its other side.
+            # Light emitted into a ball smaller than the ray's offset from the surface would start beyond its far side.
             radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
             shines &= ~inward | (abs(radius) > lights.surfaces.offsets.at(ps.p))
@@ -359,7 +360,8 @@ def _sphere_around(mi: ModuleType, shape: Shape) -> NDArray[np.float64]:
 
 
 def _together(spheres: list[NDArray[np.float64]], most: int) -> list[NDArray[np.float64]]:
-    """At most so many spheres that contain all: the group with the longest extent of centers is halved repeatedly."""
+    """At most `most` spheres that contain all of these; the group with the largest extent of centers is halved
+    repeatedly."""
     groups = [np.array(spheres)]
     while len(groups) < most:
         spans = [float(np.max(np.ptp(group[:, :3], axis=0))) if len(group) > 1 else -1.0 for group in groups]

@@ -2,5 +2,5 @@
 
     gonio verify glass.py:Glass --junit laws.xml --sarif laws.sarif --baseline laws.json
 
-One format per file: each turns a report into text, and `outputs` writes it.
+Each format has its own file, which turns a report into text; `outputs` writes it.
 """

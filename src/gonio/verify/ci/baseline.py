@@ -1,6 +1,6 @@
 """A baseline: the known failures. Only new ones fail a report.
 
-A law of a card is known if it failed when the baseline was written, and its figure is at most a tenth worse now. Any
+A law of a card is known if it failed when the baseline was written, and its value is at most a tenth worse now. Any
 report.json is a baseline; `text` writes the short form, to be stored with the code.
 """
 
@@ -16,13 +16,13 @@ from ..report import Report
 from ..verdict import FAIL, KNOWN, TOLERATED, Verdict
 
 SCHEMA = "gonio-baseline/1"
-WORSE = 1.1  # ratio of figures beyond which a failure is new: rounding and other machines change less
+WORSE = 1.1  # ratio of values beyond which a failure is new: rounding and other machines change less
 
 Known = Mapping[tuple[str, str], float | None]
 
 
 def read(path: Path) -> Known:
-    """The figures of known failures, by title and law; None for failures without a figure. InputError for other
+    """The values of known failures, by title and law; None for failures without a value. Raises InputError for other
     files."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""The files that a trial writes, and the baseline with which it is compared."""
+"""The files that a trial writes, and the baseline to which it is compared."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .baseline import Known
 
 Name = str | Path | None
-GRADES = ("invisible", "small", "visible")  # that can be tolerated, the least severe first
+GRADES = ("invisible", "small", "visible")  # grades that can be tolerated, the least severe first
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Outputs:
     """The files to write, and the baseline; None for files that are not requested.
 
     report          folder for report.html and report.json
-    junit, sarif    files
-    baseline        file of known failures; a report.json will do
-    write_baseline  file for the failures, which are known from then on
-    tolerate        the severest grade that fails no report: "invisible", "small" or "visible"; "" fails on all
+    junit, sarif    files for these formats
+    baseline        file of known failures, which may be a report.json
+    write_baseline  file for the present failures, which are known from then on
+    tolerate        the severest grade that does not fail a report: "invisible", "small" or "visible"; "" for none
     """
 
     report: Name = None
@@ -36,7 +36,7 @@ class Outputs:
     tolerate: str = ""
 
     def check(self) -> Known:
-        """The known failures. InputError if a file cannot be read or written, before anything is computed."""
+        """The known failures. Raises InputError if a file cannot be read or written, before anything is computed."""
         if self.tolerate not in ("", *GRADES):
             hint = f"give one of {', '.join(GRADES)}"
             raise InputError(f"'{self.tolerate}' is not a grade that can be tolerated", "--tolerate", hint)
@@ -71,7 +71,7 @@ class Outputs:
 
 
 def _tolerate(report: Report, most: str) -> None:
-    """Mark the failures of that grade and of less severe ones, so that they do not fail the report."""
+    """Mark the failures of that grade or a less severe one, so that they do not fail the report."""
     from ..verdict import TOLERATED
 
     tolerated = GRADES[: GRADES.index(most) + 1]

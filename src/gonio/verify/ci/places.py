@@ -20,7 +20,7 @@ _SLIGHT = ("invisible", "noise", "fitting only")  # grades that bias no picture
 
 
 class Place(NamedTuple):
-    """A file as the repository names it, "materials/glass.py", and a line of it."""
+    """A file by its path in the repository, such as "materials/glass.py", and a line of it."""
 
     file: str
     line: int
@@ -44,7 +44,7 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def of_unread(unread: Unread) -> Place | None:
-    """The line that an error of reading names, else the first of the shader's file."""
+    """The line that the error names, else the first line of the shader's file."""
     file = shaders.file_in(unread.target)
     if file is None:
         return None
@@ -61,12 +61,12 @@ def level(verdict: Verdict) -> str:
 
 
 def grade(verdict: Verdict) -> str:
-    """The severity in a word; "" where it is unknown."""
+    """The severity in one word; "" if it is unknown."""
     return str(getattr(verdict, "grade", "") or "")
 
 
 def cause(verdict: Verdict) -> str:
-    """The likely mistake; "" where none is known."""
+    """The likely mistake; "" if none is known."""
     return str(getattr(verdict, "cause", "") or "")
 
 
@@ -90,7 +90,7 @@ def _settings(card: Card) -> list[str]:
 
 
 def _relative(file: Path) -> str:
-    """The path from the repository's root, by CI or the current folder; else the absolute path."""
+    """The path relative to the repository's root, given by CI or the current folder; else the absolute path."""
     path = file.absolute()
     root = Path(os.environ.get("GITHUB_WORKSPACE") or Path.cwd())
     for base in (root, Path.cwd()):

@@ -1,4 +1,4 @@
-"""SARIF 2.1.0, the standard format of checkers: a rule per law, a result per violation."""
+"""SARIF 2.1.0, the standard format of static checkers: one rule per law, one result per violation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def text(report: Report) -> str:
-    """The file's text."""
+    """The text of the file."""
     laws = {verdict.law: verdict for card in report.cards for verdict in card.verdicts}
     rules = [_rule(verdict) for verdict in laws.values()]
     if report.unread:
@@ -82,7 +82,7 @@ def _result(card: Card, verdict: Verdict, rule: int) -> dict[str, Any]:
     key = hashlib.sha256(f"{card.title}\n{verdict.law}".encode()).hexdigest()
     facts = {
         "status": verdict.status,
-        "figure": verdict.as_dict()["figure"],  # null where it is no number
+        "figure": verdict.as_dict()["figure"],  # null if it is not a number
         "tolerance": verdict.as_dict()["tolerance"],
         "p": verdict.as_dict()["p"],
         "command": verdict.command,

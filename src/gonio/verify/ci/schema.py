@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def text() -> str:
-    """The schema's text."""
+    """The text of the schema."""
     return Path(__file__).with_name("report.schema.json").read_text(encoding="utf-8")
 
 

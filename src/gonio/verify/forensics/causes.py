@@ -1,6 +1,6 @@
 """The probable cause of a failure: named only if the ratio of two values fits a formula.
 
-Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi leaves its trace in it: the first
+Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi shows in this ratio: the first
 factor that fits is named, the simplest first. A ratio that is 1 except in a region, on a side or in a channel is named
 by that region.
 
@@ -17,11 +17,11 @@ from .factors import half_vector
 from .fits import FEWEST, fitted
 from .ratio import COVER, Cause, Fit, Ratio, factor_key, tolerance
 
-ROWS = 4096  # pairs of directions at most
+ROWS = 4096  # maximum number of pairs of directions
 
 
 def named(ratio: Ratio) -> Cause | None:
-    """The cause that a ratio suggests, None if it fits no formula."""
+    """The cause that a ratio suggests, or None if it fits no formula."""
     unsupported = nothing_below(ratio.top, ratio.bottom, ratio.wo, ratio.wi, ratio.above, ratio.below)
     ratio = telling(ratio)
     if len(ratio.wo) < FEWEST:
@@ -46,7 +46,7 @@ def named(ratio: Ratio) -> Cause | None:
     if clamp is not None:
         return clamp
     if region is None:
-        # a single channel is a region as well
+        # a single channel counts as a region too
         text = f"{ratio.name} is 1 but {words}"
         return Cause(text, text) if words and bad.mean() > COVER else _part(ratio)
     place, rows = region
@@ -59,9 +59,9 @@ def named(ratio: Ratio) -> Cause | None:
 
 
 def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
-    """One of the two that has a single value wherever they differ, the largest or smallest of its values."""
+    """A cause if one of the two values is constant wherever they differ, at the end of its range."""
     if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST or np.ptp(ratio.wi[bad], axis=0).max() < 0.1:
-        return None  # at one direction all values are the same
+        return None  # for a single direction, all values are equal
     for values, other, name in ((ratio.above, ratio.below, ratio.top), (ratio.below, ratio.above, ratio.bottom)):
         clamped, right = values[bad].max(1), other[bad].max(1)
         middle = float(np.median(clamped))
@@ -81,7 +81,7 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
 
 
 def _part(ratio: Ratio) -> Cause | None:
-    """Of two densities, one that never exceeds the other, because it includes fewer lobes."""
+    """A cause if one of two densities never exceeds the other, as when it includes fewer lobes."""
     if "pdf" not in ratio.top or "pdf" not in ratio.bottom or "weight" in ratio.top:
         return None
     above, below = ratio.above[:, 0], ratio.below[:, 0]
@@ -101,7 +101,7 @@ def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
 
 
 def telling(ratio: Ratio) -> Ratio:
-    """The pairs at which both values are finite and the denominator is not negligible."""
+    """The ratio restricted to pairs at which both values are finite and the denominator is not negligible."""
     finite = np.isfinite(ratio.above).all(1) & np.isfinite(ratio.below).all(1)
     # within 0.06 degrees of the horizon a ratio of cosines is unreliable
     finite &= np.minimum(np.abs(ratio.wo[:, 2]), np.abs(ratio.wi[:, 2])) > 1e-3
@@ -116,7 +116,7 @@ def telling(ratio: Ratio) -> Ratio:
 def nothing_below(
     top: str, bottom: str, wo: np.ndarray, wi: np.ndarray, above: np.ndarray, below: np.ndarray
 ) -> Cause | None:
-    """A numerator without a denominator in a region that has a name: samples where eval is 0."""
+    """The cause if a numerator has no denominator in a region with a name, as samples where eval is 0."""
     dark = np.all(below == 0.0, axis=1)
     lit: np.ndarray = np.any(above > 0.0, axis=1)
     bad = dark & lit
@@ -128,7 +128,7 @@ def nothing_below(
 
 
 def _off(ratio: Ratio) -> np.ndarray:
-    """Where the two differ, (N, channels)."""
+    """Whether the two values differ, (N, channels)."""
     floor = 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     size = np.maximum(np.maximum(np.abs(ratio.above), np.abs(ratio.below)), floor)
     return np.abs(ratio.above - ratio.below) > tolerance(ratio) * size
@@ -138,7 +138,7 @@ def _off(ratio: Ratio) -> np.ndarray:
 
 
 def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The region outside which a ratio is 1: as text, and the rows; None if no simple region fits."""
+    """The region outside of which a ratio is 1: as text, and its rows; None if no simple region fits."""
     share = float(bad.mean())
     if not 0.003 < share < 0.97 or bad.sum() < FEWEST:
         return None
@@ -149,14 +149,14 @@ def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 
 def _first(ratio: Ratio) -> np.ndarray:
-    """The ratio of the channel that is furthest from 1, (N,)."""
+    """The ratio in the channel where it is furthest from 1, (N,)."""
     r = ratio.above / np.where(ratio.below == 0.0, np.nan, ratio.below)
     r = np.nan_to_num(r, nan=1.0)
     return r[np.arange(len(r)), np.argmax(np.abs(r - 1.0), axis=1)]
 
 
 def _places(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Simple regions, in words: sides of the surface, then halves of the sphere, then beyond an angle."""
+    """Simple regions, with descriptions: sides of the surface, then halves of the sphere, then ranges of an angle."""
     o, i = wo[:, 2] > 0.0, wi[:, 2] > 0.0
     through = o != i
     yield "from outside", o
@@ -208,12 +208,12 @@ def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
     return place[0] if place else ""
 
 
-DENSE = 0.3  # share of a place's pairs that are bad
+DENSE = 0.3  # fraction of a region's pairs that must be bad
 
 
 def within(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """The tightest simple region that contains all bad pairs, among others, as text; "" if none is tight: opposite
-    azimuths, and intervals of an angle."""
+    """The tightest simple region that contains all bad pairs, though not only these, as text: opposite azimuths, or an
+    interval of an angle; "" if none is tight."""
     if bad.sum() < 4:
         return ""
     apart = np.sum(wo[:, :2] * wi[:, :2], axis=1) < 0.0

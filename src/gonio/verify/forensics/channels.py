@@ -1,4 +1,4 @@
-"""Whether the channels of a color reach one another: a mean, a largest value or a luminance where a channel is due."""
+"""Whether the channels of a color affect one another: a mean, maximum or luminance in place of each channel."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ...errors import InputError
 from ..subject import Fault, Subject
 from .ratio import Cause
 
-MIXED = 1e-4  # relative change of a channel by another one that is no rounding
-FIRST, SECOND = (0.6, 0.3, 0.2), (0.6, 0.1, 0.9)  # the same in red alone
+MIXED = 1e-4  # relative change of a channel by another one that rounding cannot explain
+FIRST, SECOND = (0.6, 0.3, 0.2), (0.6, 0.1, 0.9)  # equal in red only
 
 
 def mixed(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Cause | None:
-    """The color of which the red values depend on green and blue; None if there is none."""
+    """The color whose green and blue channels affect red values; None if there is none."""
     names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high <= 1.0]
     for name in names:
         low = subject.parameters[name].low

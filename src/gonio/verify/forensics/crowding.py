@@ -1,8 +1,8 @@
 """The difference between samples and pdf: where it is, how large, and the factor that would remove it.
 
 The samples are the reference: the cells of the chi-square test hold their counts, and the pdf's expectation is
-multiplied by each factor of the table. The first one that leaves no difference, in the cells of one wo and in int pdf
-of all others, is the cause.
+multiplied by each factor of the table. The first factor that leaves no difference, in the cells of one wo and in int
+pdf for all others, is the cause.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from ..subject import Subject
 
 BLOCK = 10  # rows and columns of cells per block: differences stand out from noise in few, well-filled blocks
-FULL = 25.0  # least expectation of a block
-EFFECT = 0.02  # root mean square of the relative difference of samples and expectation, below which they agree
+FULL = 25.0  # smallest expectation of a block
+EFFECT = 0.02  # RMS of the relative difference of samples and expectation below which they agree
 KNOWN = 0.004  # tolerance of a known number; 2^17 samples determine a scale to a third of a percent
-DRAWN, LOST = 1 << 14, 0.02  # samples, and the accuracy of the share of them that fail
+DRAWN, LOST = 1 << 14, 0.02  # samples, and the accuracy of the fraction of them that fail
 BEFORE = 0.08  # smallest difference whose cause is determined
 
 
@@ -37,7 +37,7 @@ BEFORE = 0.08  # smallest difference whose cause is determined
 class Blocks:
     """Blocks of cells of one wo: their counts of samples (B,), and the data of the cells.
 
-    wi, area, expected, block  of each cell (C, 3), (C,), (C,), (C,): center, solid angle, expectation, number of block
+    wi, area, expected, block  per cell, (C, 3), (C,), (C,), (C,): center, solid angle, expectation, index of the block
     """
 
     wo: np.ndarray
@@ -49,12 +49,12 @@ class Blocks:
     block: np.ndarray
 
     def joined(self, values: np.ndarray) -> np.ndarray:
-        """Values of the cells (C,), summed over blocks (B,)."""
+        """Values of the cells (C,), summed over each block, (B,)."""
         return np.bincount(self.block, values, len(self.observed))
 
 
 def blocks(cells: SampleCells) -> Blocks | None:
-    """The cells of a test in blocks; None if their wo is unknown."""
+    """The cells of a test, in blocks; None if their wo is unknown."""
     if cells.wo is None:
         return None
     a, b, c, d = boxes(cells.rows, cells.columns)
@@ -97,7 +97,7 @@ def crowd(subject: Subject, held: Blocks) -> str:
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The factor between samples and pdf; None if none fits. Arguments as of `mixture.named`."""
+    """The factor between samples and pdf; None if none fits. For the arguments, see `mixture.named`."""
     light = estimators.of_subject(subject)
     total = float(held.observed.sum())
     for formula, guess, field, of_wo in _factors(subject):
@@ -111,7 +111,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         if formula == "1":
             before = float(np.hypot(left, np.log(scale)))
             if before < BEFORE:
-                return None  # so little that any smooth factor would fit
+                return None  # so small that any smooth factor would fit
             if abs(np.log(scale)) < 0.01:
                 continue
         if left > EFFECT or left > 0.1 * before:
@@ -138,7 +138,8 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
-    """What samples may do that have the pdf's distribution, but not its amount, which differs from wo to wo."""
+    """The likely cause if samples follow the pdf's distribution, but their number differs from it by a factor that
+    depends on wo."""
     agree = f"samples over pdf are {scale:.3g} for all wi, and another number for other wo"
     u = directions.numbers(np.random.default_rng(46), DRAWN)
     s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
@@ -151,7 +152,7 @@ def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
 
 
 def _normalizes(subject: Subject, light: estimators.Estimates, field: Field, scale: float) -> bool:
-    """Whether the pdf times a factor integrates to the share of valid samples for every wo."""
+    """Whether the pdf times a factor integrates to the fraction of valid samples for every wo."""
 
     def weighed(o: np.ndarray, i: np.ndarray) -> np.ndarray:
         value = np.nan_to_num(subject.pdf(o, i) * field(o, i) * scale, posinf=0.0, neginf=0.0)
@@ -162,7 +163,7 @@ def _normalizes(subject: Subject, light: estimators.Estimates, field: Field, sca
 
 
 def _sides(held: Blocks) -> Cause | None:
-    """Whether samples and pdf agree within each side of the surface, but not on the shares of the two sides."""
+    """A cause if samples and pdf agree within each side of the surface, but not on the fractions of the two sides."""
     expected = held.joined(held.expected)
     sides = held.joined(held.wi[:, 2] * held.area) > 0.0
     if sides.all() or not sides.any():
@@ -182,7 +183,7 @@ def _sides(held: Blocks) -> Cause | None:
 
 
 def effect(expected: np.ndarray, observed: np.ndarray) -> float:
-    """Root mean square of observed / expected - 1 beyond the noise of the counts."""
+    """RMS of observed / expected - 1 beyond the noise of the counts."""
     order = np.argsort(expected)
     low = expected[order] < FULL
     e = np.append(expected[order][~low], expected[order][low].sum())
@@ -195,7 +196,7 @@ def effect(expected: np.ndarray, observed: np.ndarray) -> float:
 
 
 def _factors(subject: Subject) -> Iterator[Factor]:
-    """Constants, other sampling densities, and those of the table of factors, the simplest first."""
+    """Constants, other sampling densities, and factors of the table, the simplest first."""
 
     def over_pdf(o: np.ndarray, i: np.ndarray, value: Callable[[np.ndarray, np.ndarray], Any]) -> np.ndarray:
         pdf = subject.pdf(o, i)
@@ -219,7 +220,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
 
 
 def unsampled(subject: Subject) -> str:
-    """Where int pdf exceeds the fraction of valid samples, as text; "" if it does not."""
+    """A description of where int pdf exceeds the fraction of valid samples; "" if it does not."""
     light = estimators.of_subject(subject)
     excess = light.claimed - light.drawn
     row = int(np.argmax(excess))

@@ -1,6 +1,6 @@
-"""The explanation of failures: their effect on a picture, their probable cause, and which follow from others.
+"""The explanation of failures: their effect on a picture, their probable cause, and which of them follow from others.
 
-It runs after all laws, and only for those that fail; a report without failures costs no more.
+It runs after all laws, and only for those that fail; a report without failures costs nothing extra.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .ratio import Cause, Ratio
 if TYPE_CHECKING:
     from ..severity import Bias
 
-# These come first: a NaN affects every figure, and weights affect those of pdf and energy.
+# These come first: a NaN affects every measured value, and weights affect those of pdf and energy.
 ORDER = ("positivity", "calls", "delta", "weight", "pdf", "reciprocity", "energy")
 AFTER = ("isotropy", "linearity", "precision", "gradients")
 # Failures that follow from others: quadrature and sampling of the energy disagree where weights are wrong.
 FOLLOWS = {"energy": ("calls", "delta", "weight", "pdf"), "pdf": ("calls", "weight")}
-LIMIT = 60.0  # seconds per law; it takes less than one unless the BSDF loops
+LIMIT = 60.0  # seconds per law; the explanation takes less than one unless the BSDF loops
 
 
 class Answer(NamedTuple):
@@ -42,20 +42,20 @@ class Answer(NamedTuple):
 
 
 def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callable[[Law, Subject], Verdict]) -> None:
-    """Set `bias`, `grade` and `cause` of the verdicts of one card that fail, or break as declared.
+    """Set `bias`, `grade` and `cause` of the verdicts of one card that fail, or are violated as declared.
 
-    judge  judges another subject by a law, at less cost
+    judge  tests another subject against a law, at a lower cost
     """
     failed = [answer for answer in answers if answer.verdict.status in (FAIL, DECLARED)]
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     named: dict[str, str] = {}  # a cause's key, and the law that named it
-    faults: dict[str, str] = {}  # an exception without its numbers, and the law that met it first
-    nan = False  # whether values are NaN at more than single directions, which affects every other figure
-    infinite = False  # whether some value is
+    faults: dict[str, str] = {}  # an exception without its numbers, and the first law in which it occurred
+    nan = False  # whether values are NaN at more than single directions, which affects every other measured value
+    infinite = False  # whether some value is infinite
     visible: set[str] = set()  # laws whose failure changes a picture
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
-            # an exception or a timeout; the same one in several laws is one failure
+            # an exception or a timeout; the same one in several laws counts as one failure
             first = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
             if first != law.name:
                 verdict.cause = f"follows from {first.upper()}'s"
@@ -77,10 +77,10 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if law.name == "energy" and "reciprocity" in named.values():
             leader = "reciprocity"  # an extra or missing cosine changes the reflected light, possibly by a constant
         if leader is None:
-            # a disagreement of two estimates; a gain of eval itself follows from no other law
+            # the disagreement of two estimates; a gain of eval itself follows from no other law
             follows = FOLLOWS.get(law.name, ()) if cause is None and finding.figure <= finding.tolerance else ()
             leader = next((name for name in follows if name in visible), None)
-        # a figure of NaN, or among values that are NaN, has no other cause
+        # a measured value that is NaN, or among values that are, has no other cause
         if nan or (infinite and not math.isfinite(finding.figure)):
             leader = leader or "positivity"
         if verdict.grade is Grade.NAN:
@@ -91,20 +91,20 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if leader is not None:
             verdict.cause = f"follows from {leader.upper()}'s"
         elif cause is not None:
-            # rounding that no picture shows does not explain what pictures show
+            # rounding that is invisible in pictures does not explain visible failures
             aside = law.name == "precision" and verdict.grade in (None, Grade.INVISIBLE) and visible
             verdict.cause = f"apart from the others: {cause.words}" if aside else cause.words
             named[cause.key] = law.name
 
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The failures, with those from which others follow first."""
+    """The failures, ordered so that those from which others follow come first."""
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
 
 
-# An error of a BSDF that already failed a law must not lose the report.
+# An error in a BSDF that already failed a law must not lose the report.
 _ERRORS = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
 
 
@@ -140,7 +140,7 @@ def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: i
 
 
 def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verdict]) -> tuple[Grade, str] | None:
-    """The grade and reason if a material violates a law by nature, or if a material inside it does."""
+    """The grade and the reason if a material, or one inside it, violates a law by nature."""
     reason = subject.by_nature.get(law.name)
     if reason:
         return Grade.BY_NATURE, reason
@@ -150,7 +150,7 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
     wrong = [one.target for one in inner if judge(law, one).status == FAIL]
     try:
         sound = subject.with_sound_inside() if wrong else None
-    except GonioError:  # it takes no diffuse material
+    except GonioError:  # it does not accept a diffuse material
         return None
     if sound is None or judge(law, sound).status == FAIL:
         return None

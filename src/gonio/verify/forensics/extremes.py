@@ -1,4 +1,4 @@
-"""Where values that are negative or not finite occur: for which parameter value, which random number, which side."""
+"""Where values that are negative or not finite occur: at which parameter value, random number or side."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ...errors import InputError
 from ..subject import Fault, Subject
 from .ratio import Cause
 
-MOST = 4  # parameters of which each is set back to see whether it matters
-OFTEN = 0.2  # share of the rows with a random number that must be bad for it to be the reason
-STEEP = 15.0  # degrees; an angle below counts as none
+MOST = 4  # largest number of parameters that are reset one by one to see whether they matter
+OFTEN = 0.2  # fraction of the rows with a random number that must be bad for it to be the reason
+STEEP = 15.0  # degrees; smaller angles count as none
 NUMBERS = ("first", "second", "third")
 
 # (kind of the values, whether each row is bad, random numbers (N, 3) or None if they do not matter)
@@ -21,7 +21,8 @@ Bad = tuple[str, np.ndarray, np.ndarray | None]
 
 
 def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fails: Callable[[Subject], bool]) -> str:
-    """Which of the changed parameters a fault needs, in words: "for tint = 0"; "" if none alone, or if too many.
+    """The changed parameters that a fault needs, as text: "for tint = 0"; "" if none is needed, or if there are too
+    many.
 
     settings  the values at which the fault occurs
     fails     whether a subject has the fault
@@ -36,7 +37,7 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
                 needed.append(f"{name} = {_written(value)}")
         except (Fault, InputError):
             return ""
-    if not needed:  # each of several parameters brings it about
+    if not needed:  # each of several parameters is sufficient
         return ""
     zero = all(np.all(np.asarray(settings[part.split(" = ")[0]], float) == 0.0) for part in needed)
     guess = {
@@ -49,7 +50,7 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
 
 
 def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cause | None:
-    """The random number whose extreme value brings about the fault; None if it occurs for others too."""
+    """The random number whose extreme value causes the fault; None if it occurs at other values too."""
     for what, bad, u in rows:
         if u is None or not bad.any():
             continue
@@ -65,9 +66,9 @@ def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cau
 
 
 def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: bool) -> Cause | None:
-    """The side of the surface, and the angle, from which viewers meet the fault; None if neither tells it apart.
+    """The side of the surface, and the angle, of the views with the fault; None if neither singles them out.
 
-    wo, bad  of the same samples, (N, 3) and (N,)
+    wo, bad  directions and faults of the same samples, (N, 3) and (N,)
     """
     below = wo[:, 2] < 0.0
     sides = [side for side in (below, ~below) if side.any() and not np.any(bad & ~side)]

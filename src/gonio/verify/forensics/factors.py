@@ -1,6 +1,6 @@
 """The table of factors that may be missing, doubled or misplaced: products of cosines, powers of the index, widths of
-a distribution, Fresnel's term. A factor is a field over (wo, wi): `fits` looks for the one by which the ratio of two
-values must be divided, `crowding` for the one that must multiply a pdf to give the density of the samples.
+a distribution, the Fresnel term. A factor is a field over (wo, wi). `fits` looks for the factor by which the ratio of
+two values must be divided, `crowding` for that by which a pdf must be multiplied to give the density of the samples.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from .. import directions
 from ..subject import Subject
 from .ratio import written
 
-Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of (wo, wi), (N, 3) each: (N,)
+Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps (wo, wi), (N, 3) each, to (N,)
 
 
 class Factor(NamedTuple):
-    """A factor: its formula, the mistake that it suggests, and its values; with `of_wo`, only up to a number per wo."""
+    """A factor: its formula, the mistake that it suggests, and its values; with `of_wo`, up to a constant per wo."""
 
     formula: str
     guess: str
@@ -30,7 +30,7 @@ class Factor(NamedTuple):
 
 
 class Cosine(NamedTuple):
-    """A cosine or sine of a factor's formula: the mistake that it suggests, and its values over (wo, wi, m)."""
+    """A cosine or sine in a factor's formula: the mistake that it suggests, and its values over (wo, wi, m)."""
 
     guess: str
     field: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -52,19 +52,19 @@ COSINES = {
 
 
 def half_vector(wo: np.ndarray, wi: np.ndarray, eta: np.ndarray | float = 1.0) -> np.ndarray:
-    """The half vector of a reflection, on wo's side; with an index on wi's side over that on wo's, of a refraction."""
+    """The half vector on wo's side: of a reflection, or of a refraction with eta, wi's index divided by wo's."""
     m = wo + (eta[:, None] if isinstance(eta, np.ndarray) else eta) * wi
     m = m / np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
     return m * np.copysign(1.0, np.sum(m * wo, axis=1, keepdims=True))
 
 
 def values_of(names: Sequence[str], wo: np.ndarray, wi: np.ndarray, m: np.ndarray) -> np.ndarray:
-    """Some of COSINES, (N, names), never quite 0, so that they have logarithms."""
+    """The values of some of COSINES, (N, names), kept above 0 so that they have logarithms."""
     return np.maximum(np.abs(np.stack([COSINES[name].field(wo, wi, m) for name in names], axis=1)), 1e-9)
 
 
 def product(scale: float | str, powers: Mapping[str, int]) -> str:
-    """ "4 (o.m)", "1 / (4 (o.m))", "cos_i / cos_o"."""
+    """A scale times powers as a formula: "4 (o.m)", "1 / (4 (o.m))", "cos_i / cos_o"."""
 
     def joined(sign: int) -> list[str]:
         chosen = [(name, abs(p)) for name, p in powers.items() if p * sign > 0]
@@ -82,12 +82,12 @@ def product(scale: float | str, powers: Mapping[str, int]) -> str:
 
 
 def guess_of(names: Sequence[str]) -> str:
-    """The mistakes that some of COSINES suggest."""
+    """The mistakes that the given names of COSINES suggest."""
     return " and ".join(COSINES[name].guess for name in names)
 
 
 def cosines(names: Sequence[str]) -> Iterator[Factor]:
-    """One or two cosines of a reflection, each to the power 1 or -1."""
+    """Products of one or two cosines of a reflection, each to the power 1 or -1."""
     for count in (1, 2):
         for which in itertools.combinations(names, count):
             for powers in itertools.product((1, -1), repeat=count):
@@ -105,7 +105,7 @@ def cosines(names: Sequence[str]) -> Iterator[Factor]:
 
 
 def index_below(subject: Subject) -> Iterator[float]:
-    """Index below over index above, by the samples and by a parameter named eta, where it is not 1."""
+    """The index below divided by that above, by the samples and by a parameter named eta, unless it is 1."""
     if not subject.transmits:
         return
     wo = directions.on_side(directions.uniform(np.random.default_rng(4), 2048), 1)
@@ -121,7 +121,7 @@ def index_below(subject: Subject) -> Iterator[float]:
 
 
 def _across(wo: np.ndarray, eta: float) -> np.ndarray:
-    """The index on the other side of the surface over that on wo's side, (N,)."""
+    """The index on the other side of the surface divided by that on wo's side, (N,)."""
     return np.where(wo[:, 2] > 0.0, eta, 1.0 / eta)
 
 
@@ -129,7 +129,7 @@ SIDES = {"": 0.0, " from outside": 1.0, " from inside": -1.0}
 
 
 def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence[str] = ("",)) -> Iterator[Factor]:
-    """Powers of the index in transmission, inverted from the other side; from both sides, or from one of SIDES."""
+    """Powers of the index in transmission, inverted from below; from both sides, or from one of SIDES only."""
     for eta in index_below(subject):
         for place in sides:
             for power in powers:
@@ -144,7 +144,8 @@ def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence
 
 
 def normals(subject: Subject) -> Iterator[Factor]:
-    """The density of visible normals over that of all normals, but for the masking of wo, and the reverse."""
+    """The ratio of the density of visible normals to that of all normals, apart from the masking of wo, and its
+    inverse."""
     visible, all_ = "visible normals", "all normals"
     for eta in [*index_below(subject)] or [1.0]:
         for power, drawn, stated in ((1.0, visible, all_), (-1.0, all_, visible)):
@@ -188,7 +189,7 @@ WIDTH = "alpha in place of alpha^2, or the reverse"
 
 
 def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
-    """The subject with its two widths exchanged, at alpha^2, and at sqrt(alpha), where that changes anything."""
+    """The subject with its two widths swapped, with alpha^2, and with sqrt(alpha), if that changes anything."""
     pair = getattr(subject.model, "alpha", None)
     if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
         exchanged = subject.replace(alpha=(pair[1], pair[0]))
@@ -210,7 +211,7 @@ def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
 
 
 def distributions(subject: Subject) -> Iterator[Factor]:
-    """D of another width, alpha^2 or sqrt(alpha) in place of alpha, of GGX or Beckmann."""
+    """Ratios of D at another width, alpha^2 or sqrt(alpha), to D at alpha, for GGX and Beckmann, and their inverses."""
     value = getattr(subject.model, "alpha", None)
     if not isinstance(value, int | float | tuple | list) or np.size(value) > 2:
         return
@@ -238,13 +239,13 @@ def distributions(subject: Subject) -> Iterator[Factor]:
 
 
 def _ggx(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Heitz2014, eq. 85."""
+    """D of GGX (Heitz2014, eq. 85)."""
     q = (m[:, 0] / alpha[0]) ** 2 + (m[:, 1] / alpha[1]) ** 2 + m[:, 2] ** 2
     return np.asarray(1.0 / (np.pi * alpha[0] * alpha[1] * q**2))
 
 
 def _beckmann(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Heitz2014, eq. 81; never quite 0, so that ratios stay finite."""
+    """D of Beckmann (Heitz2014, eq. 81), kept above 0 so that ratios stay finite."""
     q = ((m[:, 0] / alpha[0]) ** 2 + (m[:, 1] / alpha[1]) ** 2) / m[:, 2] ** 2
     return np.asarray(np.exp(-np.minimum(q, 600.0)) / (np.pi * alpha[0] * alpha[1] * m[:, 2] ** 4))
 
@@ -255,7 +256,7 @@ AT_NORMAL = "Fresnel's term at the normal in place of the half vector"
 
 
 def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
-    """The exact F of a dielectric at n.o in place of o.m, or of n.i: F in reflection, 1 - F in transmission."""
+    """The exact F of a dielectric at n.o divided by that at o.m, or at n.i: F in reflection, 1 - F in transmission."""
     for eta in index_below(subject):
 
         def field(o: np.ndarray, i: np.ndarray, eta: float = eta) -> np.ndarray:
@@ -280,7 +281,7 @@ def _inverse(field: Field, o: np.ndarray, i: np.ndarray) -> np.ndarray:
 
 
 def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Reflectance of unpolarized light, by the cosine >= 0 and the index beyond over that here (Walter2007, eq. 22)."""
+    """Reflectance of unpolarized light, from the cosine >= 0 and the relative index eta (Walter2007, eq. 22)."""
     square = eta**2 - 1.0 + cosine**2
     g = np.sqrt(np.maximum(square, 0.0))
     plus = np.maximum(g + cosine, 1e-12)
@@ -289,7 +290,7 @@ def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
 
 
 def schlick_curve(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Schlick's curve, in the cosine on the side of the smaller index."""
+    """Schlick's curve, as a function of the cosine on the side of the smaller index."""
     r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
     sin2 = (1.0 - cosine**2) / eta**2
     outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cosine)

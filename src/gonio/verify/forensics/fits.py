@@ -1,5 +1,5 @@
-"""The fit of a ratio of two values that should be equal: by a constant, a factor of the table, or a factor with fitted
-constants. The result is the simplest one that holds for nearly every pair of directions.
+"""Fits a formula to the ratio of two values that should be equal: a constant, a factor of the table, or a factor with
+fitted constants. The result is the simplest formula that holds for nearly every pair of directions.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ FEWEST = 64  # pairs of directions that a fit needs
 
 
 def fitted(ratio: Ratio) -> Fit | None:
-    """The first candidate that explains a ratio everywhere."""
+    """The first candidate formula that explains a ratio everywhere."""
     if len(ratio.wo) < FEWEST:
         return None
     plain = scalar(ratio)
     quality = None if plain is None else holds(ratio, plain)
     if quality is not None:
-        return None  # 1 but for a few pairs: a factor that leaves most as they are would explain as much
+        return None  # 1 except at a few pairs: any factor that leaves most of them unchanged would explain as much
     return next((fit for fit in (candidate(ratio) for candidate in CANDIDATES) if fit is not None), None)
 
 
 def simple(ratio: Ratio) -> Fit | None:
-    """The fit by a known number, a color or powers of cosines, without any other material; None if there is none."""
+    """The fit by a known number, a color or powers of cosines, without evaluating another material; None if none."""
     if len(ratio.wo) < FEWEST:
         return None
     fit = _constant(ratio)
@@ -44,7 +44,7 @@ def _reflects(ratio: Ratio) -> bool:
 
 
 def _constant(ratio: Ratio) -> Fit | None:
-    """The same factor everywhere: pi, 2, 4, or an unnamed one; 0 and -1 too."""
+    """The same factor everywhere: pi, 2, 4, or an unnamed one, including 0 and -1."""
     r = scalar(ratio)
     if r is None:
         return None
@@ -67,7 +67,7 @@ def _constant(ratio: Ratio) -> Fit | None:
 
 
 def _color(ratio: Ratio) -> Fit | None:
-    """A constant per channel: an albedo or a tint that one of the two lacks."""
+    """A constant per channel: an albedo or a tint that one of the two values lacks."""
     if ratio.above.shape[1] != 3 or ratio.antisymmetric or np.any(ratio.below <= 0.0):
         return None
     r = ratio.above / ratio.below
@@ -94,7 +94,7 @@ def _cosines(ratio: Ratio) -> Fit | None:
     wo, wi = ratio.wo, ratio.wi
     names: tuple[str, ...] = COSINES
     logs = np.log(factors.values_of(COSINES, wo, wi, factors.half_vector(wo, wi)))
-    if ratio.antisymmetric:  # factors that both directions share cancel
+    if ratio.antisymmetric:  # factors that are symmetric in the two directions cancel
         names, logs = ("cos_i", "sin_i"), logs[:, [2, 4]] - logs[:, [3, 5]]
     positive = np.isfinite(r) & (r > 0.0)
     if positive.mean() < COVER:
@@ -122,7 +122,7 @@ def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], pos
     scale = float(np.median(quotient))
     plain = abs(scale - 1.0) < SPREAD
     if not plain and written(scale) not in NUMBERS:
-        return None  # a clamp leaves such a ratio, with any number
+        return None  # a clamp leaves such a ratio, with an arbitrary constant
     quality = holds(ratio, quotient / scale)
     if quality is None:
         return None
@@ -133,7 +133,7 @@ def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], pos
 
 
 def _of_table(ratio: Ratio, table: Iterator[factors.Factor]) -> Fit | None:
-    """The first factor of a table by which the ratio must be divided."""
+    """The first factor of a table that equals the ratio."""
     r = scalar(ratio)
     for factor in table if r is not None else ():
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -166,7 +166,7 @@ def _dielectric(ratio: Ratio) -> Fit | None:
 
 
 def _otherwise(ratio: Ratio) -> Fit | None:
-    """The denominator of swapped arguments, of the other mode, or of another width equals the numerator."""
+    """The fit if the numerator is the denominator with swapped arguments, in the other mode, or at another width."""
     if ratio.recompute is None:
         return None
     subject, wo, wi = ratio.subject, ratio.wo, ratio.wi
@@ -211,7 +211,7 @@ def _schlick(ratio: Ratio) -> Fit | None:
     r = ratio.above / np.where(ratio.below == 0.0, np.nan, ratio.below)
     cases: list[tuple[str, str, np.ndarray, np.ndarray]] = []
     if not ratio.antisymmetric:
-        # F of (1 - cos)^5 = 1 is 1: a term that one of the two lacks
+        # F with (1 - cos)^5 = 1 is 1: a term that one of the two lacks
         one, guess = np.ones(len(r)), "Fresnel's term, missing in one of the two or doubled"
         for name, x in powers.items():
             cases += [(f"F({name})", guess, x, one), (f"1 / F({name})", guess, one, x)]
@@ -225,7 +225,7 @@ def _schlick(ratio: Ratio) -> Fit | None:
 
 
 def _schlick_quotient(ratio: Ratio, r: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of a ratio over (R0 + (1 - R0) x) / (R0 + (1 - R0) y), with R0 solved for."""
+    """(spread, cover) of a ratio divided by (R0 + (1 - R0) x) / (R0 + (1 - R0) y), with R0 solved for."""
     spread, cover = 0.0, 1.0
     for column in r.T:
         # the equation is linear in R0
@@ -247,7 +247,7 @@ def _schlick_quotient(ratio: Ratio, r: np.ndarray, x: np.ndarray, y: np.ndarray)
 
 
 DEGREE = 9
-KNOTS = 97  # of a function with kinks, such as a smooth step at the horizon
+KNOTS = 97  # of a function that may have kinks, such as a smooth step at the horizon
 
 
 def _one_direction(ratio: Ratio) -> Fit | None:

@@ -1,10 +1,10 @@
-"""Why a material reflects more light than arrives: the part of it that gains, and how the gain depends on parameters.
+"""Why a material reflects more light than arrives: which part of it gains, and how the gain depends on parameters.
 
-Without absorption a part that is normalized reflects at most 1. So the albedos of the lossless variant tell
+Without absorption, a normalized part reflects at most 1. So the albedos of the lossless variant reveal
 
-    parts       with one color 1 and the others 0: which part gains alone, or whether only their sum does
+    parts       with one color 1 and the others 0: which part gains by itself, or whether only their sum does
     parameters  proportional to a power of one: a normalization lacks it; or no gain at one end of its range
-    lobes       of a smooth interface: transmission that is not what reflection leaves
+    lobes       at a smooth interface: transmission that is not what reflection leaves
     views       1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
 """
 
@@ -22,21 +22,21 @@ from .. import directions, lobes
 from ..subject import Fault, Subject
 from .ratio import Cause, written
 
-Albedo = Callable[[Subject], np.ndarray]  # of a subject at NORMAL, then at OBLIQUE: (views, channels)
+Albedo = Callable[[Subject], np.ndarray]  # maps a subject to its albedos at VIEWS, (views, channels)
 
 VIEWS = (2.0, 40.0, 60.0, 75.0, 85.0)  # degrees of wo; the first stands for the normal
 GAIN = 5e-3
-VALUES = 5  # of a parameter
-SPAN = 4.0  # by which a parameter is divided and multiplied
-POWER = 0.15  # by which an exponent may differ from an integer
-RESIDUAL = 0.05  # of a logarithm: Fresnel's terms and losses at the horizon vary as well
-LEAST_AT_NORMAL = 0.8  # albedo at the normal of a material that gains at grazing views only
+VALUES = 5  # values of a parameter
+SPAN = 4.0  # factor by which a parameter is divided and multiplied
+POWER = 0.15  # largest difference of an exponent from an integer
+RESIDUAL = 0.05  # of a logarithm: Fresnel terms and losses at the horizon vary as well
+LEAST_AT_NORMAL = 0.8  # smallest albedo at the normal of a material that gains at grazing views only
 NARROW = 0.3  # largest width at which little light is lost at the horizon
-MOST = 6  # parameters, or colors
+MOST = 6  # largest number of parameters, or of colors
 
 
 def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
-    """What a gain depends on; `white` is the subject without absorption."""
+    """The parts, parameters and views on which a gain depends; `white` is the subject without absorption."""
     if not isinstance(white.model, BSDF) or white.stochastic:
         return
     here = albedo(white)
@@ -55,7 +55,7 @@ def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
 
 
 def _parts(white: Subject, albedo: Albedo, here: float) -> str:
-    """Which color's part gains alone, in words; "" if there are no two colors."""
+    """A description of the colors whose part gains by itself; "" if there are fewer than two colors or no such part."""
     colors = {
         leaf.path: leaf.parameter
         for leaf in tree.leaves(white.model)
@@ -70,7 +70,7 @@ def _parts(white: Subject, albedo: Albedo, here: float) -> str:
         if value is None:
             return ""
         by_part[path] = float(value.max())
-    # other colors scale the sum, or shift it: they are no parts of it
+    # other colors scale or shift the sum: they do not belong to one part
     if min(by_part.values()) < GAIN or here > sum(by_part.values()) + GAIN:
         return ""
     wrong = [path for path, value in by_part.items() if value > 1.0 + GAIN]
@@ -100,8 +100,8 @@ def _of(subject: Subject, values: dict[str, Any], albedo: Albedo) -> np.ndarray 
 
 
 def _numbers(white: Subject) -> Iterator[tuple[str, str, Callable[[float], Any], float, float, float]]:
-    """Numeric parameters but colors and angles, widths one at a time: name, path, the value of a number, the number
-    now, and its range."""
+    """Numeric parameters except colors and angles, widths one at a time: name, path, the function from a number to the
+    parameter's value, the current number, and its range."""
     for leaf in tree.leaves(white.model):
         parameter, value = leaf.parameter, leaf.value
         if not parameter.numeric or parameter.white is not None or parameter.kind in ("angle", "spectrum"):
@@ -120,7 +120,7 @@ def _pair(value: float, other: float, first: bool) -> tuple[float, float]:
 
 
 def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | None, Cause | None]:
-    """The powers of parameters to which the albedo at the normal is proportional, or a range's end without gain."""
+    """The powers of parameters to which the albedo at the normal is proportional, or an end of a range without gain."""
     powers: dict[str, float] = {}
     ends: list[Cause] = []
     scale = 1.0
@@ -146,7 +146,7 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
         gains = largest > 1.0 + GAIN
         steps = np.diff(largest)
         if not (np.all(steps > -GAIN) or np.all(steps < GAIN)):
-            continue  # as by interference
+            continue  # as for interference
         if gains.all() and np.isfinite(low):  # the end itself, which has no logarithm if it is 0
             end = _of(white, {path: value_of(low)}, albedo)
             if end is not None and end.max() < 1.0 + GAIN:
@@ -172,7 +172,7 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
 
 
 def _views(here: np.ndarray) -> Cause | None:
-    """1 at the normal and a power of the cosine elsewhere."""
+    """A cause if the albedo is 1 at the normal and a power of the cosine elsewhere."""
     a = here.mean(1)
     if a[0] < LEAST_AT_NORMAL or a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
         return None
@@ -188,11 +188,11 @@ def _views(here: np.ndarray) -> Cause | None:
 
 # --------------------------------------------------------------------------- delta lobes
 
-EXACT = 1e-3  # of the light of delta lobes
+EXACT = 1e-3  # tolerance for the light of delta lobes
 
 
 def of_lobes(subject: Subject, seed: int) -> Iterator[Cause]:
-    """What the transmission of delta lobes is, where it is not what their reflection leaves."""
+    """Causes by what delta lobes transmit, if that is not what their reflection leaves."""
     wo = directions.single(directions.at(np.array(VIEWS[1:]), 37.0))
     known = lobes.of(subject, wo, seed, "importance")
     through = known.through(wo)

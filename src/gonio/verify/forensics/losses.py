@@ -14,16 +14,16 @@ from .ratio import Cause
 if TYPE_CHECKING:
     from ..subject import Subject
 
-MOST = 6  # parameters that are moved to their ends
-LITTLE = 0.2  # share of the loss that counts as none
+MOST = 6  # largest number of parameters that are moved to their ends
+LITTLE = 0.2  # fraction of the loss that counts as none
 
 
 def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> Iterator[Cause]:
-    """The parameters on which a loss depends: mixed parameters, or a loss that grows with one.
+    """The parameters on which a loss depends: mixed parameters, or a parameter with which it grows.
 
     white  the subject without absorption
-    loss   the largest loss of a subject in a furnace
-    claim  the loss that is meant
+    loss   function that returns the largest loss of a subject in a furnace
+    claim  the loss that the material declares
     """
     if not isinstance(white.model, BSDF) or white.stochastic:
         return
@@ -44,7 +44,7 @@ def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> It
 
 
 def _ranges(model: BSDF) -> list[tuple[str, float, tuple[float, float]]]:
-    """The numbers with a finite range, but colors: path, value and ends."""
+    """The numbers with a finite range, except colors: path, value and ends."""
     result: list[tuple[str, float, tuple[float, float]]] = []
     for leaf in tree.surface(model):
         parameter, value = leaf.parameter, leaf.value

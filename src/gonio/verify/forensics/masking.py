@@ -1,10 +1,11 @@
 """Whether a distribution's Lambda is that of its D.
 
-A surface is visible as a whole: the facets that are seen from wo fill its projected area (Heitz2014, eq. 14), so
+The facets that are visible from wo fill the surface's projected area (Heitz2014, eq. 14), so
 
     int D(m) max(wo . m, 0) dm = (1 + Lambda(wo)) cos theta_o.
 
-A wrong Lambda keeps every other law if the light is dimmed by it, since D and the density of normals are right.
+A wrong Lambda satisfies every other law as long as it only dims the light, since D and the density of normals are
+correct.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from ..subject import Subject
 
 THETA = (30.0, 60.0, 75.0, 84.0)
 AZIMUTHS = (0.0, 50.0)
-NODES = 512, 128  # in tan theta / alpha, in equal steps of its angle, and in azimuth
-MISMATCH = 0.01  # of 1 + Lambda: Gonio's tables and published approximations are within half of it
+NODES = 512, 128  # in tan theta / alpha, by equal steps of its arctangent, and in azimuth
+MISMATCH = 0.01  # of 1 + Lambda: the errors of Gonio's tables and of published approximations are at most half of it
 
 
 def mismatch(subject: Subject) -> str:
-    """The largest difference of 1 + Lambda from the projected area by D, in words; "" if they agree, or if there is no
-    such distribution."""
+    """A description of the largest difference between 1 + Lambda and the projected area by D; "" if they agree, or if
+    there is no such distribution."""
     model = subject.model
     ndf, alpha = getattr(model, "ndf", None), getattr(model, "alpha", None)
     if not isinstance(model, BSDF) or ndf is None or not str(getattr(model, "masking", "")).startswith("smith"):
@@ -53,10 +54,10 @@ def mismatch(subject: Subject) -> str:
 
 
 def _areas(ndf: object, alpha: tuple[float, float], wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """1 + Lambda of wo (N, 3), and the projected area of facets by D over cos theta_o, (N,) each."""
+    """1 + Lambda of wo (N, 3), and the projected area of facets by D divided by cos theta_o, (N,) each."""
     types = backend.types("float64")
     pair = types.vec2(*(backend.float_of(one, types) for one in alpha))
-    # slopes in equal steps of an angle: dense where D is, and up to the horizon
+    # slopes at equal steps of an angle: dense where D is large, and up to the horizon
     angle = (np.arange(NODES[0]) + 0.5) * (0.5 * np.pi / NODES[0])
     phi = (np.arange(NODES[1]) + 0.5) * (2.0 * np.pi / NODES[1])
     t, p = (part.ravel() for part in np.meshgrid(angle, phi, indexing="ij"))

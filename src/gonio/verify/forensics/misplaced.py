@@ -1,11 +1,11 @@
-"""Where the samples lie that the pdf does not predict, if no single factor of `crowding` explains them.
+"""Where samples lie that the pdf does not predict, if no single factor of `crowding` explains them.
 
 The counts o and expectations e of blocks of cells have a ratio r = o / e. Three patterns of r have a name:
 
     the pdf in another frame     samples follow pdf(wo, M wi), with M a rotation about the normal or a mirror image
-    two parts                    r is one number c in most blocks; elsewhere only larger (the pdf lacks a lobe), or only
+    two parts                    r is a constant c in most blocks; elsewhere only larger (the pdf lacks a lobe), or only
                                  smaller (the pdf has a lobe that is never sampled)
-    one variable                 r is a function of one angle: the distribution of that angle is another one
+    one variable                 r is a function of one angle, whose distribution differs from that in the pdf
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from .factors import half_vector
 from .ratio import Cause
 
 SMALL = 0.02  # smallest difference that one variable explains
-PLATEAU = 0.3  # share of the expectation in blocks of one ratio
-LEAST = 0.02  # share of all samples that lie elsewhere
-OTHER = 0.15  # of that share: differences of the other sign
-APART = 2.0  # ratio of samples to pdf, over that of most blocks, where a lobe is missing in one of them
-BESIDE = 0.4  # least share of the difference in such blocks
-NATURAL = 0.06  # by which the integral of the pdf may differ from the share of the samples
+PLATEAU = 0.3  # smallest fraction of the expectation in blocks of one ratio
+LEAST = 0.02  # smallest fraction of all samples that lie elsewhere
+OTHER = 0.15  # largest fraction of these for differences of the other sign
+APART = 2.0  # ratio of samples to pdf, relative to that of most blocks, where a lobe is missing in one of them
+BESIDE = 0.4  # smallest fraction of the difference in such blocks
+NATURAL = 0.06  # largest difference of the integral of the pdf from the fraction of the samples
 NOISE = 4.0  # standard errors
-STEP = 0.02  # of the logarithm of a ratio, by which ratios count as one
+STEP = 0.02  # difference of logarithms within which ratios count as equal
 BINS = 48
 NEAR_HORIZON, NEAR_NORMAL = 0.3, 0.95  # cosines
-FEW = 0.06  # share of the area in which a crowd is a ring or a point
+FEW = 0.06  # fraction of the hemisphere below which a crowd is a ring or a point
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The pattern of the difference; None if it has none. Arguments as of `mixture.named`."""
+    """The pattern of the difference; None if it has none. For the arguments, see `mixture.named`."""
     expected = held.joined(held.expected)
     if held.observed.sum() < 1000 or expected.sum() <= 0.0:
         return None
@@ -55,7 +55,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Rotations about the normal and mirror images: as text, the mistake that they suggest, and their matrix."""
+    """Rotations about the normal and mirror images: as text, with the mistake that they suggest and their matrix."""
     guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
     for path, angle in _angles(subject):
         for factor in (1.0, -1.0, 2.0, -2.0):
@@ -115,7 +115,7 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     if not filled.any():
         return None
     logs = np.log(np.maximum(o[filled], 1.0) / e[filled])
-    # the ratio that most of the expectation has
+    # the ratio in most of the expectation
     steps = np.round(logs / STEP).astype(int)
     weight = np.bincount(steps - steps.min(), e[filled])
     smooth = np.convolve(weight, np.ones(5), mode="same")
@@ -133,11 +133,11 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     ):
         return None
     lacking = more > less
-    # a lobe of its own lies where the other is dim; a wrong factor changes the ratio gradually
+    # a separate lobe lies where the rest is dim; a wrong factor changes the ratio gradually
     apart = (o > APART * c * e) if lacking else (o * APART < c * e)
     if np.abs(off[~same & apart]).sum() < BESIDE * max(more, less):
         return None
-    # the rest of a mixture: either the weights are those of the samples, or one of the two has no other part
+    # the rest of a mixture: either the weights are those of the samples, or there is no other part in one of the two
     if (
         abs(c - 1.0) > 2.0 * STEP
         and abs(float(e.sum()) / held.drawn - (1.0 if lacking else total / held.drawn)) > NATURAL
@@ -162,8 +162,8 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
 
 
 def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
-    """Where most of a weight per block is, in words, "" if it is everywhere; and whether it fills a small part of the
-    sphere."""
+    """A description of where most of a weight per block is, "" if it is everywhere; and whether it fills a small part
+    of the sphere."""
     area = held.joined(held.area)
     share = weight / max(float(weight.sum()), 1e-30)
     order = np.argsort(-share / np.maximum(area, 1e-12))
@@ -221,7 +221,7 @@ VARIABLES: dict[str, tuple[str, Variable]] = {
 
 
 def _one_variable(cells: SampleCells, held: Blocks, before: float) -> Cause | None:
-    """The angle on which the ratio of samples to pdf depends alone: a ratio per step of it removes the difference."""
+    """The only angle on which the ratio of samples to pdf depends: one ratio per step of it removes the difference."""
     wo = np.broadcast_to(held.wo, held.wi.shape)
     e, o = held.expected, cells.observed.ravel().astype(float)
     best: tuple[float, str, str, np.ndarray] | None = None

@@ -1,11 +1,11 @@
-"""Lobes among which a random number chooses: the weights that the pdf gives them against those of the samples.
+"""Lobes that a random number selects: the weights in the pdf against those of the samples.
 
-The number that chooses is found by a sweep: the sampled direction jumps at the same value whatever the other numbers
-are. Samples below and above this value are histograms of two lobes, a(wi) and b(wi), and the pdf's expectation in
-the same blocks of cells is compared with
+A sweep finds the number that selects: the sampled direction jumps at the same value of it whatever the other numbers
+are. Samples below and above this value give histograms of two lobes, a(wi) and b(wi), and the pdf's expectation in the
+same blocks of cells is compared with
 
-    x a + y b + ...                  weights that are constant
-    s(wi) a + (1 - s(wi)) b          the share s of the first lobe, taken at the sampled direction
+    x a + y b + ...                  constant weights
+    s(wi) a + (1 - s(wi)) b          the probability s of the first lobe, evaluated at the sampled direction
 """
 
 from __future__ import annotations
@@ -19,19 +19,23 @@ from ..subject import Subject
 from .crowding import Blocks
 from .ratio import Cause, written
 
-SWEEP = 512  # values of the number that may choose
+SWEEP = 512  # values of the number that may select
 TRIALS = 24  # values of the other two
-JUMP = 0.15  # of a direction between two values of it: another lobe
-MOST = 4  # jumps
-COMMON = 0.75  # share of the trials that must jump at the same value
+JUMP = 0.15  # change of a direction from one value to the next that means another lobe
+MOST = 4  # largest number of jumps
+COMMON = 0.75  # fraction of the trials that must jump at the same value
 SAMPLES = 1 << 18
-EFFECT = 0.03  # root mean square of the relative difference that is left
-SHARE = 0.01  # difference of two weights that counts
+EFFECT = 0.03  # largest RMS of the relative difference that is left
+SHARE = 0.01  # smallest difference of two weights that counts
 VIEWS = (2.0, 20.0, 35.0, 50.0, 60.0, 70.0, 78.0, 84.0, 88.0)  # degrees at which s is measured
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The mistake in the weights of the lobes; None if there is only one, or if the weights explain nothing."""
+    """The mistake in the weights of the lobes; None if there is only one lobe, or if weights do not explain it.
+
+    cells  the cells of the chi-square test of one wo
+    held   the same in blocks
+    """
     choice = _choice(subject, held.wo, seed)
     if choice is None:
         return None
@@ -67,7 +71,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
-    """The mistake that the weights of the lobes in the pdf suggest, against their shares of the samples."""
+    """The mistake that the weights of the lobes in the pdf suggest, given their fractions of the samples."""
     given, chosen = (", ".join(f"{w:.3g}" for w in part) for part in (weights, shares))
     words = f"the pdf weighs the lobes {given}, the samples choose them {chosen}"
     if np.abs(weights[::-1] - shares).max() < SHARE:
@@ -90,7 +94,7 @@ def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
 
 
 def _choice(subject: Subject, wo: np.ndarray, seed: int) -> tuple[int, np.ndarray] | None:
-    """The number (0, 1 or 2) by which one of several lobes is chosen, and the values at which the next one begins."""
+    """The number (0, 1 or 2) that selects one of several lobes, and the values at which the next lobe begins."""
     for dimension in range(3):
         u = np.repeat(directions.numbers(np.random.default_rng([seed, 47]), TRIALS), SWEEP, axis=0)
         u[:, dimension] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
@@ -104,7 +108,7 @@ def _choice(subject: Subject, wo: np.ndarray, seed: int) -> tuple[int, np.ndarra
 
 
 def _share_at(subject: Subject, wi: np.ndarray, dimension: int, seed: int) -> np.ndarray | None:
-    """The share of the first lobe for wo = wi, (C,), of an isotropic material; None where no choice is seen."""
+    """The probability of the first lobe for wo = wi, (C,), of an isotropic material; None if no selection is found."""
     shares = []
     for theta in VIEWS:
         choice = _choice(subject, directions.single(directions.at(np.array([theta]), 30.0))[0], seed)
@@ -116,7 +120,7 @@ def _share_at(subject: Subject, wi: np.ndarray, dimension: int, seed: int) -> np
 
 
 def _blocks_of(wi: np.ndarray, cells: SampleCells, held: Blocks) -> np.ndarray:
-    """The block of each direction, -1 outside of all cells, (N,)."""
+    """The block of each direction, (N,); -1 outside all cells."""
     place = np.full(len(wi), -1)
     _, rows, columns = cells.expected.shape
     for side, sign in enumerate(cells.sides):
@@ -132,13 +136,13 @@ def _blocks_of(wi: np.ndarray, cells: SampleCells, held: Blocks) -> np.ndarray:
 
 
 def _weights(lobes: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """Weights (K,) with which the lobes (K, B) sum to the expectation (B,), by least squares weighted by the noise."""
+    """Weights (K,) with which the lobes (K, B) sum to the expectation (B,), by noise-weighted least squares."""
     scale = 1.0 / np.sqrt(np.maximum(expected, 1e-6))
     return np.asarray(np.linalg.lstsq((lobes * scale).T, expected * scale, rcond=None)[0])
 
 
 def _effect(fitted: np.ndarray, expected: np.ndarray) -> float:
-    """Root mean square of fitted / expected - 1 beyond the noise of `fitted`, over well-filled blocks."""
+    """RMS of fitted / expected - 1 beyond the noise of `fitted`, over well-filled blocks."""
     filled = expected * SAMPLES > 100.0
     if not filled.any():
         return np.inf

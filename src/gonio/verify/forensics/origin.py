@@ -1,4 +1,4 @@
-"""The operation in which a NaN or an infinity begins: the recorded material is evaluated once more at one pair, and the
+"""The operation in which a NaN or an infinity originates: the recorded material is evaluated again at one pair, and the
 result is traced back to the first operation whose arguments are all finite.
 
     origin.of(material, wo, wi)     "0 / 0 in V_Kelemen (my.glsl:31)"
@@ -17,11 +17,11 @@ from ...errors import GonioError
 from ...material import BSDF, tree
 from ...ops import evaluation, graph
 
-Number = Any  # a NumPy value of one pair: (1,), or (3, 1) of vectors and colors
+Number = Any  # a NumPy value for one pair: (1,), or (3, 1) for vectors and colors
 
 
 def of(material: BSDF, wo: NDArray[np.float64], wi: NDArray[np.float64]) -> str:
-    """Where eval stops being finite at a pair, in the first precision in which it does; "" if that is not found."""
+    """Where eval stops being finite at a pair, in the first precision in which it does; "" if that cannot be found."""
     try:
         recording = material.record("eval")
     except GonioError:
@@ -29,7 +29,7 @@ def of(material: BSDF, wo: NDArray[np.float64], wi: NDArray[np.float64]) -> str:
     for kind in (np.float64, np.float32):
         given = _inputs(material, wo, wi, kind)
         if any(name not in given for name in recording.entry.parameters):
-            return ""  # values derived in another way, such as tables of averages
+            return ""  # parameters that are derived differently, such as tables of averages
         with np.errstate(all="ignore"):
             called = _Called(recording.entry, [given[name] for name in recording.entry.parameters])
         for _, node in graph.flatten(recording.entry.result, "", graph.Node):
@@ -58,20 +58,20 @@ def _finite(value: Number) -> bool:
 
 
 class _Called:
-    """One call of a recorded function: the values of its nodes, and the calls inside."""
+    """One call of a recorded function: the values of its nodes, and the calls inside it."""
 
     def __init__(self, function: graph.Function, arguments: list[Number], outside: Callable[[int], str] | None = None):
         self.function, self.outside = function, outside
         self.values: list[Number] = []
         self.inner: dict[int, _Called] = {}
-        self.places: dict[int, int] = {}  # index of a parameter's node -> place among the arguments
+        self.places: dict[int, int] = {}  # index of a parameter's node -> position in the arguments
         for node in function.nodes:
             given = [self.value(one) for one in node.args]
             if node.op == "parameter":
                 self.places[node.index] = len(self.places)
                 self.values.append(arguments[self.places[node.index]])
             elif node.op == "constant":
-                # a plain number, which takes the precision of the others
+                # a plain number, which takes on the precision of the others
                 self.values.append(node.static if isinstance(node.static, bool) else float(node.static))
             elif node.op == "call":
                 one = self.inner[node.index] = _Called(node.static, given, self._argument(node))
@@ -97,7 +97,7 @@ class _Called:
         return lambda place: self.origin(call.args[place])
 
     def origin(self, node: graph.Node) -> str:
-        """In words, where a value that is not finite begins."""
+        """A description of where a non-finite value originates."""
         if node.op == "parameter":
             return self.outside(self.places[node.index]) if self.outside else ""
         if node.op in ("call", "element"):
@@ -118,7 +118,7 @@ class _Called:
 
 
 def _is_power(node: graph.Node) -> bool:
-    """Whether it is the root that stands for a shader's power of a negative number: of x where x < 0, else of 0."""
+    """Whether a node is the root that represents a shader's power of a negative number: of x where x < 0, else of 0."""
     base = node.args[0] if node.op == "sqrt" else None
     if not isinstance(base, graph.Node) or base.op != "where" or _constant(base.args[2]) != 0.0:
         return False
@@ -131,7 +131,7 @@ def _constant(one: object) -> object:
 
 
 def _words(op: str, given: list[Number]) -> str:
-    """What an operation of finite arguments did."""
+    """A description of what an operation did with finite arguments."""
     if op == "div":
         if np.all(given[1] != 0.0):
             return "an overflow of a quotient"

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from ..subject import Subject
 
 SPREAD = 1e-3  # largest 5 % to 95 % spread of a ratio that fits
-COVER = 0.97  # share of the pairs that must follow
+COVER = 0.97  # fraction of the pairs at which a fit must hold
 
-# (subject, wo, wi): the denominator of a ratio, of another subject or with other arguments
+# maps (subject, wo, wi, mode) to the denominator of a ratio, for another subject or other arguments
 Denominator: TypeAlias = "Callable[[Subject, np.ndarray, np.ndarray, str], np.ndarray]"
 
 
@@ -24,7 +24,7 @@ class Cause:
     """A probable cause.
 
     words   the cause as a sentence of the report
-    key     the same without figures: failures with the same key have the same cause
+    key     the same without numbers: failures with the same key have the same cause
     """
 
     words: str
@@ -33,15 +33,15 @@ class Cause:
 
 @dataclasses.dataclass(frozen=True)
 class Ratio:
-    """Two values that should be equal, over pairs of directions.
+    """Two values that should be equal, at pairs of directions.
 
     top, bottom    their names, "weight x pdf" and "eval"
     wo, wi         (N, 3)
     above, below   the values, (N, channels)
     recompute      computes `below` for another subject, other directions or the other mode
-    numbers        constants that this ratio may equal, besides the usual ones: "2 alpha"
+    numbers        constants, besides the usual ones, that this ratio may equal: "2 alpha"
     zero           the mistake that a ratio of 0 suggests
-    antisymmetric  whether exchanging wo and wi inverts the ratio: factors of both directions cancel
+    antisymmetric  whether swapping wo and wi inverts the ratio: factors symmetric in the two cancel
     accuracy       relative difference of two values that count as equal; None derives it from the precision
     """
 
@@ -63,7 +63,7 @@ class Ratio:
         return f"the ratio of {self.top} to {self.bottom}"
 
     def take(self, rows: np.ndarray, channels: np.ndarray | None = None) -> Ratio:
-        """The ratio over some pairs, and some channels."""
+        """The ratio restricted to some pairs, and to some channels."""
         above, below = self.above[rows], self.below[rows]
         if channels is not None:
             above, below = above[:, channels], below[:, channels]
@@ -97,7 +97,7 @@ NUMBERS |= {"4 / pi": 4.0 / np.pi, "pi / 4": np.pi / 4.0, "2 / pi": 2.0 / np.pi,
 
 
 def written(value: float, allowed: float = SPREAD) -> str:
-    """A number as a formula if it is a known one, else in digits."""
+    """A number as a formula if it is a known one, else as digits."""
     for name, known in NUMBERS.items():
         if abs(value / known - 1.0) < allowed:
             return name
@@ -129,7 +129,7 @@ def scalar(ratio: Ratio) -> np.ndarray | None:
 
 
 def holds(ratio: Ratio, quotient: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of values that should be 1; None if too many are not."""
+    """(spread, cover) of values that should be 1; None if too many of them are not."""
     allowed = max(SPREAD, tolerance(ratio))
     good = np.isfinite(quotient)
     cover = float(np.mean(good & (np.abs(quotient - 1.0) < allowed)))

@@ -1,6 +1,6 @@
-"""A failure of a Mitsuba plugin as a short program that needs only Mitsuba, for its authors.
+"""A failure of a Mitsuba plugin as a short program for its authors, which needs only Mitsuba.
 
-The program ends with an AssertionError that states the figure, as long as the defect exists.
+As long as the defect exists, the program ends with an AssertionError that states the measured value.
 
     script("energy", subject, finding)     "" if the BSDF is not one of Mitsuba's plugins, or the law has no program
 """
@@ -88,7 +88,7 @@ def _literal(value: object) -> str:
 
 
 def _energy(subject: Subject, finding: Finding) -> str:
-    """The albedo by a grid of directions; without a gain, compared with that of the samples."""
+    """The albedo by a grid of directions; if there is no gain, compared with that of the samples."""
     from ..laws.energy import lossless_variant
 
     mode = "ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance\n"
@@ -117,7 +117,7 @@ def _energy(subject: Subject, finding: Finding) -> str:
 
 
 def _pdf(subject: Subject, finding: Finding) -> str:
-    """The fraction of samples in a region by the pdf, compared with that of the samples themselves."""
+    """The fraction of samples that the pdf predicts in a region, compared with that of the samples themselves."""
     cells = finding.evidence
     if not isinstance(cells, SampleCells) or cells.wo is None:
         return ""
@@ -127,7 +127,7 @@ def _pdf(subject: Subject, finding: Finding) -> str:
     places |= {where: float(claimed[k].sum() - drawn[k].sum()) for where, k in sides}
     where, off = max(places.items(), key=lambda item: abs(item[1]))
     held = crowding.blocks(cells)
-    if held is not None and abs(off) < 2e-3:  # none in total: the cap with the largest difference
+    if held is not None and abs(off) < 2e-3:  # no difference in total: the cap with the largest one
         expected = held.joined(held.expected) / held.drawn
         middle = np.stack([held.joined(held.wi[:, k] * held.expected) for k in range(3)], -1)
         middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)

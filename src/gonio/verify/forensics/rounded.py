@@ -1,7 +1,8 @@
 """A cosine that is rounded to few bits: values change in equal steps of it.
 
-In half precision 1 - cos^2 has few digits where cos is near 1: the peak of a narrow lobe becomes a disk with rings.
-Along a line on which a cosine decreases evenly the values of such a lobe are constant but for jumps at equal distances.
+In half precision, 1 - cos^2 has few digits where cos is near 1: the peak of a narrow lobe becomes a disk with rings.
+Along a line on which the cosine decreases evenly, the values of such a lobe are constant except for jumps at equal
+distances.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from .ratio import Cause
 
 ALONG = 1 << 13  # directions along the line
 RANGE = 0.02  # of the cosine, from 1 down: 11 degrees
-LEAST = 5  # jumps
+LEAST = 5  # smallest number of jumps
 SHARP = 30.0  # ratio of a jump to the median change from one direction to the next
-STEPPED = 0.8  # share of all change that the jumps make
-EQUAL = 0.1  # relative spread of their distances
+STEPPED = 0.8  # smallest fraction of the total change that occurs in jumps
+EQUAL = 0.1  # largest relative spread of their distances
 
 
 def named(subject: Subject) -> Cause | None:
-    """The cosine that is rounded; None if values change smoothly, or by steps of other distances."""
+    """The cosine that is rounded; None if values change smoothly, or in unequal steps."""
     wo = directions.at(np.array([30.0]), 20.0)[0]
     cos = 1.0 - RANGE * (np.arange(ALONG) + 0.5) / ALONG
     axes = {

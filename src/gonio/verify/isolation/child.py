@@ -2,11 +2,11 @@
 
     trial(Task((Item("glass.py:Glass"),), "quick", seed=1), jobs=2)
 
-Each process (`worker`) tests one card after the other and announces every step and every call of the BSDF. If it
-crashes, or exceeds its time or memory, a new process tests the card again without the call that was in progress, which
-fails the laws that need it; or, if no call was in progress, without the law. The threshold of a statistical test
-depends on the number of tests in the report, which is known only after all cards: a card is tested with the number of
-its own tests, and again if the difference matters. Therefore the report does not depend on the number of processes.
+Each process (`worker`) tests one card at a time and announces every step and every call of the BSDF. If it crashes, or
+exceeds its time or memory, a new process tests the card again without the call that was in progress, which fails the
+laws that need it; or, if no call was in progress, without the law. The threshold of a statistical test depends on the
+number of tests in the report, which is known only after all cards: a card is decided by the number of its own tests,
+and again if the final number makes a difference. Therefore the report does not depend on the number of processes.
 
 This module imports nothing of Gonio or NumPy at the top: the first process starts before this one loads the rest.
 """
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from ..verdict import Card, Unread
 
 ISOLATED = "isolated"  # location of the error about a material that cannot be sent
-OTHERS = "*"  # key of all parameter values except the given ones
+OTHERS = "*"  # key that stands for all parameter values except the given ones
 LOOK = 0.05  # seconds between two checks of time and memory
-STRIKES = 3  # crashes of a method after which it is called at the given values only; of a card outside of any call
+STRIKES = 3  # crashes in a method after which it is called at the given values only; or of a card outside any call
 
 Progress = Callable[[int, int, str], None]
 Tell = Callable[[str], None]
@@ -67,7 +67,7 @@ class Task(NamedTuple):
 
 
 def item_of(material: Any) -> Item:
-    """A Python object in a form that another process can load. InputError if that is not possible."""
+    """A Python object in a form that another process can load. Raises InputError if that is not possible."""
     from ...catalog import notation, outside
     from ...material import BSDF, tree
 
@@ -100,10 +100,10 @@ def trial(
 ) -> Report:
     """The report of a task.
 
-    jobs       processes at a time
-    limit      seconds per law, GONIO_VERIFY_LIMIT or 300 if not given
-    memory     GB per process; if not given, half of the machine's for all processes together
-    tell       called with each law's result on a single card, or with each card's on several, as soon as it is there
+    jobs       number of simultaneous processes
+    limit      seconds per law; GONIO_VERIFY_LIMIT or 300 if not given
+    memory     GB per process; if not given, half of the machine's memory for all processes together
+    tell       called with each law's result if there is a single card, else with each card's, as soon as it is known
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
@@ -179,7 +179,7 @@ class _Pool:
         self.answers: queue.Queue[tuple[Process, Any]] = queue.Queue()
         self.workers = [Process(task, limit, self.answers) for _ in range(jobs)]
         self.states: list[_State] | None = None  # once a process has loaded the targets
-        self.waiting: list[int] = []  # numbers of the cards that no process judges yet
+        self.waiting: list[int] = []  # numbers of the cards that have no process yet
         self.laws: list[str] = []
         self.unread: list[Unread] = []
         self.begun: set[tuple[int, str]] = set()
@@ -243,7 +243,7 @@ class _Pool:
             self._tell(card, f"{law}: {result}")
 
     def _tell(self, card: int, text: str) -> None:
-        if self.tell and (card, text) not in self.told:  # a card may be judged twice
+        if self.tell and (card, text) not in self.told:  # a card may be tested twice
             self.told.add((card, text))
             self.tell(text)
 
@@ -279,7 +279,7 @@ class _Pool:
         raise error
 
     def _lost(self, worker: Process, reason: str) -> None:
-        """A process has ended: its card is judged again without the step or the call in progress."""
+        """Handle the end of a process: its card is tested again without the step or the call in progress."""
         last, call = worker.last_line(), worker.call
         worker.close()
         self.workers.remove(worker)
@@ -298,7 +298,7 @@ class _Pool:
 
 
 def _machine_memory() -> float:
-    """Bytes of this machine, or of the container that it runs in, which psutil does not know."""
+    """Bytes of memory of this machine, or of its container, which psutil does not know."""
     sizes = [float(psutil.virtual_memory().total)]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with contextlib.suppress(ValueError, OSError):

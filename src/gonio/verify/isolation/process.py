@@ -24,14 +24,14 @@ from . import watch
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
 GRACE = 1.0  # seconds beyond the limit: the alarm inside the process stops a loop in Python without a new process
-LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take several
+LOAD = 20.0  # smallest limit in seconds for starting and loading: Mitsuba alone may take several
 MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before it fills the disk
 
-Call = tuple[str, str, str]  # a method, and the material's values as a key and in words
+Call = tuple[str, str, str]  # a method, and the material's parameter values as a key and as text
 
 
 class _Started(NamedTuple):
-    """A process that waits for its task, its folder, and the file there that holds what it prints."""
+    """A process that waits for its task, its folder, and the file in it that receives what it prints."""
 
     folder: tempfile.TemporaryDirectory[str]
     log: Path
@@ -57,25 +57,25 @@ def _start() -> _Started:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
-            start_new_session=True,  # Ctrl-C is for the parent; processes of the BSDF end with the session
+            start_new_session=True,  # Ctrl-C is for the parent; processes started by the BSDF end with the session
         )
     return _Started(folder, printed, process)
 
 
 class Process:
-    """One process: its card and step, since when, and the call in progress."""
+    """One process: its card and step, their starting time, and the call in progress."""
 
     def __init__(self, task: object, limit: float, answers: queue.Queue[tuple[Process, Any]]) -> None:
         self.folder, self.log, self.process = _ahead.pop() if _ahead else _start()
-        self.in_progress = Path(self.folder.name, "call")  # written by the process: faster than an answer for each call
-        self.counted = 0  # bytes of the log whose lines are counted
+        self.in_progress = Path(self.folder.name, "call")  # written by the process: faster than one answer per call
+        self.counted = 0  # bytes of the log whose lines have been counted
         self.busy, self.reason = True, ""
         self.begins(-1, STARTING)
         self.order(task, limit, str(self.in_progress))
         threading.Thread(target=self._read, args=(answers,), daemon=True).start()
 
     def order(self, *order: object) -> None:
-        """Send an order; if the process has ended, the end of its answers reports it."""
+        """Send an order; if the process has ended, the end of its answers shows that."""
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             self.process.stdin.write(pickle.dumps(order))
@@ -89,7 +89,7 @@ class Process:
         """The call that was in progress when the process ended; None outside of any call."""
         try:
             return pickle.loads(self.in_progress.read_bytes()) or None
-        except Exception:  # before the first call, or of a process that ended while it wrote
+        except Exception:  # before the first call, or after an end in the middle of writing
             return None
 
     def over(self, limit: float, memory: float) -> str:
@@ -127,7 +127,7 @@ class Process:
         return f"the process crashed: {getattr(code, 'name', code)}"
 
     def lines(self) -> int:
-        """Number of lines printed since the last call."""
+        """Number of lines printed since the previous call of this method."""
         with self.log.open("rb") as file:
             file.seek(self.counted)
             text = file.read()

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
-LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds per law; the slowest takes some ten
-GRACE = 20.0  # seconds; a signal does not interrupt a loop inside a kernel, and after these the process ends
+LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds per law; the slowest takes about ten
+GRACE = 20.0  # seconds until the process ends, since a signal does not interrupt a loop inside a kernel
 watched = False  # whether a parent watches this process, and ends it if the signal has no effect
-# a context around each call of a BSDF, by model and method; a watched process announces the call there
+# context around each call of a BSDF, by model and method; a watched process announces the call there
 calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
 
 
@@ -27,9 +27,9 @@ def words(seconds: float) -> str:
 def limited(what: str, seconds: float | None = None) -> Iterator[None]:
     """Raise TimeoutError in the block after that many seconds.
 
-    A loop in Python is interrupted. A loop in a compiled kernel is not: then the process prints an error and exits
-    with 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside of the main thread, and
-    on platforms without SIGALRM.
+    A loop in Python is interrupted. A loop in a compiled kernel is not: the process then prints an error and exits with
+    code 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside the main thread, and on
+    platforms without SIGALRM.
     """
     seconds = seconds or LIMIT
     text = words(seconds)

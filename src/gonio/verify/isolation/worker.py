@@ -1,8 +1,9 @@
 """The process in which a BSDF is tested, started by `child`: it may loop, crash, print, or exhaust memory.
 
-Orders arrive pickled on standard input; answers leave pickled by a copy of standard output, and what the BSDF prints
-goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step an answer, and
-around each call of the BSDF a file, says what comes next: the parent knows what was in progress when the process ends.
+Orders arrive pickled on standard input. Answers leave pickled through a copy of standard output, and what the BSDF
+prints goes to the file that is standard error. An order is (card, skip, forbidden, threshold). An answer before each
+step, and a file around each call of the BSDF, tell what comes next, so that the parent knows what was in progress if
+the process ends.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ def main() -> None:
         _work(orders, say)
     except GonioError as error:
         say("error", error)
-    except (_Stuck, Fault) as error:  # a fault here is that of a repeated test
+    except (_Stuck, Fault) as error:  # here, a fault is that of a repeated test
         say("lost", str(error))
     except (KeyboardInterrupt, SystemExit, GeneratorExit, TimeoutError, MemoryError, RecursionError) as error:
-        # Ctrl-C does not reach this process: the BSDF raised it, outside of the calls that `guarded` watches
+        # Ctrl-C does not reach this process: the BSDF raised it, outside the calls that `guarded` watches
         say("lost", f"{type(error).__name__} ended the thread that judges it")
     except BaseException as error:
         place, what = _outside(error), f"{type(error).__name__}: {error}"
@@ -63,10 +64,10 @@ def main() -> None:
 
 
 def _work(orders: IO[bytes], say: Say) -> None:
-    chosen(None)  # loads the laws: the parent may not know its task yet
+    chosen(None)  # loads the laws in advance: the parent may not know its task yet
     try:
         task, limit, in_progress = cast(tuple[Task, float, str], pickle.load(orders))
-    except EOFError:  # it has none
+    except EOFError:  # the parent has none
         return
     calls = _Calls(in_progress)
     watch.watched, watch.LIMIT, watch.calling = True, limit, calls
@@ -92,7 +93,7 @@ def _work(orders: IO[bytes], say: Say) -> None:
 
 
 def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
-    """The subjects, and the shaders that cannot be read where others can."""
+    """The subjects, and the shaders that could not be read although other targets could."""
     subjects: list[Subject] = []
     unread: list[Unread] = []
     for item in items:
@@ -107,14 +108,14 @@ def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
 
 
 def _outside(error: BaseException) -> str:
-    """file:line of an exception in a user's file, outside of `guarded` calls; else ""."""
+    """file:line of an exception in a user's file, outside `guarded` calls; else ""."""
     files = {getattr(module, "__file__", "") for name, module in sys.modules.items() if name.startswith(outside.PREFIX)}
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 
 
 def _pipes() -> tuple[IO[bytes], Say]:
-    """The orders, and the function that sends an answer; reading standard input and printing do not affect them."""
+    """The stream of orders, and the function that sends an answer, independent of what the BSDF reads and prints."""
     orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
@@ -135,15 +136,15 @@ def _pipes() -> tuple[IO[bytes], Say]:
 
 
 class _Stuck(BaseException):
-    """A call that did not end in time. No law catches it: a new process starts, and that call is not repeated."""
+    """A call that did not end in time. No law catches it: a new process starts, which does not repeat the call."""
 
 
 class _Calls:
-    """Writes each call of the BSDF into a file for the parent, and refuses those that ended a process before.
+    """Writes each call of the BSDF to a file for the parent, and refuses calls that ended an earlier process.
 
-    in_progress the file
-    forbidden   by method and values, the reason why it must not be called again
-    given       key of the values that the material was given
+    in_progress path of the file
+    forbidden   by method and values, the reason why that call must not be repeated
+    given       key of the material's given values
     """
 
     def __init__(self, in_progress: str) -> None:
@@ -175,7 +176,7 @@ class _Calls:
 
     def _note(self, *call: str) -> None:
         with contextlib.suppress(Exception):  # the BSDF may have closed it
-            sys.stdout.flush()  # an abort would lose what it holds
+            sys.stdout.flush()  # an abort would lose what it has buffered
         with contextlib.suppress(OSError):
             os.lseek(self.file, 0, os.SEEK_SET)
             os.write(self.file, pickle.dumps(call))
@@ -183,7 +184,7 @@ class _Calls:
     def _values(self, model: Any) -> tuple[str, str]:
         """The values of a material's parameters as a key, the same in every process, and as text."""
         known = self._keys.get(id(model))
-        if known is None or known[0] is not model:  # the model is stored, so that no other gets its id
+        if known is None or known[0] is not model:  # the model is stored, so that no other object gets its id
             key = words = ""
             if isinstance(model, BSDF):
                 with contextlib.suppress(Exception):
@@ -217,17 +218,17 @@ def _subjects(item: Item) -> list[Subject]:
         return targets.resolve(item.target, item.settings, item.sweep)
     try:
         return [of(pickle.loads(item.target))]
-    except Exception as error:  # of a module that only the other process can import
+    except Exception as error:  # such as of a module that only the other process can import
         what = f"the material cannot be sent to another process: {error}"
         raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS") from error
 
 
 def _plain(card: Card) -> Card:
-    """The card without its model, and without evidence that cannot leave this process."""
+    """The card without its model, and without evidence that cannot be sent to another process."""
     card.subject = Described.of(card.subject)
     for verdict in card.verdicts:
         try:
             pickle.dumps(verdict.evidence)
-        except Exception:  # of a law in another package
+        except Exception:  # of a law from another package
             verdict.evidence = None
     return card

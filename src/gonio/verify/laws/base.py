@@ -17,16 +17,16 @@ from ..verdict import Finding
 
 
 class Law:
-    """A law: for a subject it returns a Finding, or raises DoesNotApply.
+    """A law, which returns a Finding for a subject, or raises DoesNotApply.
 
     number   its place in the report; Gonio's own are 1 to 13
-    name     its name on the command line and in `breaks`
+    name     its name on the command line and in `known_violations`
     title    the law as a sentence
     meaning  the effect of a violation on pictures
-    everywhere  whether it is also judged at other values of the parameters
-    at_ends     and at the ends of their ranges
-    samples     whether it judges `sample`, of which at other values of the parameters only few guides are computed
-    on_request  whether it is judged only when it is named
+    everywhere  whether it is also tested at other parameter values
+    at_ends     whether these may lie at the ends of their ranges
+    samples     whether it tests `sample`; guides are computed at only a few other parameter values
+    on_request  whether it is tested only when it is named
     """
 
     family: ClassVar[Family[Law]]
@@ -43,7 +43,7 @@ class Law:
         raise NotImplementedError(f"{type(self).__name__} has no judge")
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias | None:
-        """The effect of a failure on a picture; None where it is unknown. Called only after a failure."""
+        """The effect of a failure on a picture; None if it is unknown. Called only after a failure."""
         return None
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
@@ -61,13 +61,12 @@ def where_found(subject: Subject, finding: Finding) -> Subject:
 
 def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (wo, wi) at which the subject may be positive, (count, 3) each: a third uniform on the sphere, a third with
-    wi sampled by the model (narrow lobes), a third near grazing.
+    wi sampled by the model (narrow lobes), a third near grazing angles.
 
-    They are rounded to float32, so that both precisions get the same input; with `exact` they are unit vectors to 64
-    bits.
+    They are rounded to float32, so that both precisions get the same input; with `exact`, they are 64-bit unit vectors.
     """
     key = f"pairs {count} {seed} {exact}"
-    if key not in subject.memo:  # several laws look at the same ones
+    if key not in subject.memo:  # several laws use the same pairs
         subject.memo[key] = _pairs(subject, count, seed, exact)
     wo, wi = subject.memo[key]
     return wo.copy(), wi.copy()
@@ -99,24 +98,24 @@ def _pairs(subject: Subject, count: int, seed: int, exact: bool) -> tuple[np.nda
 
 
 ROUNDINGS = 4
-ROWS = 1 << 20  # per call
-CLOSER = 64  # at the few pairs where that is not enough
-MINOR = 0.01  # of the tolerance: differences that need no explanation
-ALLOWED = 8.0  # roundings of the directions that are tolerated of float32 code
+ROWS = 1 << 20  # rows per call
+CLOSER = 64  # random changes at the few pairs where ROUNDINGS are not enough
+MINOR = 0.01  # fraction of the tolerance below which a difference needs no explanation
+ALLOWED = 8.0  # tolerated rounding error of the directions in float32 code, in units of 2^-24
 
 
 def rounding(
     function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0, times: int = ROUNDINGS
 ) -> np.ndarray:
-    """The change of a value by ALLOWED roundings of both directions in float32 (6e-8 each), (N, channels).
+    """The change of a value if both directions change by ALLOWED rounding errors of float32 (6e-8 each), (N, channels).
 
-    Narrow lobes magnify the rounding of a half vector by 1 / alpha, and a step that close may be crossed; no float32
-    code can be more accurate.
+    Narrow lobes magnify the rounding error of a half vector by 1 / alpha, and a step that close may be crossed; no
+    float32 code can be more accurate.
     """
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
     slope, step = np.zeros_like(value), np.zeros_like(value)
-    together = max(1, ROWS // max(3 * len(wo), 1))  # changes of direction per call: calls of few rows cost as much
+    together = max(1, ROWS // max(3 * len(wo), 1))  # changes of direction per call: calls with few rows cost as much
     for first in range(0, times, together):
         moved: list[tuple[np.ndarray, np.ndarray]] = []
         for _ in range(min(together, times - first)):
@@ -139,10 +138,10 @@ def beyond_rounding(
     floor: float | np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """The relative difference of a and b (N, channels) beyond the rounding of the directions of `function`.
+    """The relative difference of a and b (N, channels) beyond the effect on `function` of rounding the directions.
 
-    Pairs whose plain difference is below a hundredth of the tolerance keep it. Pairs above the tolerance are looked at
-    again: of four random changes of direction none may show how fast a value changes where it is steepest.
+    Pairs whose plain difference is below a hundredth of the tolerance keep it. Pairs above the tolerance are examined
+    again: four random changes of direction may miss how fast a value changes where it is steepest.
     """
     error = relative(a, b, 0.0, floor)
     for seed, times, least in ((0, ROUNDINGS, MINOR * tolerance), (1, CLOSER, tolerance)):
@@ -172,11 +171,11 @@ def worst_of(error: np.ndarray) -> tuple[int, float]:
 
 
 def angles(w: np.ndarray) -> str:
-    """A direction's theta and phi in degrees."""
+    """A direction's theta and phi in degrees, as text."""
     theta, phi = directions.angles(w)
     return f"{theta:.4g}, {phi:.4g}"
 
 
 def pair_in_words(wo: np.ndarray, wi: np.ndarray) -> str:
-    """Both directions in degrees."""
+    """Both directions in degrees, as text."""
     return f"wo at {angles(wo)}; wi at {angles(wi)} degrees"

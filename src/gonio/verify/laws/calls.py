@@ -1,4 +1,4 @@
-"""Calls: results do not depend on how a renderer calls."""
+"""Calls: results do not depend on how a renderer calls a BSDF."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .base import Law, pair_in_words, pairs
 
 SAME = {"float64": 1e-10, "float32": 1e-4}
 LARGE = 1 << 20
-SMALL = 1e-6  # of the largest value: smaller values are negligible
-DARK = 1e-30  # a value that is 0 in a kernel in which denormal numbers are
+SMALL = 1e-6  # fraction of the largest value below which values are negligible
+DARK = 1e-30  # smallest size to which differences are relative: a kernel may flush denormal numbers to 0
 
 
 class Calls(Law):
@@ -86,7 +86,7 @@ SUSPECTS = {
     "textured parameters": "the value of one ray is used for others: derived once for all of them?",
     "a new object": "a call changes the results of later ones: state stored in the object?",
 }
-# by the beginning of what differs from the declared facts, the mistake of the formula, or of the declaration
+# the mistake of the formula or of the declaration, by the first words of the difference from the declared facts
 FACTS = {
     "light is transmitted": "a side that eval or sample does not test, or keeps by an absolute value; else declare it",
     "it reflects light from below": "a side that is not tested, or an absolute value; else declare it",
@@ -95,7 +95,7 @@ FACTS = {
 
 
 def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
-    """Checks of any BSDF."""
+    """The checks that apply to any BSDF."""
     wo, wi = pairs(subject, min(effort.pairs // 8, 4096), seed)
     u = directions.numbers(np.random.default_rng([seed, 101]), len(wo))
     for precision in subject.precisions:
@@ -116,10 +116,10 @@ def _answers(
     mode: Mode = "radiance",
     lanes: int = 0,
 ) -> list[dict[str, np.ndarray]]:
-    """Results of eval, pdf and sample, rows (N, ...), called as a renderer does, with Dr.Jit vectors of any rows.
+    """Results of eval, pdf and sample, rows (N, ...), called with Dr.Jit vectors as a renderer does.
 
-    times  number of consecutive calls of each method: a result per call
-    lanes  a multiple of N: the rows are repeated, and the results are those of the last N
+    times  number of consecutive calls of each method, with one result per call
+    lanes  a multiple of N, to which the rows are repeated; the results are those of the last N
     """
     dr = backend.drjit()
     types = backend.types(precision)
@@ -215,7 +215,7 @@ def _unlike(
         difference = np.where(keep[:, None], np.abs(a - b), 0.0)
         off = difference / np.maximum(size, DARK)
         off = np.where(np.isnan(off), np.inf, off).max(1)
-        # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in few rows
+        # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in a few rows
         wrong = off > same
         if wrong.sum() > (0 if same == 0.0 else 0.002 * len(off)) or np.any(off > 0.1):
             row = int(np.argmax(off))
@@ -231,7 +231,7 @@ def _short(values: np.ndarray) -> str:
 
 
 def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
-    """Reflection does not depend on the mode, and transmission by one factor per side."""
+    """Check that reflection does not depend on the mode, and transmission only by one factor per side."""
     radiance, power = (subject.eval(wo, wi, mode) for mode in ("radiance", "importance"))
     through = wo[:, 2] * wi[:, 2] < 0.0
     same = SAME[subject.best]
@@ -253,7 +253,7 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
 
 
 def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> Iterator[Answer]:
-    """Parameters that vary from ray to ray, as with textures: each ray has the result of its own values."""
+    """Check that each ray has the result of its own values if parameters vary from ray to ray, as with textures."""
     if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
         return
     along = [axis for axis in ranges.axes(subject) if axis.path not in subject.model.fixed]
@@ -268,7 +268,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
         return
 
     def results(one: Subject) -> dict[str, np.ndarray]:
-        # a guide depends on all values together: its density and samples differ from those of one value
+        # a guide depends on all values together: its density and samples differ from those for a single value
         return {"eval": one.eval(wo, wi)} if one.guided else _answers(one, wo, wi, u, one.best)[0]
 
     try:
@@ -283,7 +283,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Reflection does not depend on the mode."""
+    """Check that reflection does not depend on the mode."""
     radiance, power = (_answers(subject, wo, wi, u, subject.best, mode=mode)[0] for mode in ("radiance", "importance"))
     for name in ("eval", "sample's weight"):
         a, b = radiance[name], power[name]
@@ -295,7 +295,8 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, eta of samples."""
+    """Check that declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, eta of
+    samples."""
     model = subject.model
     # all pairs of sides, even those without declared values
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))

@@ -23,18 +23,18 @@ from ..verdict import Finding, Trial
 from .base import Law, pairs, where_found
 
 GAIN = 1e-3
-FINER = 100.0  # accuracy of an integral that is computed again
+FINER = 100.0  # how many times as accurate an integral is when it is repeated
 STATED = "the albedo that is stated"
 FURNACE = "white furnace"
 LOST = f"{FURNACE} loses"
-COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo, to find what a loss depends on
-MOST_ALONE = 6  # parameters that are whitened alone
-ELSEWHERE = 88.0  # degrees; a view at other parameter values
+COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo at which the parameters behind a loss are sought
+MOST_ALONE = 6  # parameters that are made lossless one at a time
+ELSEWHERE = 88.0  # degrees of the most oblique view at other parameter values
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
 
 class Energy(Law):
-    """Directional albedo of power <= 1 for every wo, by quadrature of eval and by the model's own sampling alike.
+    """Directional albedo for power <= 1 for every wo, by quadrature of eval and by the model's own sampling alike.
 
     albedo(wo) = int f*(wo, wi) |cos theta_i| dwi over both sides, f* without the radiance factor of transmission.
     """
@@ -52,7 +52,7 @@ class Energy(Law):
             figure=0.0, tolerance=GAIN, reason="a quarter of an 8-bit step; the integrals are ten times more accurate"
         )
         value, error = _quadrature(subject, wo, effort, seed)
-        guided = subject.drawn_by is not None  # sampled by a guide of its own at the given values only
+        guided = subject.drawn_by is not None  # its own guide is computed at the given values only
         mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed) if not guided else [value] * 3
         curves = AlbedoCurves(wo, value, error, mean, noise)
         excess = value.max(1) - error.max(1) - 1.0
@@ -80,7 +80,7 @@ class Energy(Law):
         if masking:
             finding.problems.append(masking)
         white = _judged_lossless(subject)
-        if white is not None and subject.guided:  # a guide of its own would take seconds
+        if white is not None and subject.guided:  # computing its own guide would take seconds
             white = dataclasses.replace(white, drawn_by=subject.sampler)
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
@@ -141,15 +141,15 @@ class Energy(Law):
         coarse = dataclasses.replace(effort, accuracy=3e-3, full=False)
 
         def albedo(one: Subject) -> np.ndarray:
-            # a guide of its own would take seconds
+            # computing its own guide would take seconds
             one = dataclasses.replace(one, drawn_by=subject.sampler) if subject.guided else one
             return _quadrature(one, view, coarse, seed)[0]
 
         yield from gains.causes(white, albedo)
 
     def _of_albedo(self, curves: AlbedoCurves) -> Iterator[Cause]:
-        """What the curves themselves say of a gain."""
-        # the right albedo is known only where nothing is absorbed
+        """Causes of a gain that the albedo curves themselves show."""
+        # the correct albedo is known only where nothing is absorbed
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:
             if curves.furnace is not None and albedo.shape[1] == 3:
@@ -167,13 +167,13 @@ class Energy(Law):
             return
         bad = np.abs(a - 1.0) > SPREAD
         place = place_of(curves.wo, curves.wo, bad)
-        # with an edge, not a gradual rise
+        # a sharp edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
             yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times that {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
-        """The closed form of a material's albedo equals the integral of its values."""
+        """Check that the closed form of a material's albedo equals the integral of its values."""
         if not isinstance(subject.model, BSDF) or subject.stochastic:
             return
 
@@ -195,7 +195,7 @@ class Energy(Law):
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
-        """The same with every albedo 1 and F = 1: the loss is the light that the model neglects."""
+        """Test the lossless variant, with every albedo 1 and F = 1: its loss is the light that the model neglects."""
         value, error = _quadrature(white, wo, effort, seed)
         curves.furnace = value
         gain = float((value - error).max() - 1.0)
@@ -216,7 +216,7 @@ class Energy(Law):
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless_tolerance", None)
-        # a claim speaks of the given values: others, such as a weight of 0, may leave nothing to reflect
+        # a claim is about the given values: others, such as a weight of 0, may leave nothing to reflect
         judged = effort.full or value.max() > 0.0
         if claim is not None and judged and lost[where] > claim + float(error.max()):
             finding.problems.append(
@@ -224,7 +224,7 @@ class Energy(Law):
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
-        """A gain with one albedo 1, or one F = 1, alone: with all of them another term may make up for it."""
+        """Look for a gain with a single albedo or a single F set to 1: with all of them, another term may hide it."""
         if not effort.full or not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
             return
         white = {
@@ -247,13 +247,13 @@ class Energy(Law):
 
 
 def _judged_lossless(subject: Subject) -> Subject | None:
-    """The lossless variant; of a material without albedos to set that claims to lose nothing, itself."""
+    """The lossless variant; the subject itself if it has no albedos to set and claims to lose nothing."""
     claimed = getattr(subject.model, "lossless_tolerance", None) is not None
     return lossless_variant(subject) or (subject if claimed else None)
 
 
 def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
-    """The albedo by which the authors weight other layers is that of the values."""
+    """Check that the albedo by which the authors weight other layers is the integral of the values."""
     stated = subject.model.stated_albedo(wo) if isinstance(subject.model, BSDF) and not subject.stochastic else None
     if stated is None:
         return
@@ -289,7 +289,7 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
 
 
 def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed: int) -> bool:
-    """Whether more light is reflected than arrives if the largest channel of every color stands for all three."""
+    """Whether more light is reflected than arrives if every color has its largest channel in all three."""
     gray = {
         name: (max(value),) * 3
         for name, parameter in subject.parameters.items()
@@ -301,8 +301,9 @@ def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed:
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
-    """Directions wo on each side that answers: in equal steps of the cosine, the normal, and near grazing."""
-    # not in the middle: steps of a material lie at simple fractions, where the precisions may be on different sides
+    """Directions wo on each side that reflects or transmits: in equal steps of the cosine, along the normal, and near
+    grazing angles."""
+    # not at midpoints: steps of a material lie at simple fractions, where the two precisions may take different sides
     mu = (np.arange(effort.furnace) + 0.47) / effort.furnace
     # the normal itself as well, where tangents and azimuths are undefined
     theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else (ELSEWHERE,)])
@@ -311,7 +312,7 @@ def _views(subject: Subject, effort: Effort) -> np.ndarray:
 
 
 def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """int eval dwi of power plus the delta lobes' share, and the error of both, (N, channels)."""
+    """int eval dwi for power plus the light of the delta lobes, and the error of the sum, (N, channels)."""
     ideal = _deltas(subject, wo, seed, effort.full)
     if not subject.has_density:
         return ideal, np.full_like(ideal, 1e-6)
@@ -328,14 +329,14 @@ def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarr
     power = lobes.of(subject, wo, seed, "importance")
     carried = power.carried
     if not full and carried.size:
-        # lobes that coincide at some parameters are sampled together, twice as often as each states
+        # lobes that coincide at some parameter values are sampled as one, twice as often as each states
         often = np.where(power.share > 0.05, np.round(power.share / np.maximum(power.pdf, 0.01)), 1.0)
         carried = carried * np.maximum(often, 1.0)[..., None]
     return np.sum(carried * power.valid[..., None], axis=1)
 
 
 def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """A stochastic eval: its mean over directions, half of them the model's own, with three standard errors."""
+    """The integral of a stochastic eval over directions, half of them the model's own, and three standard errors."""
     values, errors = [], []
     half, even = count // 2, 0.25 / np.pi
     for i, one in enumerate(wo):
@@ -353,7 +354,7 @@ def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean weight of power, its standard error, and the largest single contribution, (N, channels) each."""
+    """Mean weight for power, its standard error, and the largest single contribution, (N, channels) each."""
     dr = backend.drjit()
     single, exact = backend.types("float32"), backend.types("float64")
     model = subject.bound()
@@ -368,7 +369,7 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
         u = histogram.random_numbers(single, index, seed + 8191 * start)
         s = guarded(subject.model, "sample", lambda many=many, u=u: model.sample(many, u, mode))
         weight = exact.vec3(dr.select(s[2] > 0.0, single.vec3(s[1]), 0.0)) + dr.zeros(exact.float, len(part) * count)
-        dr.eval(weight)  # all channels together: each reduction would draw the samples anew
+        dr.eval(weight)  # all channels together: each reduction would draw the samples again
         sums = [dr.block_sum(channel, count) for channel in weight]
         squares = [dr.block_sum(dr.square(channel), count) for channel in weight]
         most = [dr.block_reduce(dr.ReduceOp.Max, channel, count) for channel in weight]
@@ -381,7 +382,7 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np.ndarray, heavy: np.ndarray) -> float:
-    """p-value of the channels' mean; where a single sample rivals the noise, the noise is underestimated."""
+    """p-value of the channels' mean; if a single sample is comparable to the noise, the noise is underestimated."""
     spread = float(np.hypot(noise.mean(), 1e-6))
     if float(heavy.mean()) > 0.2 * spread:
         spread += float(heavy.mean())

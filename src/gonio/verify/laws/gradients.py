@@ -21,16 +21,17 @@ from .base import Law, pair_in_words, pairs, relative, worst_of
 
 TOLERANCE = 1e-4
 ROWS = 1 << 17  # rays in flight
-# Relative to the parameter: with five points the truncation error is its fourth power, the rounding error 1e-16 / 1e-4.
+# Relative to the parameter: with five points, the truncation error is its fourth power, and the rounding error is
+# 1e-16 / 1e-4.
 STEP = 1e-4
-ALL = 0.9  # share of the lit pairs that a rounded parameter changes at once
-PARTS = 8  # of the way to another value
-LEVELS = 3  # of ever smaller parts
+ALL = 0.9  # fraction of the pairs with light that a rounded parameter changes at once
+PARTS = 8  # equal parts of the way to another value
+LEVELS = 3  # subdivisions into ever smaller parts
 
 
 class Gradients(Law):
-    """d eval / d parameter by forward autodiff equals five-point differences, for every differentiable parameter, those
-    of inner materials included."""
+    """d eval / d parameter by forward-mode autodiff equals five-point differences, for every differentiable parameter,
+    including those of inner materials."""
 
     number = 8
     name = "gradients"
@@ -60,8 +61,8 @@ class Gradients(Law):
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
-            # kinks, such as those of a table, are detected down to 1e-7 of the usual slope (`_derivatives`): slopes of
-            # 1 % of it have four digits
+            # kinks, such as those of a table, are detected down to 1e-7 of the usual slope (`_derivatives`), so slopes
+            # of 1 % of it are accurate to four digits
             usual = float(np.percentile(np.abs(differences), 90.0))
             floor = max(1e-6 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-2 * usual, least)
             off = relative(exact, differences, 0.0, floor) * smooth[:, None]
@@ -115,9 +116,9 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter without derivative changes nearly all values at once when it is changed by a third, and has
-    no derivative there either. With a derivative there, it is only clamped at the given value; if pairs change one by
-    one, it is the threshold of a step in space."""
+    """Whether a parameter with zero derivative changes nearly all values at once when it is changed by a third, and has
+    zero derivative there too. If the derivative there is not zero, the parameter is only clamped at the given value; if
+    pairs change one by one, it is the threshold of a step in space."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -139,8 +140,8 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
 
 
 def _at_once(subject: Subject, path: str, ends: tuple[Any, Any], pair: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Whether nearly all values change at the same value of the parameter: in the step with most changes, in the part
-    of this step with most changes, and so on."""
+    """Whether nearly all values change at the same value of the parameter, sought in the step with the most changes,
+    then in the part of this step with the most changes, and so on."""
     low, high = 0.0, 1.0
     for _ in range(LEVELS):
         at = np.linspace(low, high, PARTS + 1)
@@ -154,7 +155,7 @@ def _at_once(subject: Subject, path: str, ends: tuple[Any, Any], pair: tuple[np.
 
 
 def _between(first: Any, last: Any, share: float) -> Any:
-    """A value on the way from one to another: a number or a tuple."""
+    """The linear interpolation between two values, a number or a tuple."""
     at = (1.0 - share) * np.asarray(first, float) + share * np.asarray(last, float)
     return tuple(map(float, at)) if at.ndim else float(at)
 
@@ -173,7 +174,7 @@ def _size(value: Any) -> float:
 
 
 def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], Any]:
-    """The function that moves a bound value."""
+    """A function that shifts a bound value."""
 
     def moved(bound: Any) -> Any:
         if parameter.kind != "angle":
@@ -187,8 +188,8 @@ def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], An
 
 
 class _Derivatives(NamedTuple):
-    """By autodiff and by differences, (N, channels) each; whether two different steps agree and no kink explains the
-    difference, (N,); and the derivative below which there is none."""
+    """Derivatives by autodiff and by differences, (N, channels) each; whether two different steps agree and no kink
+    explains the difference, (N,); and the size below which a derivative counts as 0."""
 
     exact: np.ndarray
     differences: np.ndarray
@@ -199,9 +200,9 @@ class _Derivatives(NamedTuple):
 def _derivatives(
     model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float = STEP
 ) -> dict[str, _Derivatives]:
-    """The derivatives by parameters at some paths, with steps relative to their sizes. All are computed at once, each
-    on separate rays, where the others are moved by 0: one kernel serves them all. If another parameter has no
-    derivative, a parameter is moved alone, since 0 times NaN is NaN."""
+    """The derivatives by the parameters at some paths, with steps relative to their sizes. All are computed at once,
+    each on its own rays, where the others are moved by 0: one kernel serves them all. If a result is not finite, its
+    parameter is moved alone, since 0 times the NaN of another derivative is NaN."""
     derivatives: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):
@@ -257,7 +258,7 @@ def _judged(
     lit = np.array([np.any(v != 0.0, axis=1) for v in shifted.values()])
     wide = (8.0 * one - two) / (12.0 * step)
     narrow = (8.0 * half - one) / (6.0 * step)
-    # a parameter is without effect where 1 % more of it changes a value by less than 1e-8 of it
+    # a parameter has no effect if increasing it by 1 % changes values by less than 1e-8 of the largest
     least = 1e-6 * float(np.max(np.abs(plain), initial=0.0)) / size
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))

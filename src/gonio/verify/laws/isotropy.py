@@ -19,9 +19,9 @@ Pair: TypeAlias = "tuple[np.ndarray, np.ndarray]"  # of directions wo and wi, (N
 
 EXACT = 1e-6
 SINGLE = 2e-3
-VISIBLE = 1e-3  # least anisotropy
-ROTATION = "rotation"  # parameter that turns the axes about the normal, counterclockwise (docs/conventions.md)
-TURN = 0.7  # radians by which the axes are turned
+VISIBLE = 1e-3  # smallest relative change that counts as anisotropy
+ROTATION = "rotation"  # parameter that rotates the axes about the normal, counterclockwise (docs/conventions.md)
+TURN = 0.7  # radians by which the axes are rotated
 
 
 class Isotropy(Law):
@@ -72,14 +72,14 @@ class Isotropy(Law):
 
     @staticmethod
     def _drawn_along_axes(subject: Subject, first: Pair, second: Pair) -> bool:
-        """Whether the density of samples changes under rotation: isotropic values may be sampled along axes."""
+        """Whether the density of samples changes under rotation: isotropic values may be sampled along the axes."""
         there, back = subject.pdf(*first), subject.pdf(*second)
         return bool(np.any(np.abs(there - back) > VISIBLE * np.maximum(there, back)))
 
     def _rotated_together(
         self, subject: Subject, finding: Finding, pair: tuple[np.ndarray, np.ndarray], exact: bool
     ) -> None:
-        """With its axes turned, the material has the same values for directions that are turned with them."""
+        """Check that with its axes rotated, the material has the same values for directions rotated with them."""
         other = _with_turned_axes(subject)
         if other is None:
             return
@@ -137,7 +137,7 @@ class Isotropy(Law):
             yield Cause(f"{words}, or does the formula depend on a tangent?", "turns")
 
     def _cause_of_turn(self, subject: Subject, seed: int) -> Cause:
-        """Whether the axes turn the wrong way, or only parts of the formula turn."""
+        """Whether the axes rotate the wrong way, or only parts of the formula rotate."""
         wo, wi = pairs(subject, 4096, seed)
         other = _with_turned_axes(subject)
         assert other is not None, "the law has failed for it"
@@ -165,7 +165,8 @@ class Isotropy(Law):
         return relative(there, back, noise, floor).max(1)
 
     def _axes(self, subject: Subject, finding: Finding) -> None:
-        """Second moments of eval over wi, for wo at the normal, along the two axes: in the order of the two widths."""
+        """Check that the second moments of eval over wi along the two axes, for wo at the normal, are in the order of
+        the two widths."""
         name = next((n for n, p in subject.parameters.items() if p.kind == "alpha"), "")
         pair = getattr(subject.model, name, None)
         if not isinstance(pair, tuple | list):
@@ -180,7 +181,7 @@ class Isotropy(Law):
             widths = [_spread(subject.replace(**{name: (float(v), float(v))}))[2] for v in pair]
         except InputError:  # the material rejects equal values
             widths = [float(v) for v in pair]
-        # of exponents, the larger one is the narrower
+        # for exponents, the larger one gives the narrower lobe
         apart = abs(widths[0] - widths[1]) > 1e-3 * max(widths)
         if apart and (along - across) * (widths[0] - widths[1]) < 0.0:
             wider = "x" if along > across else "y"
@@ -189,7 +190,7 @@ class Isotropy(Law):
 
 
 def _spread(subject: Subject) -> tuple[float, float, float]:
-    """Second moments of eval over wi, for wo at the normal, along the two axes; and their sum over the light."""
+    """Second moments of eval over wi along the two axes, for wo at the normal; and their sum divided by the light."""
     turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
     phi0 = float(turn or 0.0)
     theta = np.geomspace(1e-4, 0.499 * np.pi, 400)
@@ -205,7 +206,7 @@ def _spread(subject: Subject) -> tuple[float, float, float]:
 
 
 def _with_turned_axes(subject: Subject) -> Subject | None:
-    """The subject with its axes turned by TURN; None if it has no parameter for that."""
+    """The subject with its axes rotated by TURN; None if it has no parameter for that."""
     parameter = subject.parameters.get(ROTATION)
     if parameter is None or parameter.kind != "angle":
         return None
@@ -213,7 +214,7 @@ def _with_turned_axes(subject: Subject) -> Subject | None:
 
 
 def _swapped(subject: Subject) -> Subject | None:
-    """The subject with alpha_x and alpha_y exchanged; None if it has none."""
+    """The subject with alpha_x and alpha_y swapped; None if it has none."""
     for name, parameter in subject.parameters.items():
         pair = getattr(subject.model, name, None)
         if parameter.kind == "alpha" and isinstance(pair, tuple | list):

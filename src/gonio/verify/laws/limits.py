@@ -1,4 +1,4 @@
-"""Limits: what is switched off changes nothing."""
+"""Limits: a part that is switched off changes nothing."""
 
 from __future__ import annotations
 
@@ -18,20 +18,21 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 
 ROUNDINGS = 8
 TOLERANCE = ROUNDINGS * 2.0**-52
-SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # a rounding of `base.rounding`, and one of 64 bits
-# Of a material that declares no limits: parameters with these words in their names that may be 0, the values at which
-# it is compared with 0, and the part of the change from the first of them to 0 that the last may make.
+SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # unit of the rounding errors of `base.rounding`, and the same for 64 bits
+# For a material that declares no limits: words in the names of parameters that may be 0; the values that are compared
+# with 0; and the largest fraction of the change from the first of them to 0 that may remain at the last.
 WORDS = ("weight", "thickness")
 NEAR = (1e-2, 1e-8)
 STEP = 0.5
 
 
 class Limits(Law):
-    """At a declared limit the muted parameters change no value of eval, and eval is that of the model it equals.
+    """At a declared limit, the muted parameters change no value of eval, and eval equals that of the model it reduces
+    to.
 
     All limits are compared at once, each on separate rays: on a quarter of them with the other parameters as given, on
-    the rest with random ones. Given by numbers instead of arrays, the same values must have the same result, although
-    the code of parts that are off is then omitted.
+    the rest with random ones. The same values as numbers instead of arrays must give the same result, although the code
+    of parts that are off is then omitted.
     """
 
     number = 12
@@ -67,10 +68,10 @@ class _Case(NamedTuple):
     """A comparison at a limit.
 
     limit    the limit
-    against  "coat_color changes values"
+    against  the comparison as text, such as "coat_color changes values"
     one      the subject at the limit, with one value per pair where parameters vary
     other    the subject that it must equal
-    number   whether it is the same material, whose limit is given by numbers instead of arrays
+    number   whether both are the same material, with the limit given by numbers instead of arrays
     error    relative difference of their values, (N, channels)
     """
 
@@ -91,7 +92,7 @@ class _Case(NamedTuple):
         return "where " + ", ".join(f"{name} = {value:g}" for name, value in self.limit.values.items())
 
     def at(self, row: int) -> tuple[Subject, Subject]:
-        """What it must equal, and the subject at the limit, with the parameters of one of the rows."""
+        """The subject that it must equal and the subject at the limit, with the parameters of one of the rows."""
         return _row(self.other, row, len(self.error)), _row(self.one, row, len(self.error))
 
 
@@ -163,7 +164,7 @@ def _named(
     wo: np.ndarray,
     wi: np.ndarray,
 ) -> list[_Case]:
-    """The case; if it fails, one for each of the parameters that changes values by itself."""
+    """The case; if it fails, one case for each parameter that changes values by itself."""
     if case.size <= TOLERANCE or len(names) == 1:
         return [case]
     cases = []
@@ -186,7 +187,7 @@ def _at_one(
     wo: np.ndarray,
     wi: np.ndarray,
 ) -> list[_Case]:
-    """The comparisons at a limit of a material whose parameters must not vary from ray to ray."""
+    """The comparisons at a limit for a material whose parameters must not vary from ray to ray."""
     limited = subject.replace(**limit.values)
     one = _Side(limited, limited.eval(wo, wi))
     cases = _against_model(limit, one, wo, wi)
@@ -200,7 +201,7 @@ def _at_one(
 
 
 def _against_model(limit: Limit, one: _Side, wo: np.ndarray, wi: np.ndarray) -> list[_Case]:
-    """The comparison with the model without what is switched off."""
+    """The comparison with the model that lacks the part that is switched off."""
     if limit.equals is None:
         return []
     other = of(limit.equals(one.subject.model))
@@ -218,7 +219,7 @@ class _Side(NamedTuple):
 def _case(
     limit: Limit, text: str, one: _Side, other: _Side, wo: np.ndarray, wi: np.ndarray, number: bool = False
 ) -> _Case:
-    """The comparison of two sides; narrow lobes magnify the rounding of the directions."""
+    """The comparison of two sides, up to the rounding of the directions, which narrow lobes magnify."""
     a, b = one.values, other.values
     floor = np.percentile(np.abs(b).max(1), 90.0)
     error = relative(a, b, 0.0, floor)
@@ -239,8 +240,8 @@ def _case(
 def _block(
     subject: Subject, axes: Mapping[str, ranges.Axis], limit: Limit, rng: np.random.Generator, count: int
 ) -> dict[str, np.ndarray]:
-    """One value per pair of every parameter that may vary: at a limit its own; every fourth is the given one, all
-    others are random."""
+    """One value per pair for every parameter that may vary: that of the limit, if it has one; else the given value for
+    every fourth pair and random values for the others."""
     columns = {}
     for path, axis in axes.items():
         column = _draw(axis, rng, count)
@@ -254,15 +255,15 @@ def _block(
 def _changed(
     axes: Mapping[str, ranges.Axis], limit: Limit, block: dict[str, np.ndarray], rng: np.random.Generator
 ) -> dict[str, np.ndarray]:
-    """The block with other values of the muted parameters."""
+    """The block with other random values for the muted parameters."""
     muted = [path for path in axes if any(fnmatchcase(path, pattern) for pattern in limit.mutes)]
     drawn = {path: _draw(axes[path], rng, len(block[path])) for path in muted if path not in limit.values}
     return {**block, **drawn}
 
 
 def _in_blocks(subject: Subject, blocks: list[dict[str, np.ndarray]]) -> Subject | None:
-    """The subject with the blocks' values one after the other: one kernel, with the code of all parts, serves them.
-    None where a parameter of a limit must not vary from ray to ray."""
+    """The subject with the blocks' values one after the other, so that one kernel, with the code of all parts, serves
+    them; None if a parameter of a limit must not vary from ray to ray."""
     if any(path not in blocks[0] for limit in subject.model.limits for path in limit.values):
         return None
     try:
@@ -282,14 +283,14 @@ def _values(
 
 
 def _draw(axis: ranges.Axis, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Random values of a parameter, (N,), of a color (N, 3), of two widths (N, 2)."""
+    """Random values of a parameter: (N,), (N, 3) for a color, (N, 2) for two widths."""
     columns = 3 if axis.kind in ("color", "spectrum") else 2 if axis.kind == "alpha" else 1
     values = np.asarray(axis.at(rng.uniform(size=(count, columns))), float)
     return values[:, 0] if columns == 1 else values
 
 
 def _part(subject: Subject, rows: np.ndarray, count: int) -> Subject:
-    """The subject with the values of some of `count` rays, where parameters have one per ray."""
+    """The subject with the values of some of `count` rays, for parameters that have one per ray."""
 
     def part(value: Any) -> Any:
         if isinstance(value, tuple):
@@ -301,7 +302,7 @@ def _part(subject: Subject, rows: np.ndarray, count: int) -> Subject:
 
 
 def _row(subject: Subject, row: int, count: int) -> Subject:
-    """The subject with the values of one ray as numbers."""
+    """The subject with the parameter values of one ray, as numbers."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, tuple):
@@ -318,8 +319,8 @@ def _row(subject: Subject, row: int, count: int) -> Subject:
 
 
 def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
-    """Whether a weight or a thickness fades out: near 0, values come close to those at 0. No more is known of a
-    material that declares no limits."""
+    """Check that a weight or a thickness fades out: values near 0 are close to those at 0. Nothing else can be tested
+    for a material that declares no limits."""
     names = [axis for axis in ranges.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:

@@ -18,11 +18,11 @@ from .base import Law, pair_in_words, pairs, relative, worst_of
 
 EXACT, SINGLE = 1e-9, 1e-4
 GRAYS = (0.125, 0.3125, 0.5, 0.875)  # colors at which values are compared
-POWERS = np.geomspace(0.2, 6.0, 4001)  # of a color that values may follow
+POWERS = np.geomspace(0.2, 6.0, 4001)  # exponents of a color that values may follow
 
 
 class Linearity(Law):
-    """eval is affine in each albedo, eval(c a + (1-c) b) = c eval(a) + (1-c) eval(b), and a mix is the mix of values.
+    """eval is affine in each albedo, eval(c a + (1-c) b) = c eval(a) + (1-c) eval(b), and mixes mix values.
 
     An albedo is a spectrum that is declared to lie in [0, 1].
     """
@@ -49,7 +49,7 @@ class Linearity(Law):
         for label, case, a, b in cases:
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
             if size > tolerance and case != label:
-                # as where one layer dims another by its brightest channel
+                # for example if one layer attenuates another by its brightest channel
                 notes.append(f"{label} is not linear between two colors: off by {size:.2g}")
                 continue
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi, effort.full):
@@ -93,7 +93,7 @@ class Linearity(Law):
 
 
 def _power_of(rows: np.ndarray) -> float | None:
-    """The p other than 1 for which all pairs follow a + b x^p, from values at GRAYS (4, N); None if there is none.
+    """The exponent p != 1 for which all pairs follow a + b x^p, from values at GRAYS (4, N); None if there is none.
 
     a and b, which differ from pair to pair, cancel in the ratio of two differences of values.
     """
@@ -103,7 +103,7 @@ def _power_of(rows: np.ndarray) -> float | None:
         return None
     begin, *between, end = np.power.outer(np.asarray(GRAYS), POWERS)
     powers = []
-    for row, ratio in zip(inner, ((x - begin) / (end - begin) for x in between), strict=True):  # ratios fall with p
+    for row, ratio in zip(inner, ((x - begin) / (end - begin) for x in between), strict=True):  # they decrease with p
         powers.append(np.interp((first - row)[lit] / (last - first)[lit], -ratio, POWERS))
     power = float(np.median(powers[0]))
     same = all(np.percentile(np.abs(each / power - 1.0), 97.0) < SPREAD for each in powers)
@@ -111,7 +111,7 @@ def _power_of(rows: np.ndarray) -> float | None:
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
-    """Values that should be equal: at an albedo between two others, and of a mix, against the interpolation."""
+    """Values that should be equal: at an albedo between two others, and of a mix, each with its interpolation."""
 
     def between(name: str, a: Value, b: Value) -> severity.Pair:
         low, high = subject.replace(**{name: a}), subject.replace(**{name: b})
@@ -121,7 +121,7 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
 
     names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
     cases = {name: between(name, 0.125, 0.875) for name in names}
-    # a mean of the channels, or a difference of two, is linear in gray values
+    # a mean of the channels, or a difference of two, is linear in gray values: only colors reveal it
     cases |= {f"{name}: in color": between(name, *COLORS) for name in names}
     if isinstance(subject.model, BSDF):
         other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
@@ -137,8 +137,8 @@ COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
 
 def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given: bool) -> bool:
     """Whether light is reflected once, twice, and so on by this albedo, or passes a layer of this reflectance several
-    times: see `statistics.is_power_series` and `is_dimmed`. At other than the given values of the other colors the
-    first power may be absent: what meets a black part once is lost."""
+    times: see `statistics.is_power_series` and `is_dimmed`. If the other colors do not have their given values, the
+    first power may be absent: light that hits a black part once is lost."""
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
     noise = 1e-9 if subject.best == "float64" else 1e-4
     return statistics.is_power_series(rows, noise, first_power=given) or statistics.is_dimmed(rows, noise)

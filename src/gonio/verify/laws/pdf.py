@@ -20,8 +20,8 @@ from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, angles, pair_in_words, pairs, where_found
 
-# No simple fraction is the cosine or the square of the sine of these angles: the steps of a material often lie there,
-# where the two precisions may be on different sides.
+# The cosines and squared sines of these angles are not simple fractions: steps of a material often lie there, where the
+# two precisions may take different sides.
 ABOVE = (
     (0.0, 0.0),
     (12.0, 20.0),
@@ -33,12 +33,12 @@ ABOVE = (
     (89.5, 250.0),
 )
 BELOW = ((180.0, 0.0), (155.0, 70.0), (139.0, 190.0), (124.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
-OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for Fresnel's term
-FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for an accuracy of a percent
-PAIRS = 1 << 13  # of directions, to find a cause
-EXCESS = 1e-3  # of int pdf over 1
-SUPPORT = 1e-4  # share of light where the pdf is 0
-MIN_LIGHT = 1e-3  # mean value against which that share is measured
+OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the second for the Fresnel term
+FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for an accuracy of one percent
+PAIRS = 1 << 13  # pairs of directions used to find a cause
+EXCESS = 1e-3  # tolerated excess of int pdf above 1
+SUPPORT = 1e-4  # tolerated fraction of light where the pdf is 0
+MIN_LIGHT = 1e-3  # smallest mean value relative to which that fraction is measured
 
 
 class Pdf(Law):
@@ -69,7 +69,7 @@ class Pdf(Law):
                 where = f"{name + ': ' if name else ''}wo at {angles(wo)} degrees"
                 for kind, p in tested.outcome._asdict().items():
                     finding.trials.append(Trial(p, f"{_KINDS[kind]}, {where}", _Repeat(part, wo, kind, effort, seed)))
-                    # of several p-values of 0, that with the most misplaced samples
+                    # among several p-values of 0, the one with the most misplaced samples
                     off = float(np.abs((cells.expected - cells.observed).sum((1, 2))).max()) / cells.drawn
                     if p < lowest or (p == lowest == 0.0 and off > misplaced):
                         lowest, misplaced, finding.evidence = p, off, cells
@@ -138,14 +138,14 @@ class Pdf(Law):
                 yield Cause(note, "pdf where no sample occurs")
 
 
-ALL, LACKING = 0.995, 0.03  # shares of the samples: that do not fail, and that the pdf lacks
-MISSING = 0.01  # share of the samples that the pdf predicts and that do not occur
-STEEP = 0.7  # ratio of what the pdf lacks near the normal to what it lacks at an oblique view
+ALL, LACKING = 0.995, 0.03  # least fraction of samples that do not fail, and of samples that the pdf lacks
+MISSING = 0.01  # largest fraction of samples that the pdf predicts but that do not occur
+STEEP = 0.7  # largest ratio of the pdf's deficit near the normal to its deficit at an oblique view
 
 
 def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[Cause]:
-    """No sample fails, and the pdf predicts too few, the fewer the more oblique the view; nowhere does it predict too
-    many."""
+    """Yield a cause if no sample fails and the pdf predicts too few, with a deficit that grows with the angle of the
+    view, but nowhere too many."""
     above = [tested for tested in tests if tested.wo[2] > 0.0]
     if len(above) < 2 or min(tested.cells.observed.sum() / tested.cells.drawn for tested in above) < ALL:
         return
@@ -161,7 +161,7 @@ def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[C
 
 
 def _missing(cells: SampleCells) -> float:
-    """Share of the samples that the pdf predicts where significantly fewer fall."""
+    """Fraction of samples that the pdf predicts in excess of those observed, where the excess is significant."""
     held = crowding.blocks(cells)
     if held is None:
         return 1.0
@@ -169,14 +169,14 @@ def _missing(cells: SampleCells) -> float:
     return float(np.maximum(expected - held.observed - 4.0 * np.sqrt(expected), 0.0).sum() / held.drawn)
 
 
-SWEEP = 512  # values of one number
+SWEEP = 512  # values of one random number
 TRIALS = 32  # values of the other two
-JUMP = 0.2  # of a direction from one value to the next: another lobe
-STILL = 1e-7  # of a direction, that has not moved
+JUMP = 0.2  # change of a direction from one value to the next that means another lobe
+STILL = 1e-7  # change of a direction that counts as none
 
 
 def _swept(subject: Subject, wo: np.ndarray, dimension: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (TRIALS, SWEEP, 3) of samples while one number runs through [0, 1), and which of them are smooth."""
+    """Sampled directions (TRIALS, SWEEP, 3) as one random number sweeps [0, 1), and which of them have a density."""
     u = np.repeat(directions.numbers(np.random.default_rng([seed, 45]), TRIALS), SWEEP, axis=0)
     u[:, dimension] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
     s = subject.sample(np.repeat(wo, len(u), axis=0), u)
@@ -184,15 +184,15 @@ def _swept(subject: Subject, wo: np.ndarray, dimension: int, seed: int) -> tuple
 
 
 def _parts(wi: np.ndarray) -> list[slice]:
-    """The parts of a sweep between values at which most directions jump: the choice of another lobe."""
+    """The parts of a sweep between values at which most directions jump because another lobe is chosen."""
     jumps = (np.abs(np.diff(wi, axis=1)).max(2) > JUMP).mean(0) > 0.7
     ends = [0, *(np.flatnonzero(jumps) + 1), wi.shape[1]]
     return [slice(first, last) for first, last in itertools.pairwise(ends)]
 
 
 def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
-    """The ends of [0, 1), or of a lobe's part of it, at which a number does not move the direction that it moves
-    elsewhere, in words."""
+    """A description of the ends of [0, 1), or of a lobe's part of it, at which a random number does not move the
+    direction although it does elsewhere; "" if there are none."""
     for dimension, name in enumerate(("first", "second", "third")):
         wi, fine = _swept(subject, wo, dimension, seed)
         for part in _parts(wi):
@@ -213,8 +213,9 @@ def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
 
 
 def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
-    """Whether u.x chooses a lobe and then directs it as if it still had all of [0, 1): over its part the azimuth covers
-    less than 2 pi, or the polar angle does not reach the middle of the lobe, which is at one end of [0, 1)."""
+    """Whether u.x chooses a lobe and then, without being remapped to [0, 1), its direction: over the lobe's part of
+    [0, 1), the azimuth covers less than 2 pi, or the polar angle does not reach the middle of the lobe, which is at one
+    end of [0, 1)."""
     wi, fine = _swept(subject, wo, 0, seed)
     if _misses_the_middle(wo[0], wi, fine):
         return True
@@ -231,13 +232,13 @@ def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
     return short > 0.8 * TRIALS
 
 
-ASIDE = np.cos(np.radians(8.0))  # from the middle of a lobe
-MOVED = np.radians(10.0)  # of the polar angle over a part
+ASIDE = np.cos(np.radians(8.0))  # cosine of the angle beyond which a direction is not near the middle of a lobe
+MOVED = np.radians(10.0)  # smallest change of the polar angle over a part
 
 
 def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool:
-    """Whether u.x moves a lobe's polar angle over its part of [0, 1), and no end of the part is near the lobe's middle:
-    the normal, the mirror direction, or the normal as the half vector."""
+    """Whether u.x changes a lobe's polar angle over its part of [0, 1), but never comes near the lobe's middle: the
+    normal, the mirror direction, the normal as the half vector, or wo."""
     m = wi + wo
     m = m / np.maximum(np.linalg.norm(m, axis=-1, keepdims=True), 1e-9)
     cosines = [wi[..., 2], np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1), np.abs(m[..., 2]), np.sum(wi * wo, axis=-1)]
@@ -261,7 +262,7 @@ _KINDS = {
 
 
 class _Repeat:
-    """The same test with another seed: other cells, other samples."""
+    """A test repeated with another seed: other cells, other samples."""
 
     def __init__(self, subject: Subject, wo: np.ndarray, kind: str, effort: Effort, seed: int) -> None:
         self.subject, self.wo, self.kind, self.effort, self.seed = (subject, wo, kind, effort, seed)
@@ -272,7 +273,7 @@ class _Repeat:
 
 
 def _widths(subject: Subject, effort: Effort) -> list[float]:
-    """Other values of alpha, if there is such a parameter."""
+    """Other values of alpha to test, if there is such a parameter."""
     parameter = subject.parameters.get("alpha")
     if parameter is None or parameter.kind not in ("alpha", "float"):
         return []
@@ -316,14 +317,14 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
 
 
 def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
-    """Positive eval at pdf = 0 is light that sampling never reaches."""
+    """Check that pdf > 0 where eval > 0: sampling never reaches light elsewhere."""
     if not subject.has_density:
         return
     wo, wi = pairs(subject, effort.pairs, seed)
     value, pdf = (subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best))
     wanting = (value > 0.0) & ~(pdf > 0.0)
     total = float(np.sum(value[np.isfinite(value)]))
-    # a density of a millionth is negligible against a delta lobe, which carries the light
+    # a density of a millionth is negligible compared with a delta lobe, which carries the light
     total = max(total, MIN_LIGHT * len(value))
     share = float(np.sum(value[wanting & np.isfinite(value)])) / total
     if np.any(pdf < 0.0):

@@ -24,11 +24,11 @@ from .base import Law, pair_in_words, pairs, where_found
 THETA = (0.0, 1e-3, 1.0, 30.0, 60.0, 89.0, 89.9, 89.99, 89.9999, 90.0)
 PHI = (0.0, 90.0, 137.0, 180.0)
 CORNERS = (0.0, 1e-7, 0.5, 0.99999994)  # of random numbers; the last is the largest float32 below 1
-NEGATIVE = 1e-6  # of the largest value: float32 sums with cancellation end this far below 0
+NEGATIVE = 1e-6  # fraction of the largest value by which float32 sums with cancellation may fall below 0
 
 
 class Positivity(Law):
-    """eval, pdf and weight are finite and >= 0, and the gradients finite, to 89.9999 degrees and at extremes."""
+    """eval, pdf and weight are finite and >= 0, and gradients finite, to 89.9999 degrees and at extreme parameters."""
 
     number = 1
     name = "positivity"
@@ -44,7 +44,7 @@ class Positivity(Law):
             reason="none is allowed",
             notes=[f"{len(variants)} settings: the given one and the ends of each range"],
         )
-        declared = "positivity" in subject.breaches  # measured noise around 0: its size is a share of the largest value
+        declared = "positivity" in subject.breaches  # measured noise around 0: relative to the largest value
         checked = 0
 
         def fails(text: str, suffix: str, a: np.ndarray, b: np.ndarray, changed: dict[str, Any]) -> None:
@@ -163,7 +163,7 @@ _FAULTS = {"not finite": lambda values: ~np.isfinite(values), "negative": lambda
 def _drawn(
     subject: Subject, effort: Effort, seed: int, precision: Precision
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """The checked quantities but eval: name, values (n, channels), and random numbers if they are of samples."""
+    """The checked quantities except eval: name, values (n, channels), and random numbers if they are of samples."""
     wo, wi, u = _grid(subject, effort, seed)
     for what, values, _, _, rows in _values(subject, wo, wi, u, precision):
         if what not in ("eval", "wi"):
@@ -173,7 +173,7 @@ def _drawn(
 
 
 def _exact_places(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Directions at which formulas divide by 0."""
+    """Directions at which formulas divide by 0, each as a name and a mask of the rows."""
     normal = [np.hypot(w[:, 0], w[:, 1]) == 0.0 for w in (wo, wi)]
     level = [w[:, 2] == 0.0 for w in (wo, wi)]
     equal, opposite = np.all(wo == wi, axis=1), np.all(wo == -wi, axis=1)
@@ -214,7 +214,7 @@ def _batches(
     if isinstance(subject.model, BSDF) and columns:
         try:
             together = subject.replace(**columns)
-            # a guide of its own, for parameters that vary, takes seconds; signs do not depend on it
+            # a guide for parameters that vary takes seconds to compute; signs do not depend on it
             guide_search.lend(subject.sampler.model, together.model)
             probe = directions.at(np.full(len(changes) * count, 30.0), 10.0)
             together.eval(probe, probe)
@@ -225,7 +225,7 @@ def _batches(
 
 
 def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs: extreme angles on both sides, also where it has no values, and random ones."""
+    """Pairs, at extreme angles on both sides, even a side without values, and at random; and random numbers."""
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
@@ -246,23 +246,23 @@ def _values(
     rows = np.arange(len(wo))
     yield "eval", subject.eval(wo, wi, precision=precision), wo, wi, rows
     if subject.drawn_by is not None:
-        return  # pdf and samples are those of a guide, whose weights are eval over its own density
+        return  # pdf and samples are those of a guide, whose weights are eval divided by its own density
     yield "pdf", subject.pdf(wo, wi, precision)[:, None], wo, wi, rows
     s = subject.sample(wo, u, precision=precision)
     shown = np.where(np.isfinite(s.wi), s.wi, 0.0)
     yield "weight", s.weight, wo, shown, rows
     yield "a sample's pdf", s.pdf[:, None], wo, shown, rows
-    yield "wi", s.wi, wo, shown, rows  # of failed samples too: a renderer derives rays and derivatives from them
+    yield "wi", s.wi, wo, shown, rows  # also of failed samples: a renderer derives rays and derivatives from them
 
 
 def _own_axes(subject: Subject) -> list[ranges.Axis]:
-    """The ranges of its own parameters, without angles."""
+    """The ranges of the subject's own parameters, except angles."""
     return [axis for axis in ranges.axes(subject) if axis.path in subject.parameters and axis.kind != "angle"]
 
 
 def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
-    """The subject with all parameters at the low, or at the high, ends of their ranges. Arrays with both of them need
-    the code of all parts, so that all other values share their kernels."""
+    """The subject with all parameters at the low ends, and with all at the high ends, of their ranges. Arrays with both
+    of them need the code of all parts, so that all other values share their kernels."""
     corners = []
     for end in ("low", "high"):
         values = {axis.path: getattr(axis, end) for axis in _own_axes(subject)}
@@ -289,7 +289,7 @@ def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
 
 
 def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tuple[str, int]]:
-    """Parameters for which the gradient of the summed values is not finite, each with a row."""
+    """Parameters for which the gradient of the summed values is not finite, each with the row at fault."""
     dr = backend.drjit()
     kind = backend.types("float32")
     leaves: dict[str, list[Any]] = {}
@@ -297,7 +297,7 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     def watched(parameter: Any, value: Any) -> Any:
         bound = parameter.bind(value, kind)
         if bound is not None and backend.is_drjit(bound):
-            # one entry per ray, so that the gradient tells which
+            # one entry per ray, so that the gradient identifies the ray
             bound = bound + dr.zeros(kind.float, len(wo))
             dr.enable_grad(bound)
             leaves.setdefault(parameter.name, []).append(bound)
@@ -314,7 +314,7 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     dr.backward(dr.sum(dr.sum(value, axis=0)))
     bad = []
     gradients = {name: [dr.grad(bound) for bound in bounds] for name, bounds in leaves.items()}
-    dr.eval(gradients)  # together: each alone would be a kernel, most of it the same
+    dr.eval(gradients)  # together: separate kernels would be nearly the same
     for name, each in gradients.items():
         for one in each:
             gradient = np.asarray(one.numpy())

@@ -72,7 +72,7 @@ class Precision(Law):
         noise = rounding(lambda a, b: subject.eval(a, b), wo, wi)
         bad = relative(single, exact, noise, 1e-6 * float(np.percentile(np.abs(exact), 99.0))).max(1) > TOLERANCE
         place = place_of(wo, wi, bad)
-        # of a product or a power, one part too large may make the whole 0, infinite or NaN
+        # a factor of a product or a power that overflows may make the whole 0, infinite or NaN
         lost = ~np.isfinite(single) | ((single == 0.0) & (exact != 0.0))
         if bad.any() and lost.any(1)[bad].mean() > 0.5:
             words = "float32 is 0 or not finite where float64 has a value" + (f", {place}" if place else "")

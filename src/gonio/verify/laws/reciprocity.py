@@ -17,11 +17,11 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 
 EXACT = 1e-6
 SINGLE = 2e-3
-STEPS = 24  # of the map, per angle
+STEPS = 24  # steps of the map per angle
 EVEN = 512  # pairs of angles
 REPEATS = 4096  # values of a stochastic model per pair
 PERTURBATION = 1e-5  # radians
-PAIRS = 1 << 13  # of directions, to find a cause
+PAIRS = 1 << 13  # pairs of directions used to find a cause
 
 
 class Reciprocity(Law):
@@ -42,7 +42,7 @@ class Reciprocity(Law):
             return self._expected(subject, effort, seed, eta)
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
-        # f divides by the cosine: within 0.006 degrees of grazing only rounding is left
+        # f divides by the cosine: within 0.006 degrees of the horizon, only rounding error is left
         keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
         wo, wi = wo[keep], wi[keep]
         error = _difference(subject, wo, wi, eta, exact)
@@ -93,7 +93,7 @@ class Reciprocity(Law):
             yield Cause(f"{words}: {guess}?", "one direction of a base")
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
-        """A stochastic model: means over many values per pair, both ways."""
+        """The finding for a stochastic model: means over many values per pair, in both orders of the directions."""
         wo, wi = pairs(subject, 96, seed)
         keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 0.02  # f divides by the cosine
         wo, wi = wo[keep][:24], wi[keep][:24]
@@ -121,7 +121,7 @@ class Reciprocity(Law):
 
 
 def _difference_is_even(subject: Subject, seed: int) -> bool:
-    """Whether f(wo, wi) - f(wi, wo) depends on the two angles to the normal alone."""
+    """Whether f(wo, wi) - f(wi, wo) depends only on the two angles to the normal."""
     rng = np.random.default_rng([seed, 7])
     theta = rng.uniform(2.0, 88.0, (2, EVEN))
     off = []
@@ -134,10 +134,10 @@ def _difference_is_even(subject: Subject, seed: int) -> bool:
 
 
 def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed: int) -> float | None:
-    """Mean of f(wo, wi) - f(wi, wo), in standard errors; None where both are 0.
+    """Mean of f(wo, wi) - f(wi, wo), in standard errors; None if both are 0.
 
-    The random numbers of a model may be a hash of its directions: each row gets another `seed` if the model has one;
-    otherwise the directions are perturbed slightly, equally for both ways.
+    The random numbers of a model may be a hash of its directions. Each row therefore gets another `seed` if the model
+    has one; otherwise the directions are perturbed slightly, equally in both orders.
     """
     a, b = (np.tile(w, (REPEATS, 1)) for w in (wo, wi))
     if "seed" in subject.parameters:
@@ -157,7 +157,7 @@ def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed
 
 
 def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
-    """Whether the law holds with another eta than that of the samples."""
+    """Whether the law holds with an eta other than that of the samples."""
     exact = subject.best == "float64"
     wo, wi = pairs(subject, PAIRS, seed, exact)
     keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
@@ -165,7 +165,7 @@ def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
 
 
 def _eta(subject: Subject, seed: int) -> float:
-    """Index below over index above, by the model's own samples; 1 if nothing is transmitted."""
+    """Index below divided by index above, by the model's own samples; 1 if nothing is transmitted."""
     if not subject.transmits:
         return 1.0
     rng = np.random.default_rng([seed, 4])
@@ -187,7 +187,7 @@ def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, ex
     scale = _scale(wo, wi, eta)[:, None]
     there, back = subject.f(wo, wi) * scale, subject.f(wi, wo)
     if exact:
-        # a billionth of the largest value is as good as 0
+        # a billionth of the largest value counts as 0
         floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
         return relative(there, back, 0.0, floor)
     noise = rounding(lambda a, b: subject.f(a, b) * _scale(a, b, eta)[:, None], wo, wi) + rounding(subject.f, wi, wo)

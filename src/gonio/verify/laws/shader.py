@@ -1,4 +1,4 @@
-"""Shader code: what is written as text and read again has the values of the material."""
+"""Shader code: written as text and read back, it has the values of the material."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .base import Law, pair_in_words, pairs
 if TYPE_CHECKING:
     from ...shaders import read_back
 
-SHOWN = 8  # parameters of the worst case
-PAIRS = 2048  # thresholds such as alpha < 1e-4 need some
-TOLERANCE = 1e-12  # most values are equal in all bits
+SHOWN = 8  # parameters shown for the worst case
+PAIRS = 2048  # enough to reach both sides of thresholds such as alpha < 1e-4
+TOLERANCE = 1e-12  # most values are bit-identical
 
 
 class Shader(Law):
-    """The shader code of a material, read again, gives the material's values in 64 bits: GLSL, HLSL and WGSL."""
+    """The shader code of a material, read back, gives the material's values in 64 bits: GLSL, HLSL and WGSL."""
 
     number = 13
     on_request = True
@@ -38,7 +38,7 @@ class Shader(Law):
         model = subject.model
         if not isinstance(model, BSDF):
             raise DoesNotApply("it is no material of Gonio's, and no shader code is written from it")
-        from ...shaders.program import FUNCTIONS, check  # imported late: 0.1 s, and this law is tried on request
+        from ...shaders.program import FUNCTIONS, check  # imported late: 0.1 s, and this law is tested on request only
 
         try:
             check(model, FUNCTIONS, "shader")
@@ -85,7 +85,7 @@ def _add(
     inputs: tuple[np.ndarray, ...],
     fields: dict[str, np.ndarray],
 ) -> None:
-    """Make a difference the finding's worst."""
+    """Record a difference as the finding's worst."""
     finding.figure = max(finding.figure, worst.figure)
     wo, wi, u = (rows[worst.row] for rows in inputs)
     place = f"u = {np.round(u, 4)}" if worst.function == "sample" else pair_in_words(wo, wi)
@@ -96,7 +96,7 @@ def _add(
 
 
 def languages(finding: Finding) -> list[str]:
-    """The languages that can be read here: without a compiler WGSL alone, and the law cannot pass."""
+    """The languages that can be read back here: without a compiler, WGSL only, and the law cannot pass."""
     from ...shaders import read_back
     from ...spirv.compiler import compiler
 

@@ -17,11 +17,11 @@ from .base import Law, beyond_rounding, pair_in_words, relative, worst_of
 
 EXACT = 1e-10
 SINGLE = 2e-3
-LOBE = 1e4  # 1/sr; larger values and densities are those of a lobe of a degree at most
+LOBE = 1e4  # 1/sr; larger values and densities are those of a lobe no wider than a degree
 ENDS = (0.0, 1.0 - 2.0**-24)  # of a random number
-EVERY = 64  # samples, one of which has a certain number at a certain end
-ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
-PAIRS = 1 << 13  # samples, to find a cause
+EVERY = 64  # samples, one of which has a given random number at a given end
+ASIDE = 3e-5  # radians: a tenth of the width of the narrowest lobe, and hundreds of float32 ulps
+PAIRS = 1 << 13  # samples used to find a cause
 
 
 class Weight(Law):
@@ -97,7 +97,7 @@ class Weight(Law):
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
-            if "is allowed" not in convention:  # the verdict already states the figure
+            if "is allowed" not in convention:  # the verdict already states the measured value
                 yield Cause(convention, convention)
 
     def _at(
@@ -107,7 +107,7 @@ class Weight(Law):
         worst, where, wi = 0.0, 0, wo[0]
         for mode in modes:
             s = subject.sample(wo, u, mode, precision)
-            # at the ends of random numbers a density may underflow to 0 in float32, and the quotient of two need not
+            # at the ends of the random numbers, a density may underflow to 0 in float32, but not a quotient of two
             inner = np.all((u > ENDS[0]) & (u < ENDS[1]), axis=1) | (precision == "float64")
             _conventions(s, inner, problems, precision)
             unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-2  # other directions are rejected
@@ -158,7 +158,7 @@ class Weight(Law):
 
 
 def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precision) -> np.ndarray:
-    """Whether a change of wi by a few roundings makes the value or the pdf vanish, or appear."""
+    """Whether a change of wi by a few float32 ulps makes the value or the pdf vanish, or appear."""
     rng = np.random.default_rng(8)
     moved = np.concatenate([wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape) for _ in range(6)])
     many = np.tile(wo, (6, 1))
@@ -169,9 +169,10 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 
 
 def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
-    """ "clamped to at most 1" where weights (N, channels) that differ from the right ones have one value; else "".
+    """A description such as "clamped to at most 1" if all weights (N, channels) that differ from the correct ones have
+    one value; else "".
 
-    name  of the right ones
+    name  of the correct weights
     """
     if not len(weight):
         return ""
@@ -201,14 +202,14 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
     wo = directions.uniform(rng, count)
     wo[:, 2] = np.abs(wo[:, 2]) * rng.choice(np.array(subject.sides or (1,)), count)
     u = directions.numbers(rng, count)
-    for number, (which, end) in enumerate(itertools.product(range(3), ENDS)):  # where inversions divide by 0 or end
+    for number, (which, end) in enumerate(itertools.product(range(3), ENDS)):  # where inversions may divide by 0
         u[number::EVERY, which] = end
     return directions.single(wo), u
 
 
 def _conventions(s: object, inner: np.ndarray, problems: list[str], precision: Precision) -> None:
-    """Failed samples have weight 0, in the rows `inner`; the others have unit directions; probabilities are at most
-    1."""
+    """Check that failed samples have weight 0, in the rows `inner`, that the others have unit directions, and that
+    probabilities are at most 1."""
     pdf, weight, wi, delta = s.pdf, s.weight, s.wi, s.delta  # type: ignore[attr-defined]
     good = pdf > 0.0
     wrong = []
@@ -224,7 +225,7 @@ def _conventions(s: object, inner: np.ndarray, problems: list[str], precision: P
 
 
 def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> Finding:
-    """A stochastic model: E[weight g(wi)] under `sample` against E[eval g(wi) / pdf] at the same directions."""
+    """The finding for a stochastic model: mean weight under `sample` against mean eval / pdf at the same directions."""
 
     def p_value(seed: int) -> float:
         wo, u = _drawn(subject, 16 * effort.pairs, seed)
@@ -234,7 +235,7 @@ def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> 
         difference = s.weight[good].mean(1) - value / s.pdf[good]
         if not len(difference):
             return 1.0
-        # where both use the same random number, only rounding is left
+        # where both use the same random number, only rounding error is left
         noise = float(np.hypot(difference.std() / np.sqrt(len(difference)), 1e-6 * s.weight[good].mean()))
         return statistics.normal_two_sided(difference.mean() / noise) if noise > 0.0 else 1.0
 

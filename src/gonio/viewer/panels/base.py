@@ -18,8 +18,8 @@ class Panel:
             name = "grazing"         # its code is grazing.js, in the folder of the file with this class
 
     The code calls `gonio.addPanel({id, title, mount(host, app), ...})`; web/src/panel.ts defines its members and
-    arguments. It runs in the page, also in files written by `--export`: only installed packages and programs that
-    register one can add panels, never a scene or a link.
+    arguments. It runs in the page and in files written by `--export`. Only installed packages, and programs that
+    register one, can add panels, never a scene or a link.
 
     script  the JavaScript file, if its name differs from that of the panel
     """
@@ -33,7 +33,7 @@ Panel.family = Family("panel", "gonio.panels", (__package__,), subclasses_of(Pan
 
 
 def scripts() -> tuple[str, ...]:
-    """The code of every panel, in alphabetical order of their names; InputError if a file is missing."""
+    """The code of every panel, in alphabetical order of their names. Raises InputError if a file is missing."""
     return tuple(
         _read(Path(inspect.getfile(panel)).parent / (panel.script or f"{name}.js"))
         for name, panel in Panel.family.all().items()

@@ -1,12 +1,12 @@
-"""Adapters to the shaders of engines: a folder per engine, which holds no text of the engine.
+"""Adapters to the shaders of engines: one folder per engine, which contains no text of the engine.
 
     adopt_package("node_modules/three", "three")     writes three-standard.glsl, its adapter, and the tables it reads
 
 A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
 of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`). An engine that is not
-on npm is recognized by a file of its repository (`MARK`). `replaced` states words of the adapters that depend on the
-release, such as which arguments a function takes. Shaders that an engine's JavaScript writes are had by running it
-(`generated`), only if asked for.
+on npm is recognized by a file of its repository (`MARK`). `replaced` returns replacements of words in the adapters that
+depend on the release, such as the arguments that a function takes. Shaders that an engine's JavaScript writes are
+obtained by running it (`generated`), only on request.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
 class Engine(NamedTuple):
     """An engine: the name of its package on npm, our programs, and its tables by file name.
 
-    mark       of an engine that is not on npm: a file of its repository, by which a checkout is recognized
-    replaced   words of the adapters that depend on what the package holds
-    generated  of an engine with a build whose shaders its JavaScript writes: shaders and adapters by file name
+    mark       for an engine that is not on npm: a file of its repository, by which a checkout is recognized
+    replaced   replacements of words in the adapters that depend on the package's contents
+    generated  for an engine with a build whose JavaScript writes shaders: shaders and adapters by file name
     """
 
     package: str
@@ -45,9 +45,9 @@ class Engine(NamedTuple):
 
 
 class Package(NamedTuple):
-    """A package that a user has: its name and version by its package.json, and its folder.
+    """A user's package: its name and version from its package.json, and its folder.
 
-    A checkout has the name of its engine, and no version.
+    A checkout has the name of its engine and no version.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Package(NamedTuple):
 
 
 def engines() -> dict[str, Engine]:
-    """All engines by the names of their packages."""
+    """All engines, by the names of their packages."""
     modules = [importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__)]
     return {
         one.PACKAGE: Engine(
@@ -72,37 +72,37 @@ def engines() -> dict[str, Engine]:
 
 
 def package_in(folder: str | os.PathLike[str]) -> Package:
-    """The package or checkout in a folder. Raises InputError if none of an engine is there."""
+    """The package or checkout of an engine in a folder. Raises InputError if there is none."""
     place = Path(os.path.expanduser(folder))
     for engine in engines().values():
         if engine.mark and (place / engine.mark).is_file():
             return Package(engine.package, "", place)
     path = place / "package.json"
-    hint = f"the folder of {', '.join(engines())}, such as node_modules/three"
+    hint = f"give the folder of {', '.join(engines())}, such as node_modules/three"
     try:
         if path.stat().st_size > MAX_DESCRIPTION:
-            raise InputError(f"over {MAX_DESCRIPTION >> 20} MB", str(path), hint)
+            raise InputError(f"larger than {MAX_DESCRIPTION >> 20} MB", str(path), hint)
         about = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"no package.json that can be read: {error.strerror}", str(folder), hint) from None
+        raise InputError(f"its package.json cannot be read: {error.strerror}", str(folder), hint) from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"its package.json is no JSON: {error}", str(folder), hint) from None
+        raise InputError(f"its package.json is not valid JSON: {error}", str(folder), hint) from None
     name = about.get("name") if isinstance(about, dict) else None
     if name not in engines():
-        raise InputError(f"no adapter to the package '{name}'", str(folder), hint)
+        raise InputError(f"no adapter for the package '{name}'", str(folder), hint)
     return Package(name, str(about.get("version", "")), path.parent)
 
 
 def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str], *, tsl: bool = False) -> list[Path]:
-    """Write the materials of a package of an engine into a folder: each a .glsl or .wgsl with its adapter.
+    """Write the materials of an engine's package into a folder: each a .glsl or .wgsl with its adapter.
 
-    folder  the package as npm installs it, such as node_modules/three, or a checkout of an engine that is not on npm;
+    folder  the package as installed by npm, such as node_modules/three, or a checkout of an engine that is not on npm;
             it is read again whenever a material is used
-    target  the folder to write, made if missing; the shaders name the package relative to it
+    target  the folder to write, created if missing; the shaders refer to the package relative to it
     tsl     whether to add the materials of three.js's TSL build, for which Node runs the package's JavaScript; they are
-            written as they are now, and do not change with the package
-    Returns the shaders, one per material. Raises InputError if the package is none that Gonio knows, or has no TSL
-    build that can be read; MachineError without Node.
+            snapshots, which do not change with the package
+    Returns the shaders, one per material. Raises InputError if Gonio has no adapters for the package, or if its TSL
+    build is missing or cannot be read; MachineError without Node.
     """
     package = package_in(folder)
     engine = engines()[package.name]
@@ -110,7 +110,7 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
     words = engine.replaced(package.folder)
     tables = engine.tables(package.folder)
     if tsl and engine.generated is None:
-        raise InputError(f"'{package.name}' has no TSL build", "--tsl", "it is for three")
+        raise InputError(f"'{package.name}' has no TSL build", "--tsl", "only three has one")
     generated = engine.generated(package.folder) if tsl and engine.generated else {}
     there = os.path.relpath(package.folder.resolve(), place.resolve()).replace(os.sep, "/")
     place.mkdir(parents=True, exist_ok=True)

@@ -21,15 +21,15 @@ MAX_SIDE = 4096
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum, rows by roughness, columns by n.v: bias, their sum E, and the albedo of sheen.
+    """The table of the split sum, rows by roughness, columns by n.v: bias, scale + bias, and the albedo of sheen.
 
-    The PNG holds colors with a common divisor in alpha, which the engine expands to half floats when it loads.
+    The PNG stores colors with a common divisor in alpha, which the engine expands to half floats on loading.
     """
     try:
         text = (package / _TABLE).read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(
-            f"no table: {error.strerror}", str(package / _TABLE), "@babylonjs/core of 7 or later"
+            f"no table: {error.strerror}", str(package / _TABLE), "use @babylonjs/core 7 or later"
         ) from None
     match = _PICTURE.search(text)
     if match is None:
@@ -39,9 +39,9 @@ def tables(package: Path) -> dict[str, np.ndarray]:
     try:
         with Image.open(io.BytesIO(base64.b64decode(match[1])), formats=["PNG"]) as picture:
             if max(picture.size) > MAX_SIDE:
-                raise InputError(f"{picture.size[0]} x {picture.size[1]} texels", _TABLE, f"at most {MAX_SIDE}")
+                raise InputError(f"{picture.size[0]} x {picture.size[1]} texels", _TABLE, f"use at most {MAX_SIDE}")
             texels = np.asarray(picture.convert("RGBA"), np.float64) / 255.0
     except (binascii.Error, UnidentifiedImageError, OSError, ValueError, SyntaxError) as error:
-        raise InputError(f"a PNG that cannot be read: {error}", _TABLE, "the package may be cut off") from None
+        raise InputError(f"its PNG cannot be read: {error}", _TABLE, "the package may be truncated") from None
     expanded = texels[..., :3] ** _GAMMA / np.maximum(texels[..., 3:], 1.0 / 255.0)
     return {"environmentBrdf": expanded.astype(np.float16).astype(np.float64)}

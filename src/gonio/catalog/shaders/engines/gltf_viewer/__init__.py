@@ -1,4 +1,4 @@
-"""glTF-Sample-Viewer of the Khronos Group: its BRDFs under one lamp, from the bundle of its package."""
+"""The Khronos Group's glTF-Sample-Viewer: its BRDFs under one light, from the bundle in its package."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "@khronosgroup/gltf-viewer"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """None: its tables serve environments and sheen."""
+    """No tables: the viewer uses its own only for environments and sheen."""
     return {}

@@ -15,11 +15,11 @@ _SIZE, _SAMPLES = 128, 1024  # of integrate_dfg.glsl
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum that the renderer computes when it starts: scale, bias + scale, 0.
+    """The table of the split sum that the renderer computes when it starts: bias, scale + bias, 0.
 
-    Rows by falling roughness, columns by n.v. The integral and its points are those of Karis, "Real Shading in Unreal
-    Engine 4" (2013), with his masking for environments, k = alpha / 2; row y holds roughness (128 - y + 1/2) / 128,
-    which is a texel beyond the one that is read for it.
+    Rows by decreasing roughness, columns by n.v. The integral and its sample points are those of Karis, "Real Shading
+    in Unreal Engine 4" (2013), with his masking for environments, k = alpha / 2; row y is computed for roughness
+    (128 - y + 1/2) / 128, one texel more than the roughness for which it is read.
     """
     rows, columns = np.arange(_SIZE), np.arange(_SIZE)
     roughness, n_v = (_SIZE - rows + 0.5) / _SIZE, (columns + 0.5) / _SIZE
@@ -32,7 +32,7 @@ def tables(package: Path) -> dict[str, np.ndarray]:
         alpha = rough**2
         cosine = np.sqrt((1 - height) / (1 + (alpha**2 - 1) * height))
         sine = np.sqrt(1 - cosine**2)
-        # the tangent frame of integrate_dfg.glsl is turned by a quarter: t = (0, 1, 0), b = (-1, 0, 0)
+        # the tangent frame of integrate_dfg.glsl is rotated by a quarter turn: t = (0, 1, 0), b = (-1, 0, 0)
         half = np.stack([-np.sin(azimuth) * sine, np.cos(azimuth) * sine, cosine], axis=-1)
         v_h = view @ half.T
         n_l = np.clip(2 * v_h * cosine - n_v[:, None], 0, 1)
@@ -45,16 +45,16 @@ def tables(package: Path) -> dict[str, np.ndarray]:
 
 
 def replaced(package: Path) -> dict[str, str]:
-    """What the adapters' defines say of this checkout: which arguments its `light_compute` takes."""
+    """The defines in the adapters that depend on the checkout: the arguments that its `light_compute` takes."""
     path = package / MARK
     try:
         text, _ = functions_in(path.read_text(encoding="utf-8", errors="replace"), "light_compute", str(path))
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", str(path), "a checkout of Godot 4.3 or later") from None
+        raise InputError(f"cannot be read: {error.strerror}", str(path), "use Godot 4.3 or later") from None
     arguments = text.partition("{")[0]
     known = ["f0", "diffuse_light", "specular_light", "is_directional", "albedo"]
     if missing := [name for name in known if name not in arguments]:
-        raise InputError(f"light_compute has no argument {missing[0]}", str(path), "a checkout of Godot 4.3 or later")
+        raise InputError(f"light_compute has no argument {missing[0]}", str(path), "use Godot 4.3 or later")
     defined = {"half": "GODOT_HALF", "uint orms": "GODOT_PACKED", "screen_uv": "GODOT_SCREEN"}
     defined["energy_compensation"] = "GODOT_COMPENSATION"
     defines = [define for argument, define in defined.items() if argument in arguments]

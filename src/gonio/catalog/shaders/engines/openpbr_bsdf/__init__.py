@@ -1,4 +1,4 @@
-"""Adobe's openpbr-bsdf: its GLSL face with its tables as textures."""
+"""Adobe's openpbr-bsdf: its GLSL interface, with its tables as textures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .....errors import InputError
 PACKAGE = "openpbr-bsdf"
 MARK = "impl/openpbr_bsdf.h"
 SIZE = 32  # entries along each axis of a table
-UNORM = 65535.0  # what stands for 1 in the tables of energies
+UNORM = 65535.0  # the number that represents 1 in the energy tables
 MAX_BYTES = 4 << 20
 _ENERGIES = {
     "ideal_dielectric_energy_complement": 3,
@@ -28,7 +28,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE]-?\d+)?")
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The tables of energies, of 1 to 3 axes and one channel, and that of the fuzz, of 2 axes and three channels."""
+    """The energy tables, with 1 to 3 axes and one channel, and that of the fuzz, with 2 axes and three channels."""
     energies = {}
     for name, axes in _ENERGIES.items():
         shape = (*(SIZE,) * axes, 1) if axes > 1 else (1, SIZE, 1)  # the library reads its rows as textures of one row
@@ -37,14 +37,14 @@ def tables(package: Path) -> dict[str, np.ndarray]:
 
 
 def _numbers(package: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """The numbers of a header of data."""
+    """The numbers in a header file of data."""
     path = package / "impl" / "data" / f"openpbr_{name}_data.h"
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"over {MAX_BYTES >> 20} MB", str(path), "a table of openpbr-bsdf")
+            raise InputError(f"larger than {MAX_BYTES >> 20} MB", str(path), "use a table of openpbr-bsdf")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"no table: {error}", str(path), "a checkout of openpbr-bsdf with impl/data") from None
+        raise InputError(f"no table: {error}", str(path), "use a checkout of openpbr-bsdf with impl/data") from None
     words = _NUMBER.findall(_COMMENT.sub(" ", text))
     if len(words) != np.prod(shape):
         raise InputError(f"{len(words)} numbers, {np.prod(shape)} expected", str(path))

@@ -1,4 +1,4 @@
-"""three-gpu-pathtracer: its BSDF with the density and the sampling of its own."""
+"""three-gpu-pathtracer: its BSDF, with its own density and sampling."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "three-gpu-pathtracer"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """None: all its terms are formulas."""
+    """No tables: all its terms are formulas."""
     return {}

@@ -1,4 +1,4 @@
-"""PlayCanvas: the light of one lamp on its lit material, from the chunks of its GLSL."""
+"""PlayCanvas: its lit material under one light, from its GLSL chunks."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "playcanvas"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """None: its tables serve area lights and environments."""
+    """No tables: the engine uses its own only for area lights and environments."""
     return {}

@@ -15,11 +15,11 @@ _TABLE = "src/renderers/shaders/DFGLUTData.js"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum: rows by n.v, columns by roughness; half floats of scale and bias."""
+    """The table of the split sum, rows by n.v, columns by roughness: half floats of scale and bias."""
     try:
         text = (package / _TABLE).read_text(encoding="utf-8")
     except OSError as error:
-        raise InputError(f"no table: {error.strerror}", str(package / _TABLE), "three of 0.181 or later") from None
+        raise InputError(f"no table: {error.strerror}", str(package / _TABLE), "use three 0.181 or later") from None
     _, words = array_in(text, "DATA", _TABLE)
     size = round((len(words) / 2) ** 0.5)
     if len(words) != 2 * size * size or any(not 0 <= word < 1 << 16 for word in words):

@@ -1,9 +1,9 @@
-"""three.js's other build, TSL: materials whose WGSL the package's JavaScript writes when they are first drawn.
+"""The TSL build of three.js: materials whose WGSL the package's JavaScript writes when they are first drawn.
 
     generated(Path("node_modules/three"))     files by name: three-tsl-standard.wgsl, its adapter, ...
 
-`capture.mjs` runs in Node and prints the fragment programs of WebGPURenderer; here each becomes a function of two
-directions. Its adapter is the one to the WebGL build, which has the same parameters.
+`capture.mjs` runs in Node and prints the fragment programs of WebGPURenderer; this module turns each into a function of
+two directions. Its adapter is that of the WebGL build, which has the same parameters.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _GIVEN = {
     "v_positionViewDirection": "view",
     "v_tangentView": "vec3<f32>( 1.0, 0.0, 0.0 )",
 }
-_TANGENT = re.compile(r"nodeVarying\d+ : vec4<f32>")  # the tangent with its handedness, which has no name
+_TANGENT = re.compile(r"nodeVarying\d+ : vec4<f32>")  # the tangent with its handedness, an input without a name
 _END = """
 // By Gonio: a flat surface under a light of irradiance 1. On it the derivatives that three.js takes are 0.
 fn dpdx( direction : vec3<f32> ) -> vec3<f32> { return 0.0 * direction; }
@@ -49,7 +49,7 @@ def generated(package: Path, adapters: Path) -> dict[str, str]:
 
     package   the folder of three.js
     adapters  the folder of our adapters to the WebGL build
-    Raises InputError for a package whose programs cannot be had or read, MachineError without Node.
+    Raises InputError if the package's programs cannot be obtained or read, MachineError without Node.
     """
     files = {}
     for name, text in _programs(package / _BUILD).items():
@@ -63,13 +63,13 @@ def generated(package: Path, adapters: Path) -> dict[str, str]:
 def _programs(build: Path) -> dict[str, str]:
     """The fragment programs by material."""
     if not build.is_file():
-        raise InputError(f"no {_BUILD}", str(build.parents[1]), "three of npm has it; `npm run build` in a checkout")
+        raise InputError(f"no {_BUILD}", str(build.parents[1]), "npm's three has it; in a checkout, `npm run build`")
     if (node := shutil.which("node")) is None:
-        raise MachineError("TSL needs Node, and there is no node", "--tsl", f"install Node 20 or later, or {_WITHOUT}")
+        raise MachineError("TSL needs Node, which was not found", "--tsl", f"install Node 20 or later, or {_WITHOUT}")
     done = _run(node, build)
     if done.returncode:
         said = [line for line in done.stderr.splitlines() if re.match(r"\w*Error\b", line)] or done.stderr.split("\n")
-        raise InputError(f"its JavaScript ends with '{said[0][:200]}'", str(build), _WITHOUT)
+        raise InputError(f"its JavaScript fails with '{said[0][:200]}'", str(build), _WITHOUT)
     try:
         programs = json.loads(done.stdout)
         return {str(name): str(text) for name, text in programs.items()}
@@ -95,10 +95,10 @@ def _run(node: str, build: Path) -> subprocess.CompletedProcess[str]:
 
 
 def _function(text: str, name: str) -> str:
-    """A program with its entry point as a function that is called, and `lit`, which calls it."""
+    """A program with its entry point turned into a function, and `lit`, which calls it."""
     entry = _ENTRY.search(text)
     if entry is None:
-        raise InputError("no fragment program in what three.js wrote", name, _WITHOUT)
+        raise InputError("no fragment program in the output of three.js", name, _WITHOUT)
     inputs = [f"{one} : {kind}" for one, kind in _INPUT.findall(entry[1])]
     values = [
         "vec4<f32>( 1.0, 0.0, 0.0, 1.0 )" if _TANGENT.fullmatch(one) else _GIVEN.get(one.split(" ")[0], "")
@@ -106,14 +106,14 @@ def _function(text: str, name: str) -> str:
     ]
     unknown = [one for one, value in zip(inputs, values, strict=True) if not value]
     if unknown or "light" not in values:
-        what = f"an unknown input, {unknown[0]}" if unknown else "no direction of the light"
-        raise InputError(f"{what}, in the program of this release of three.js", name, _WITHOUT)
+        what = f"unknown input {unknown[0]}" if unknown else "no direction of the light"
+        raise InputError(f"{what} in the program of this release of three.js", name, _WITHOUT)
     body = f"{text[: entry.start()]}fn main( {', '.join(inputs)} ) ->{text[entry.end() :]}"
     return body + _END.replace("INPUTS", ", ".join(values))
 
 
 def _checked(text: str, adapter: str, name: str) -> str:
-    """A program whose inputs are those of an adapter; its table has the adapter's name for it."""
+    """A program after a check that its inputs are those of the adapter, with the adapter's name for its table."""
     textures = re.findall(r"var (\w+) : texture_2d<f32>", text)
     uniforms = set(re.findall(r"^\t(\w+) : (?:f32|vec\d<f32>),?$", text, re.MULTILINE))
     parameters = set(re.findall(r"^\[parameters\.(\w+)\]", adapter, re.MULTILINE))
@@ -124,7 +124,7 @@ def _checked(text: str, adapter: str, name: str) -> str:
 
 
 def _adapter(webgl: str) -> str:
-    """The adapter to a program, from the one to the WebGL build."""
+    """The adapter to a program, from that of the WebGL build."""
     doc, rest = webgl.partition("\n")[0], webgl[webgl.index("[parameters.") :]
     head = [doc.replace("Material", "NodeMaterial", 1), 'function = "lit"', 'arguments = ["light", "view"]']
     return "\n".join([*head, "cosine = true", "", rest])
