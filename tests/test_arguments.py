@@ -35,11 +35,11 @@ def given(value: object) -> str:
         ({"spp": True}, "True given"),
         ({"spp": 10**30}, "samples per pixel"),
         ({"size": (640,)}, "2 whole numbers expected"),
-        ({"size": (1, 60_000_000)}, "longer than 65536 pixels"),
+        ({"size": (1, 60_000_000)}, "larger than 65536 pixels"),
         ({"timeout": NAN}, "a number expected"),
         ({"exposure": NAN}, "exposure"),
         ({"denoise": "no"}, "True or False expected"),
-        ({"output": "a\0.png"}, "a text or a path expected"),
+        ({"output": "a\0.png"}, "a string or a path expected"),
     ],
 )
 def test_a_render_asks_for_what_its_annotations_say(arguments: dict[str, object], text: str) -> None:
@@ -118,7 +118,7 @@ def test_directions_and_random_numbers_that_are_none_are_refused() -> None:
 
 def test_a_film_is_as_long_as_a_side_may_be() -> None:
     check_film((65536, 1), "size")
-    with pytest.raises(InputError, match="longer than"):
+    with pytest.raises(InputError, match="larger than"):
         check_film((1, 65537), "size")
 
 

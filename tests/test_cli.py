@@ -277,7 +277,7 @@ def test_a_scenes_own_name_for_the_picture_counts_where_it_is_used(
     text = (scene / "scene.json").read_text().replace("ball.png", "ball")
     (scene / "scene.json").write_text(text)
     told = failure(capsys, "render", scene)
-    assert "'ball' is no known kind of picture" in told and "scene.json#/output/filename" in told and "-o FILE" in told
+    assert "is not a known kind of picture" in told and "scene.json#/output/filename" in told and "-o FILE" in told
     assert gonio("render", scene, "-o", "picture.exr", "--spp", 1) == 0
     assert gonio("study", scene, "--vary", "shapes.0.material.p=4", "--spp", 1) == 0
 
@@ -539,7 +539,7 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     assert "alpha" in text and "Mitsuba plugin: gonio_conductor" in text
     assert "Source: src/gonio/materials/microfacet/conductor.py" in text
     assert gonio("explain", "phong") == 0
-    assert "Violates reciprocity by design: " in capsys.readouterr().out
+    assert "Violates the law reciprocity by design: " in capsys.readouterr().out
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
 
 

@@ -227,7 +227,7 @@ def test_another_version_is_refused_by_name(two: Cluster, monkeypatch: pytest.Mo
     ("given", "what"),
     [({}, "an address or a number"), ({"workers": 0}, "0 workers"), ({"address": "tcp://127.0.0.1:1"}, "no scheduler")]
     + [
-        ({"address": text}, "is no address")
+        ({"address": text}, "is not a scheduler address")
         for text in ("nonsense", "", "a b:1", "htp://a:1", "tcp://a:0", "tcp://a:99999")
     ],
 )

@@ -188,4 +188,4 @@ def test_a_name_that_is_no_text_is_printed_as_it_is(tmp_path: Path, encoding: st
 def test_a_path_that_is_no_text_is_one_error(vary: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = Path(__file__).parents[1] / "examples" / "phong"
     assert app.run(["study", str(scene), "--vary", vary, "-o", str(tmp_path / "a.png")]) == 2
-    assert "is no text" in capsys.readouterr().err
+    assert "is not valid text" in capsys.readouterr().err

@@ -183,7 +183,7 @@ def _use(found: manual.Page) -> str:
 
 
 def _laws(found: manual.Page) -> str:
-    lines = [f"Violates **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()]
+    lines = [f"Violates the law **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()]
     card = ROOT / f"docs/report-cards/{found.name}.md"
     if card.exists():
         lines.append(f"Judged in full on its [report card](../../report-cards/{found.name}.md).")

@@ -193,7 +193,7 @@ _KINDS: dict[str, tuple[Check, str]] = {
     "bool": (_flag, "True or False"),
     "int": (integer, "a whole number"),
     "float": (number, "a number"),
-    "str": (_text, "a text"),
+    "str": (_text, "a string"),
     "Path": (_of_class("Path"), "a path"),
     "BSDF": (_of_class("BSDF"), "a material"),
     "ArrayLike": (_array, "an array of numbers"),

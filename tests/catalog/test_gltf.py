@@ -149,7 +149,7 @@ def test_a_scene_takes_a_file_with_the_pictures_inside(tmp_path: Path) -> None:
         ({"file": "none.gltf"}, "'none.gltf' does not exist"),
         ({"file": "all.gltf"}, "it contains 8 materials"),
         ({"file": "all.gltf", "material": "Gold"}, "no material 'Gold'"),
-        ({"file": "scene.json"}, "no gltf file by its name"),
+        ({"file": "scene.json"}, "not a gltf file by its name"),
         ({"file": "all.gltf", "material": "Red", "alpha": 1}, "unknown key 'alpha'"),
         ({"file": 3}, "expected a string"),
     ],

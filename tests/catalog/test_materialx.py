@@ -151,7 +151,7 @@ if importlib.util.find_spec("MaterialX"):
         "another type": (given("base_color", "float", 'value="1"'), "of type float, color3 expected"),
         "no number": (given("base_weight", "float", 'value="red"'), "base_weight = 'red' is not of type float"),
         "no value": (given("base_weight", "float", ""), "base_weight = '' is not of type float"),
-        "not finite": (given("base_weight", "float", 'value="1e999"'), "base_weight = '1e999' is no"),
+        "not finite": (given("base_weight", "float", 'value="1e999"'), "base_weight = '1e999' is not"),
         "of itself": (including("a.mtlx"), "which includes it again"),
         "outside": (including("../b.mtlx"), "is outside its folder"),
         "a million nodes": (HEAD + "<a/>" * 1_000_000 + "</materialx>", "more than 100000 elements"),

@@ -38,11 +38,11 @@ def _written(material: str, line: str | None = None) -> str:
 @pytest.mark.parametrize(
     ("stored", "name", "sheet", "said"),
     [
-        ("lambert", "oren-nayar.csv", "lab2", "the file names lambert, and the task is oren-nayar"),
-        ("conductor-beckmann", "conductor-ggx.csv", "lab2", "ndf=beckmann, and the task has ndf=ggx"),
-        ("lambert", "kulla-conty.csv", "hw4", "the file names lambert, and the task is kulla-conty"),
-        ("conductor-ggx", "conductor-ggx.csv", "hw4", "masking=smith-separable, and the task has masking=schlick-dir"),
-        ("blinn-phong", "phong.csv", "lab2", "the file names blinn-phong, and the task is phong"),
+        ("lambert", "oren-nayar.csv", "lab2", "the file names lambert, but the task is oren-nayar"),
+        ("conductor-beckmann", "conductor-ggx.csv", "lab2", "ndf=beckmann, but the task has ndf=ggx"),
+        ("lambert", "kulla-conty.csv", "hw4", "the file names lambert, but the task is kulla-conty"),
+        ("conductor-ggx", "conductor-ggx.csv", "hw4", "masking=smith-separable, but the task has masking=schlick-dir"),
+        ("blinn-phong", "phong.csv", "lab2", "the file names blinn-phong, but the task is phong"),
     ],
 )
 def test_a_file_does_not_choose_what_it_is_judged_by(

@@ -106,7 +106,7 @@ def test_mitsubas_names_of_the_widths_are_a_pair() -> None:
         go.Conductor.preset("Au", alpha_u=0.1, alpha_v=0.3),
     ):
         assert made.alpha == (0.1, 0.3)  # type: ignore[attr-defined]
-    with pytest.raises(InputError, match="alpha_u alone"):
+    with pytest.raises(InputError, match="only alpha_u given"):
         go.Conductor(alpha_u=0.1)  # type: ignore[call-arg]
 
 

@@ -85,7 +85,7 @@ def test_a_finished_picture_goes_on_to_more_samples(scene: Path, tmp_path: Path)
         more = go.resume(tmp_path / "c", spp=9, output=tmp_path / "more.exr")
     assert np.array_equal(more, go.render(scene, spp=9))
     assert np.array_equal(images.read(tmp_path / "more.exr").pixels, more)
-    with pytest.raises(InputError, match="holds 9 samples per pixel, 4 are requested"):
+    with pytest.raises(InputError, match="holds 9 samples per pixel, but 4 are requested"):
         go.resume(tmp_path / "c", spp=4)
 
 
@@ -132,7 +132,7 @@ def test_both_files_damaged_is_one_clear_error(scene: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match="damaged or was cut short"):
         go.resume(tmp_path / "c")
     (tmp_path / "picture.exr").write_bytes(b"\x76\x2f\x31\x01")
-    with pytest.raises(InputError, match="no checkpoint of Gonio"):
+    with pytest.raises(InputError, match="not a checkpoint of Gonio"):
         go.resume(tmp_path / "picture.exr")
 
 

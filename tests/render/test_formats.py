@@ -39,9 +39,9 @@ def refused(content: bytes) -> str:
         ([bytes((128 + 100, 7)), *[GREY] * 3], "longer than its scanline"),
         ([bytes((100,)) + b"x" * 100, *[GREY] * 3], "longer than its scanline"),
         ([bytes((0,)), *[GREY] * 4], "empty"),
-        ([GREY, GREY], "cut off"),
-        ([GREY, GREY, GREY, bytes((9, 1, 2))], "cut off"),
-        ([GREY, GREY, GREY, bytes((128 + 9,))], "cut off"),
+        ([GREY, GREY], "truncated"),
+        ([GREY, GREY, GREY, bytes((9, 1, 2))], "truncated"),
+        ([GREY, GREY, GREY, bytes((128 + 9,))], "truncated"),
     ],
 )
 def test_wrong_runs_of_a_radiance_picture_are_refused(runs: list[bytes], reason: str) -> None:

@@ -352,7 +352,7 @@ def test_an_interrupt_while_a_loop_is_recorded_is_one(monkeypatch: pytest.Monkey
     scene = mi.load_dict(scene_dict())
     before = picture(scene, 2)
     with monkeypatch.context() as patch:
-        patch.setattr(path.Path, "vertex", interrupted)
+        patch.setattr(path.Path, "bounce", interrupted)
         with pytest.raises(KeyboardInterrupt):
             picture(scene, 2)
     assert np.array_equal(picture(scene, 2), before)

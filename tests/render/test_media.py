@@ -216,7 +216,7 @@ def test_absorption_takes_no_texture(tmp_path: Path) -> None:
 
 
 def test_more_media_than_a_path_can_count_are_one_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="9 transparent materials, 8 at most"):
+    with pytest.raises(InputError, match="9 transparent materials, at most 8"):
         rendered(tmp_path, [slab(-i - 0.9, -i, absorption=0.1 * (i + 1)) for i in range(9)])
 
 

@@ -183,10 +183,10 @@ def test_a_scene_means_what_mitsuba_makes_of_it(tmp_path: Path, version: str) ->
         ('<float name="x" value="$here"/>', r"the parameter \$here has no value", "a.xml:1"),
         ('<shape type="cube"><path value="."/></shape>', "inside another element", "a.xml:1"),
         ('<default name="x"/>', "<default> has no value", "a.xml:1"),
-        ('<default name="x" value="1"><float/></default>', "an element that cannot contain any", "a.xml:1"),
+        ('<default name="x" value="1"><float/></default>', "an element that cannot contain other elements", "a.xml:1"),
         ('<include filename="c.xml"/>', "begins with <float>", "c.xml:1"),
         ('<include filename="d.xml"/>', "of version 0.6.0 is included in a scene of version 3.0.0", "d.xml:1"),
-        ('<include filename="a.xml"/>', "more than 15 includes inside each other", "a.xml:1"),
+        ('<include filename="a.xml"/>', "more than 15 nested includes", "a.xml:1"),
     ],
 )
 def test_an_error_names_the_users_line(tmp_path: Path, content: str, message: str, place: str) -> None:
@@ -205,7 +205,7 @@ def test_what_a_scene_grows_to_is_bounded(tmp_path: Path) -> None:
     chain = "".join(f'<default name="a{n}" value="{f"$a{n - 1}" * 16 if n else "x" * 16}"/>' for n in range(11))
     with pytest.raises(InputError, match="make the text too long"):
         mitsuba_xml.read(scene(tmp_path / "scene", chain), {})
-    with pytest.raises(InputError, match="more than 64 elements inside each other"):
+    with pytest.raises(InputError, match="more than 64 nested elements"):
         mitsuba_xml.read(scene(tmp_path / "scene", '<shape type="cube">' * 10_000 + "</shape>" * 10_000), {})
     with pytest.raises(InputError, match="a parameter's name of 5000 characters"):
         mitsuba_xml.read(scene(tmp_path / "scene", f'<default name="{"a" * 5000}" value="1"/>'), {})

@@ -110,7 +110,7 @@ def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None
 
 
 def test_the_base_class_is_found_by_its_old_name() -> None:
-    with pytest.warns(DeprecationWarning, match="Transport is called Path now"):
+    with pytest.warns(DeprecationWarning, match="Transport is now Path"):
         old = integrators.Transport
     assert issubclass(old, integrators.Path) and old.depth(integrators.Settings("path")) == 2
 

@@ -103,10 +103,10 @@ def test_zero_normals_are_taken_from_the_faces(tmp_path):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "names vertex 0"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n", "names vertex -4"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n", "names texture coordinate 1, 0 are given"),
-        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 x\n", "'x' is no vertex"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 x\n", "'x' is not a face vertex"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "a face of 2 vertices"),
         ("a.obj", "v 0 0\nf 1 1 1\n", "3 numbers expected"),
-        ("a.obj", "v 0 0 abc\n", "no number"),
+        ("a.obj", "v 0 0 abc\n", "not a number"),
         ("a.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
         ("a.obj", "v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
@@ -129,7 +129,7 @@ def test_zero_normals_are_taken_from_the_faces(tmp_path):
         ("a.ply", quad_ply("binary_little_endian", struct.pack("<B2i", 200, 0, 1)), "'face' entries"),
         ("a.ply", quad_ply("ascii").replace(b"4 0 1 2 3", b"4 0 1"), "'face' entries"),
         ("a.ply", quad_ply("ascii").replace(b"float x", b"quad x"), "unknown property"),
-        ("a.stl", b"solid\n", "no known kind of mesh"),
+        ("a.stl", b"solid\n", "not a known kind of mesh"),
     ],
     ids=range(23),
 )
@@ -241,7 +241,7 @@ def test_grey_and_alpha_images(tmp_path):
 @pytest.mark.parametrize("content", [b"x", b"hello world" * 10, b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"#?RADIANCE\n"])
 def test_bytes_that_are_no_image(tmp_path, content):
     (tmp_path / "a.png").write_bytes(content)
-    with pytest.raises(InputError, match=r"no image that can be read|cannot be decoded"):
+    with pytest.raises(InputError, match=r"not a readable image|cannot be decoded"):
         textures.load_image(tmp_path / "a.png", "here")
 
 

@@ -230,7 +230,7 @@ WRONG = [
     ("/integrator", {"type": "path"}, None, "key 'maxDepth' is missing", "maxDepth"),
     ("/integrator", {"type": "whited"}, "/integrator/type", "unknown type 'whited'", "did you mean 'whitted'"),
     ("/integrator/maxDepth", 0, None, "expected a number >= 1", ">= 1"),
-    ("/output/filename", "a.jpeg", None, "no known kind of picture", "exr"),
+    ("/output/filename", "a.jpeg", None, "not a known kind of picture", "exr"),
     ("/output/filename", "../a.exr", None, "outside the folder", "plain file name"),
     ("/output/filename", "/tmp/a.exr", None, "outside the folder", "plain file name"),
     ("/outputs", {}, None, "unknown key 'outputs' of scene description", "did you mean 'output'"),

@@ -245,7 +245,7 @@ def test_a_colour_that_rgb_cannot_show_keeps_its_luminance() -> None:
         ({"type": "led", "peaks": [[1200, 20, 1]]}, "1200 nm is not visible"),
         ({"type": "led", "peaks": []}, "peaks"),
         ({"type": "led", "peaks": [[500, 20, 0]]}, "no peak"),
-        ({"type": "spectrum", "wavelengths": [0.4, 0.7], "values": [1, 1]}, "nothing of it is visible"),
+        ({"type": "spectrum", "wavelengths": [0.4, 0.7], "values": [1, 1]}, "no part of it is visible"),
         ({"type": "spectrum", "wavelengths": [700, 400], "values": [1, 1]}, "do not ascend"),
         ({"type": "spectrum", "wavelengths": [400, 700], "values": [1]}, "values"),
         ({"type": "blackbod", "temperature": 3000}, "blackbody"),

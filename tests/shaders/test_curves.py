@@ -78,7 +78,7 @@ def test_a_budget_chooses_cheaper_terms_of_a_material() -> None:
     model, found = tiers.cheapest(GOLD, 150)
     assert model.fresnel == "schlick" and found[0].cost == 140 and 0.0 < found[0].mean < 0.01
     assert tiers.cheapest(GOLD, 1000)[0] == GOLD
-    with pytest.raises(go.InputError, match="20 operations given, and the cheapest form of Conductor takes"):
+    with pytest.raises(go.InputError, match="20 operations given, but the cheapest form of Conductor takes"):
         tiers.cheapest(GOLD, 20)
 
 

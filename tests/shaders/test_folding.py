@@ -81,5 +81,5 @@ def test_folded_python_file_has_the_values(tmp_path: Path) -> None:
 
 
 def test_folding_goes_with_whole_materials() -> None:
-    with pytest.raises(InputError, match="--fold with --fit"):
+    with pytest.raises(InputError, match="--fold given with --fit"):
         go.emit("conductor", "glsl", fold=True, fit="3")

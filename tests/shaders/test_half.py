@@ -68,7 +68,7 @@ def test_layers_that_are_off_are_left_out() -> None:
 def test_numbers_that_overflow_are_refused() -> None:
     table = go.ops.Table("bright", np.array([[1.0], [7e4]]))
     assert pixels(table).max() == 7e4
-    with pytest.raises(go.InputError, match="table bright holds 70000, more than 16 bits"):
+    with pytest.raises(go.InputError, match="table bright holds 70000, which 16 bits cannot hold"):
         pixels(table, 16)
 
 

@@ -85,7 +85,7 @@ def test_tables_are_bound_where_the_program_has_room() -> None:
     made = bundle(go.KullaConty(GOLD), "wgsl", placement=Placement(group=2, first_binding=5))
     assert re.findall(r"@group\((\d)\) @binding\((\d)\)", made.text) == [("2", "5"), ("2", "6")]
     assert [(t["group"], t["binding"]) for t in made.manifest["textures"]] == [(2, 5), (2, 6)]
-    with pytest.raises(go.InputError, match=r"group 2 given, and GLSL ES 3.00 \(WebGL2\) has no groups"):
+    with pytest.raises(go.InputError, match=r"group 2 given, but GLSL ES 3.00 \(WebGL2\) has no groups"):
         go.emit(GOLD, group=2)
 
 

@@ -127,8 +127,8 @@ def test_tables_of_a_bundle_are_in_the_files_that_its_manifest_names(form: str, 
 def test_forms_that_do_not_exist_or_do_not_fit_are_refused() -> None:
     for lang, form, text in (
         ("glsl", "ktx", "unknown form 'ktx'"),
-        ("osl", "ktx2", "OSL reads tables in a form of its own"),
-        ("numpy", "ktx2", "a form of tables given, and numpy is a file of its own"),
+        ("osl", "ktx2", "OSL reads tables in its own form"),
+        ("numpy", "ktx2", "a form of tables given, but a numpy file stands alone"),
     ):
         with pytest.raises(go.InputError, match=text):
             go.emit(go.KullaConty(GOLD), lang, tables=form)

@@ -155,10 +155,10 @@ def test_unknown_languages_functions_and_things_are_refused() -> None:
 
 def test_what_cannot_be_a_shader_is_refused_with_one_clear_error() -> None:
     for refused, words in [
-        (lambda: go.emit(GOLD, functions=3), "functions: 3 given, a text or several texts expected"),  # type: ignore[arg-type]
+        (lambda: go.emit(GOLD, functions=3), "functions: 3 given, a string or several strings expected"),  # type: ignore[arg-type]
         (lambda: go.emit(GOLD, functions=()), "no function given"),
         (lambda: go.emit(GOLD, functions=" , "), "no function given"),
-        (lambda: go.emit(GOLD, ["glsl"]), r"lang: \['glsl'\] given, a text expected"),  # type: ignore[arg-type]
+        (lambda: go.emit(GOLD, ["glsl"]), r"lang: \['glsl'\] given, a string expected"),  # type: ignore[arg-type]
         (lambda: go.emit(go.Lambert(), functions=["terms"]), "Lambert has no terms"),
         (lambda: go.emit(go.Conductor(alpha=np.array([0.1, 0.2, 0.3]))), "one value per ray given"),
         (lambda: go.emit(go.Conductor(eta=1e39)), r"1e\+39 given, at most 3\.4e38"),

@@ -148,12 +148,12 @@ def test_headers_are_included_once_and_beside_one_another(tmp_path) -> None:
     (tmp_path / "parts" / "more.h").write_text("float twice(float x) { return 2.0 * x; }\n")
     text = '#include "header.h"\n#include "parts/tools.h"\nfloat f(float x) { return twice(x); }'
     compile_text(text, "x.glsl", folders=[tmp_path])
-    with pytest.raises(InputError, match=r"'of_cpp.h' lies in no folder") as error:
+    with pytest.raises(InputError, match=r"'of_cpp.h' is not in a folder") as error:
         compile_text(f"#define __cplusplus 1\n{text}", "x.glsl", folders=[tmp_path])
     assert error.value.where.endswith("header.h:5")
     (tmp_path / "parts" / "more.h").write_text('#include "../../outside.h"\n')
     (tmp_path.parent / "outside.h").write_text("float twice(float x) { return 2.0 * x; }\n")
-    with pytest.raises(InputError, match=r"outside.h' lies in no folder"):
+    with pytest.raises(InputError, match=r"outside.h' is not in a folder"):
         compile_text(text, "x.glsl", folders=[tmp_path])
 
 
@@ -166,7 +166,7 @@ def test_header_of_a_branch_that_is_left_out_is_included_again(tmp_path) -> None
 def test_include_reads_named_folders_only(tmp_path) -> None:
     (tmp_path / "a.glsl").write_text("float twice(float x) { return 2.0 * x; }\n")
     text = '#include "a.glsl"\nfloat f(float x) { return twice(x) + missing; }'
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="not in a folder"):
         compile_text(text, "test")
     with pytest.raises(InputError) as error:
         compile_text(text, "test", folders=[tmp_path])

@@ -117,12 +117,12 @@ def judged(file: Path, name: str, **more: object) -> Report:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("LoopsInPython", "no end after 6 s"),
-        pytest.param("IsDeaf", "no end after 6 s", marks=pytest.mark.slow),
-        ("LoopsInAKernel", "no end after 6 s"),
+        ("LoopsInPython", "not finished after 6 s"),
+        pytest.param("IsDeaf", "not finished after 6 s", marks=pytest.mark.slow),
+        ("LoopsInAKernel", "not finished after 6 s"),
         ("Allocates", "more than 1 GB of memory"),
         ("Aborts", "the process crashed: SIGABRT"),
-        ("Leaves", "the process ended itself with exit code 0"),
+        ("Leaves", "the process exited with code 0"),
         ("Exits", "SystemExit in sample"),
         ("KillsItsThread", "KeyboardInterrupt in sample"),
     ],
@@ -132,7 +132,7 @@ def test_what_brings_the_process_down_fails_the_laws_that_need_it(
 ) -> None:
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # or words are never lost
     # the laws that hold must be done by then on a slow machine, and so must what takes memory before it takes time
-    report = judged(file, name, limit=6.0 if "no end" in words else 60.0, memory=1.0)
+    report = judged(file, name, limit=6.0 if "not finished" in words else 60.0, memory=1.0)
     statuses = {verdict.law: verdict.status for verdict in report.cards[0].verdicts}
     assert statuses == {"reciprocity": "pass", "weight": "fail", "isotropy": "pass"}
     assert words in report["weight"].why[0]
@@ -160,7 +160,7 @@ def test_a_fact_that_raises_fails_the_laws_that_ask_for_it(file: Path) -> None:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(("line", "words"), [("os._exit(3)", "exit code 3"), ("raise SystemExit", "SystemExit")])
+@pytest.mark.parametrize(("line", "words"), [("os._exit(3)", "exited with code 3"), ("raise SystemExit", "SystemExit")])
 def test_a_file_that_cannot_even_be_loaded_is_bad_input(tmp_path: Path, line: str, words: str) -> None:
     (tmp_path / "bad.py").write_text(f"import os\n{line}\n")
     with pytest.raises(go.InputError, match=words):

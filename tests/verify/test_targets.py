@@ -114,7 +114,7 @@ def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pyt
     text = GOOD + "    def pdf(self, wo, wi):\n        return wi.z\n"
     text += "    def sample(self, wo, u, mode='radiance'):\n        while True:\n            pass\n"
     found = verify(f"{file(tmp_path, text)}:Good", quick=True, law=["weight", "shader"])
-    assert "no end after 1 s" in found["weight"].why[0] and "no end after 1 s" in found["shader"].why[0]
+    assert "not finished after 1 s" in found["weight"].why[0] and "not finished after 1 s" in found["shader"].why[0]
 
 
 @pytest.mark.sample(1)

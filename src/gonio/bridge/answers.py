@@ -13,7 +13,7 @@ class Answer(NamedTuple):
     """A query and its result.
 
     what   the call, such as "eval_pdf"
-    wrong  what is wrong with the result; "" if nothing is
+    wrong  a description of the error in the result; "" if there is none
     share  error as a fraction of the reflected light, if the error affects pictures
     worst  largest error relative to the value for a single pair of directions
     rows   two values that should be equal: their names, wo and wi, (N, 3), and the values, (N, channels)

@@ -25,7 +25,10 @@ FEW = 0.002  # fraction of rows that rounding errors may move across a discontin
 
 
 def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
-    """The result of every call at the given surface interaction, which has COUNT lanes and whose wi is replaced."""
+    """The result of every call at the given surface interaction, which has COUNT lanes and whose wi is replaced.
+
+    seed  seed of the directions
+    """
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
         ("eval_pdf", trial.eval_pdf),

@@ -278,7 +278,7 @@ def mitsuba() -> ModuleType:
 
 
 def rejected(error: Exception, name: str) -> InputError:
-    """Mitsuba's error for a description, as an InputError."""
+    """Mitsuba's error for the description of the plugin `name`, as an InputError."""
     text = " ".join(str(error).split())
     if "not found" in text and ("Plugin" in text or "plugin" in text):
         return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))

@@ -54,7 +54,8 @@ class MitsubaBSDF(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
-        """A sampled direction; null interactions, which pass straight through, count as delta lobes."""
+        """A direction sampled from three numbers in [0, 1); null interactions, which pass straight through, count as
+        delta lobes."""
         ctx, si, flags = context(mi, mode), self._interaction(wo), mi.BSDFFlags
         bs, value = self.bsdf.sample(ctx, si, mi.Float(u.x), mi.Point2f(u.y, u.z), self._active)
         weight = mi.unpolarized_spectrum(value)
@@ -95,7 +96,8 @@ class MitsubaBSDF(BSDF):
     # ------------------------------------------------------------------ facts
 
     def renderer_calls(self, seed: int) -> Iterator[Answer]:
-        """The results of the calls that a renderer makes in addition to eval, pdf and sample."""
+        """The results of the calls that a renderer makes in addition to eval, pdf and sample; `seed` is that of the
+        directions."""
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)
 

@@ -76,6 +76,7 @@ def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
 def check(name: str, location: str, folder: Path | None = None, allow_code: bool = False) -> Path | None:
     """Raise InputError if a plugin type named by a document would load untrusted native code.
 
+    location    file and line of the document that errors name
     folder      the document's folder, whose `plugins` may be loaded if `allow_code` is set
     Returns the file in that folder that will be loaded, else None.
     """
@@ -96,7 +97,10 @@ def check(name: str, location: str, folder: Path | None = None, allow_code: bool
 
 
 def register(register_kind: Callable[[str, OfVariant], None], name: str, make: OfVariant) -> None:
-    """Register a Python plugin with `mi.register_bsdf` or a similar function; see `_refuse_current_folder`."""
+    """Register a Python plugin with `mi.register_bsdf` or a similar function.
+
+    Raises InputError if Mitsuba would load a native plugin of that name from the current folder instead.
+    """
     _refuse_current_folder(name, "Mitsuba")
     register_kind(name, make)
 

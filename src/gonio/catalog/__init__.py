@@ -1,1 +1,1 @@
-"""Materials from texts and files: the notation, the library of named materials, documents, and user files."""
+"""Materials from strings and files: the notation, the library of named materials, documents, and user files."""

@@ -3,7 +3,7 @@
     go.material("alum-bronze")                                  Bagher2012's fit, a `shifted-gamma`
     go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
 
-As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The files in `published/`
+On the command line and in scenes, the second is written alum-bronze:low2012/lowsmooth_E2. The files in `published/`
 contain the values as printed; this module converts them to parameters. Every fit is also a preset of its model.
 """
 
@@ -52,24 +52,24 @@ def materials() -> list[str]:
 
 
 def fits(name: str) -> list[str]:
-    """FILE/FIT of every fit of a material, the default first; raises InputError for an unknown name."""
+    """FILE/FIT of every fit of a material, the default first. Raises InputError for an unknown name."""
     _known(name, "material")
     return [fit.name for fit in published().values() if name in fit.materials]
 
 
 def knows(text: str) -> bool:
-    """Whether a text names a material of the library, even with an unknown fit."""
+    """Whether a string names a material of the library, even with an unknown fit."""
     return text.partition(":")[0] in published()[DEFAULT].materials
 
 
 def resembles(text: str) -> bool:
-    """Whether a text is the name of a material, with or without a fit, or closer to one than to a model's name."""
+    """Whether a string is the name of a material, with or without a fit, or closer to one than to a model's name."""
     near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
     return bool(near) and near[0] in materials()
 
 
 def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
-    """(class, its preset's name) of NAME or NAME:FILE/FIT."""
+    """(class, its preset's name) of NAME or NAME:FILE/FIT. Raises InputError, which names `where`, if it is unknown."""
     name, _, fit = text.partition(":")
     _known(name, where)
     fit = fit or DEFAULT
@@ -81,7 +81,7 @@ def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
 
 
 def presets(model_name: str) -> dict[str, Preset]:
-    """The fits of a model as its presets: "alum-bronze" of the default, else "alum-bronze:low2012/lowsmooth_E2"."""
+    """A model's fits as presets: "alum-bronze" for the default fit, else "alum-bronze:low2012/lowsmooth_E2"."""
     return {
         key: Preset(key, values, fit.source)
         for fit in published().values()

@@ -24,7 +24,7 @@ MaterialLike: TypeAlias = "BSDF | str | Path | Mapping[str, Any] | type[Any] | H
 
 
 def material(given: MaterialLike, fit: str = "", **parameters: Value) -> BSDF:
-    """A material from a text, a file, a description, a class or an instance.
+    """A material from a string, a file, a description, a class or an instance.
 
         go.material("conductor(preset=Au)", alpha=0.2)      # as on the command line; also "lambert+ggx"
         go.material("alum-bronze", fit="low2012/lowsmooth_E2")
@@ -32,16 +32,17 @@ def material(given: MaterialLike, fit: str = "", **parameters: Value) -> BSDF:
         go.material({"type": "conductor", "preset": "Au"})  # as in JSON
         go.material("ward.py:Ward"), go.material(Ward), go.material(Ward(alpha=0.1))
 
-    given       a text: a model, NAME(parameter=value,...), a sum, FILE.py:CLASS, a name of the library
+    given       a string: a model, NAME(parameter=value,...), a sum, FILE.py:CLASS, a name of the library
                 (`materials()` lists them; also NAME:FILE/FIT), or a file that describes materials, of another program
                 or the result of a fit ("gold.json"), followed by :NAME if it contains several; a path; a dictionary
-                with a "type"; a class, Gonio's or your own with `eval(wo, wi)`, with its default values (an inner
+                with a "type"; a class, Gonio's or your own with `eval(wo, wi)`, which gets its default values (an inner
                 material without a default is metal of alpha 0.3); or an instance
-    fit         of a name of the library: FILE/FIT; by default Bagher2012's
-    parameters  override its values: `alpha=0.2`, `preset="Au"`, `**{"base.alpha": 0.2}`; a name that only one inner
-                material has needs no path
-    Raises InputError, with the closest known name, if it is unknown or missing from the paper, for a file that cannot
-    be read, and for anything else; a GonioWarning names features of a file that Gonio's materials lack.
+    fit         FILE/FIT of a library material; "" selects Bagher2012's
+    parameters  values that override its own: `alpha=0.2`, `preset="Au"`, `**{"base.alpha": 0.2}`; a name that only one
+                inner material has needs no path
+    Raises InputError, with the closest known name, for an unknown name or a fit that the paper does not have, for a
+    file that cannot be read, and for a value of any other type. A GonioWarning names features of a file that Gonio's
+    materials lack.
     """
     if fit and not isinstance(given, str):
         raise InputError(f"fit '{fit}' given with a {type(given).__name__}", "material: fit", "give a name with it")
@@ -52,12 +53,12 @@ def material(given: MaterialLike, fit: str = "", **parameters: Value) -> BSDF:
 
 
 def title_of(given: MaterialLike) -> str:
-    """A short name for titles: a text itself, any other material as text."""
+    """A short name for titles: a string itself, any other material in the notation of the command line."""
     return str(given) if isinstance(given, str | Path) else notation.written(material(given))
 
 
 def is_material(value: object) -> bool:
-    """Whether a value other than a text or a path is accepted by `material`."""
+    """Whether a value other than a string or a path is accepted by `material`."""
     return isinstance(value, BSDF | Mapping) or callable(getattr(value, "eval", None))
 
 

@@ -5,12 +5,12 @@
     gold.binary                                 a file of measured values
     chest.gltf:Wood                             a material of a glTF file, numbers only (`documents`)
     gold.json                                   a result of `gonio fit`, or JSON as below
-    lambert+ggx                                 a sum; ggx and beckmann are lobes of Schlick's Fresnel term
+    lambert+ggx                                 a sum; ggx and beckmann are lobes with Schlick's Fresnel term
     alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
-    alum-bronze:low2012/lowsmooth_E2            the same by another published fit
+    alum-bronze:low2012/lowsmooth_E2            the same material by another published fit
     conductor(alpha=0.3,preset=Au)              all in one; a comma separates where a name and = follow
     kulla-conty(base=conductor,base.alpha=0.3)  a value of an inner material, by its path; in any order
-    gold.json(k=0)                              the same by its name, if one inner material alone has it: b.k of a sum
+    gold.json(k=0)                              a value by its name, if only one inner material has it: b.k of a sum
     {"type": "conductor", "alpha": [0.1, 0.4]}  as in a scene
 
 Values are numbers, "0.9,0.8,0.7" or [0.9, 0.8, 0.7] for several, names, true or false, and materials. The default inner
@@ -52,6 +52,7 @@ def named(
     """A material as the command line names it, and its settings: values by parameter, "preset" among them.
 
     assignments  "name=value" each
+    preset       name of a preset of the material; "" for none
     allow_code   let a data file name classes in Python files, which are then run
     Raises InputError, with the closest known spelling, for unknown names and values out of range.
     """
@@ -62,10 +63,12 @@ def named(
 
 
 def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = True) -> list[Settings]:
-    """The class and settings of each text: its own settings, and those of the shared ones that the class has.
+    """The class and settings of each material: its own settings, and all shared settings that apply to the class.
 
-    assignments  "name=value" each, shared by all; raises InputError for one that no material has
+    texts        the materials, as on the command line
+    assignments  "name=value" each, shared by all
     nested       as in `shared`
+    Raises InputError for a shared setting that applies to no material.
     """
     named = [taken_apart(text) for text in texts]
     return [
@@ -74,9 +77,11 @@ def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = Tru
 
 
 def shared(named: Sequence[Settings], assignments: Sequence[str], nested: bool = True) -> list[dict[str, str]]:
-    """The subset of shared settings, "name=value" each, for each material; raises InputError for one that none has.
+    """For each material, the shared settings that apply to it.
 
-    nested  also for a material of which an inner one has the parameter
+    assignments  the shared settings, "name=value" each
+    nested       whether a setting also applies to a material of which an inner one has the parameter
+    Raises InputError for a setting that applies to none of the materials.
     """
     wanted = dict(map(assignment, assignments))
     assigned, known = [], set()
@@ -131,8 +136,8 @@ def _one_of(owner: str, paths: Sequence[str], name: str) -> str:
 
 
 def path_of(material: BSDF, name: str) -> str:
-    """The path of a parameter given by its path, or by its name if only one inner material has it; the text itself if
-    there is none. Raises InputError if several inner materials have it."""
+    """The path of a parameter given by its path, or by its name if only one inner material has it; `name` itself if
+    there is no such parameter. Raises InputError if several inner materials have it."""
     if "." in name or name in material.parameters():
         return name
     here = {key: getattr(material, key) for key, parameter in material.parameters().items() if parameter.inner}
@@ -140,8 +145,10 @@ def path_of(material: BSDF, name: str) -> str:
 
 
 def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
-    """`named` for a class; a value is text or a JSON value. "base.alpha" is a value of the material `base`, and
-    overrides one inside the text of `base`."""
+    """`named` for a class and its values, each a string or another JSON value.
+
+    A value of the inner material `base` has the key "base.alpha" and overrides the one that `base` itself states.
+    """
     known = cls.parameters()
     values: dict[str, object] = {}
     preset = "" if "preset" in known else str(given.get("preset", ""))
@@ -201,7 +208,7 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
 
 
 def typed(parameter: Parameter, value: Value) -> object:
-    """A parameter's value from text, or from a JSON value."""
+    """A parameter's value from a string, or from another JSON value."""
     where = f"--param {parameter.name}"
     if parameter.inner:
         return _inner(value, where, {})
@@ -252,7 +259,7 @@ def setting(material: object, path: str, value: Value) -> str:
     """The value of a material's parameter in a form that `typed` accepts in any process: as `written`, but FILE.py:NAME
     for a distribution or another member that only this program knows.
 
-    path  "alpha", "base.ndf"
+    path  path of the parameter, such as "alpha" or "base.ndf"
     """
     above, _, name = path.rpartition(".")
     owner = tree.value_at(material, above) if above and isinstance(material, BSDF) else material
@@ -261,7 +268,7 @@ def setting(material: object, path: str, value: Value) -> str:
 
 
 def as_json(material: BSDF) -> dict[str, object]:
-    """The material as JSON, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` accepts the values. File
+    """The material as JSON, without rounding: {"type": "conductor", "alpha": 0.3}; `made` accepts the values. File
     paths are absolute, since a reader may run in another folder.
 
     Raises InputError for a class without a file, and for values that JSON cannot express.
@@ -291,7 +298,7 @@ def as_json(material: BSDF) -> dict[str, object]:
 
 
 def for_files(material: BSDF) -> dict[str, object] | None:
-    """The material in the form of result files: with the types of scenes; None if no file can express it."""
+    """The material as result files store it, with the type names of scene files; None if no file can express it."""
     try:
         return documents.for_scenes(as_json(material))
     except InputError:
@@ -359,12 +366,13 @@ def _typed_at(material: BSDF, path: str, value: Value) -> object:
 
 
 def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
-    """The material with some values replaced, by path: text or JSON values. Raises InputError for invalid ones."""
+    """The material with some values replaced, by path: strings or other JSON values. Raises InputError for invalid
+    ones."""
     return _inner(material, "material", values)
 
 
 def spelled(cls: type[BSDF]) -> str:
-    """The text that names a class: a material's name, FILE.py:CLASS, or the file of a shader."""
+    """The string that names a class: a material's name, FILE.py:CLASS, or the file of a shader."""
     if cls.spelling:
         return cls.spelling
     if BSDF.family.all().get(cls.name) is cls:

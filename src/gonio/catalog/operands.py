@@ -106,7 +106,7 @@ def is_material(word: str) -> bool:
 
 
 def readings(text: str) -> list[Kind]:
-    """All readings of a word, the most likely first; at least one. Raises InputError for a Python file without a
+    """All readings of a word, at least one, the most likely first. Raises InputError for a Python file without a
     class."""
     text = text.strip()
     if texts.summands(text):

@@ -46,21 +46,22 @@ def reader_of(text: str) -> type[BSDF] | None:
 
 
 def names_data(text: str) -> bool:
-    """Whether a text names a file that is a material by itself: measured values, or a shader."""
+    """Whether a string names a file that is a material by itself: measured values, or a shader."""
     return shaders.names_shader(text) or reader_of(text) is not None
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:
     """The material class that FILE.py:CLASS names; the file is run once per saved version.
 
-    folder  the base of a relative path; by default the current folder
+    folder  the base of a relative path; None: the current folder
+    where   the location that errors name
     Raises InputError, with file and line, if the file cannot be run or has no such class.
     """
     return as_material(thing(text, folder, where))
 
 
 def as_material(cls: object) -> type[BSDF]:
-    """A class as a material class; raises InputError if it cannot be one."""
+    """A class as a material class. Raises InputError if it cannot be one."""
     place = place_of(cls)
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
@@ -89,7 +90,7 @@ def is_plugin(cls: object) -> bool:
 
 def adopt(thing: object, where: str = "") -> type[BSDF]:
     """A material class for a class with `eval` that is not a gonio.BSDF, or for an instance of one: `pdf` and `sample`
-    use a guide computed from `eval`."""
+    use a guide computed from `eval`. Errors name `where`."""
     cls = thing if isinstance(thing, type) else type(thing)
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
@@ -125,9 +126,9 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
 
 @exclusive
 def probe(material: BSDF) -> BSDF:
-    """The material itself, after a test of its formulas on two directions, before they fail deep inside a render.
+    """Test a material's formulas on two directions, before they fail deep inside a render, and return the material.
 
-    Raises InputError, with file and line, if one raises, uses Python's `if` on a value, or returns a wrong type.
+    Raises InputError, with file and line, if a formula raises, uses Python's `if` on a value, or returns a wrong type.
     """
     if any(is_outside(type(inner)) for _, inner in tree.walk(material)):
         _try(material)
@@ -136,7 +137,7 @@ def probe(material: BSDF) -> BSDF:
 
 @exclusive
 def check_operators(material: BSDF) -> BSDF:
-    """The material itself; raises InputError, with file and line, if a user's formula uses `**` on a value.
+    """Return the material itself. Raises InputError, with file and line, if a user's formula uses `**` on a value.
 
     Formulas are recorded only if their file contains the operator: the verifier runs all others, including those that
     do not terminate, under its own supervision.

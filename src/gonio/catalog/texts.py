@@ -1,4 +1,4 @@
-"""Parsing of a material's text: its name and its settings.
+"""Parse a material's string: its name and its settings.
 
     taken_apart("conductor(alpha=0.3,preset=Au)")    (Conductor, {"alpha": "0.3", "preset": "Au"})
     taken_apart("lambert+ggx")                       (Sum, {"a": "lambert", "b": "conductor(fresnel=schlick,...)"})
@@ -39,9 +39,11 @@ def assignment(text: str, option: str = "--param") -> tuple[str, str]:
 
 
 def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tuple[type[BSDF], dict[str, object]]:
-    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); JSON values for a document's
+    """The class and the settings of NAME, FILE or NAME(parameter=value,...): strings, or JSON values for a document's
     material and for JSON.
 
+    where       the location that errors name
+    allow_code  let a document name classes in Python files
     Raises InputError if it is not a material, and for a document that names code without permission.
     """
     if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
@@ -94,7 +96,7 @@ def split(text: str) -> tuple[str, str]:
 
 
 def summands(text: str) -> list[str]:
-    """The parts of a sum of materials, "lambert+ggx", with the lobes of `LOBES` written out; empty for any other text.
+    """The parts of a sum of materials, "lambert+ggx", with the lobes of `LOBES` written out; empty for other strings.
     A + inside brackets, as in 1e+5, or in a file name does not separate parts."""
     parts, depth = [""], 0
     for letter in text if "+" in text else "":
@@ -110,7 +112,7 @@ def summands(text: str) -> list[str]:
 
 
 def as_call(text: str) -> str:
-    """A sum as a text to which settings can be added, "sum(a=lambert,b=...)"; any other text unchanged."""
+    """A sum in a form to which settings can be added, "sum(a=lambert,b=...)"; any other string unchanged."""
     parts = summands(text)
     return f"sum(a={as_call('+'.join(parts[:-1]))},b={parts[-1]})" if parts else text
 
@@ -137,7 +139,7 @@ def _is_known(head: str) -> bool:
 
 
 def assignments(inside: str, where: str = "MODEL") -> dict[str, str]:
-    """The text of each parameter of "alpha=0.3,preset=Au"."""
+    """The value of each parameter in "alpha=0.3,preset=Au", as a string; errors name `where`."""
     return dict(assignment(part, where) for part in _parts(inside))
 
 
@@ -189,13 +191,15 @@ def _no_material(value: object, where: str) -> InputError:
 
 
 def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
-    """The class of a name, or of FILE.py:CLASS."""
+    """The class of a name, or of FILE.py:CLASS; errors name `where`."""
     return class_and_preset(name, where)[0]
 
 
 def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
-    """The class of a name, of FILE.py:CLASS or of a library material, with its preset; "" for none. Raises InputError,
-    with the closest known name, for an unknown name."""
+    """The class of a name, of FILE.py:CLASS or of a library material, with its preset; "" for none.
+
+    Raises InputError, which names `where` and the closest known name, for an unknown name.
+    """
     if outside.names_code(name):
         return outside.load(name, where=where), ""
     if shaders.names_shader(name):
@@ -206,7 +210,7 @@ def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
 
 
 def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
-    """`taken_apart` for a text or a JSON value of a material."""
+    """`taken_apart` for a material given as a string or another JSON value; errors name `where`."""
     if isinstance(value, BSDF):
         return type(value), {}
     if isinstance(value, str):
@@ -222,13 +226,13 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
 
 
 def named_by(fields: dict[str, object]) -> str:
-    """The name of a class by the "type" of a description, and by the "file" of a shader; both are removed."""
+    """The name of a class, from the "type" of a description and the "file" of a shader, both of which are removed."""
     name = str(fields.pop("type"))
     return str(fields.pop("file")) if name == SHADER and "file" in fields else name
 
 
 def as_text(value: object) -> str:
-    """A JSON value as text."""
+    """A JSON value as a string."""
     if isinstance(value, Mapping):
         inner = ",".join(f"{name}={as_text(v)}" for name, v in value.items() if name != "type")
         return f"{value.get('type')}({inner})" if inner else str(value.get("type"))
@@ -238,7 +242,7 @@ def as_text(value: object) -> str:
 
 
 def range_of(text: str) -> list[str]:
-    """The five values of "LOW..HIGH", geometric if the range spans a factor of ten or more; empty for any other text.
+    """The five values of "LOW..HIGH", geometric if the range spans a factor of ten or more; empty for any other string.
 
     Raises InputError for ends that are not numbers or do not increase.
     """

@@ -83,7 +83,7 @@ def for_command(path: Path, against: str | BSDF | None) -> Asked:
         return Asked(material, f"with the parameters of the file's line: {text}")
     material = notation.build((cls, own))
     if text and (line is None or line.cls is not cls):
-        return Asked(material, f"the file's line names {text}, and {cls.name} was asked for", not own)
+        return Asked(material, f"the file's line names {text}, but {cls.name} was requested", not own)
     return _with_defaults(material, own)
 
 
@@ -101,7 +101,7 @@ def for_task(path: Path, models: tuple[str, ...]) -> Asked:
     asked = next((one for one in map(notation.taken_apart, models) if one[0] is line.cls), None)
     if asked is None:
         name = notation.taken_apart(models[0])[0].name
-        raise AnotherModelError(f"the file names {line.cls.name}, and the task is {name}", path.name)
+        raise AnotherModelError(f"the file names {line.cls.name}, but the task is {name}", path.name)
     cls, own = asked
     wanted = notation.build((cls, own))
     given = notation.build((cls, {**_without_preset(Line(cls, own), line.settings), **line.settings}))
@@ -153,14 +153,14 @@ def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
         other = inside.get(path)
         if other is None or type(other) is not type(inner):
             has = "missing" if other is None else other.name
-            what = f"{path} is {has}, and the task has {inner.name}"
+            what = f"{path} is {has}, but the task has {inner.name}"
             raise AnotherModelError(f"the file names another model: {what}", where)
         for name, parameter in type(inner).parameters().items():
             if not (isinstance(parameter, ChoiceParameter) or name == _EDGE) or name == _SAMPLING:
                 continue
             asked, given_one = getattr(inner, name), getattr(other, name)
             if given_one != asked and (not path or given_one != parameter.default):
-                raise AnotherModelError(f"the file names {name}={given_one}, and the task has {name}={asked}", where)
+                raise AnotherModelError(f"the file names {name}={given_one}, but the task has {name}={asked}", where)
             terms[tree.join(path, name)] = asked
     return terms
 

@@ -1,1 +1,1 @@
-"""Materials fitted to measurements: `data` (fitted values), `parameters` (free parameters), `solver`, `fit`."""
+"""Fit materials to measurements: `data` (fitted values), `parameters` (free parameters), `solver`, `fit`."""

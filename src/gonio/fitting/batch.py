@@ -98,7 +98,11 @@ def run(
     report: Callable[[int, int, str], None] = lambda done, total, text: None,
     notice: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
-    """Fit each model to each file. An error is raised for a single file; with several files it goes into `failed`."""
+    """Fit each model to each file. An error is raised for a single file; with several files it goes into `failed`.
+
+    report  called before each file with the number of finished files, the number of all files, and the file's name
+    notice  called at the start with a notice if an earlier run already fitted some of the files
+    """
     settings = settings or Settings()
     how = (tuple(models), *settings.key)
     job = parts.Parts("fit", how, tuple(files)) if len(files) > 1 else None

@@ -91,7 +91,11 @@ def _correlation(covariance: Floats) -> Floats:
 
 
 def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int) -> tuple[Floats, Floats]:
-    """(J^T J (K, K), scores J^T r of each run (R, K)) for residuals in parts; `rows` assigns a run to each residual."""
+    """(J^T J (K, K), scores J^T r of each run (R, K)) for residuals in parts.
+
+    rows   index of the run of neighbors that each residual belongs to
+    count  number of parameters K
+    """
     runs = int(rows.max()) + 1 if len(rows) else 1
     hessian, scores = np.zeros((count, count)), np.zeros((runs, count))
     for residual, jacobian, which in parts:
@@ -110,6 +114,7 @@ def degrees_of_freedom(parts: Sequence[Linearized], rows: NDArray[np.int64], inv
     e_g is the run's contribution to the variance for independent errors of equal size. The sum is about chi^2 with
     (sum e_g)^2 / sum e_g^2 degrees of freedom (Satterthwaite1946).
 
+    rows     index of the run of neighbors that each residual belongs to
     inverse  inverse of J^T J, (K, K)
     """
     runs = int(rows.max()) + 1 if len(rows) else 1

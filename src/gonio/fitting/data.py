@@ -44,7 +44,7 @@ class Data:
         return np.count_nonzero(self.value < 0.0, axis=0)
 
     def some(self, count: int, seed: int = 1) -> Data:
-        """A uniform random subset of `count` values; all values if there are fewer."""
+        """A uniform random subset of `count` values, selected by `seed`; all values if there are fewer."""
         if count >= len(self):
             return self
         chosen = np.sort(np.random.default_rng([seed, 91]).choice(len(self), count, replace=False))
@@ -56,6 +56,8 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
 
     A half-difference table provides its own valid cells; other tables are resampled on such a grid within the measured
     angles.
+
+    where  name of the table, for errors
     Raises InputError if no value remains.
     """
     if not 0.0 < grazing <= 90.0:

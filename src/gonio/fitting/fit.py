@@ -84,8 +84,8 @@ class Fit:
 
     @property
     def half_widths(self) -> Floats:
-        """Half widths of the symmetric 95 % intervals, (K,), by Student's t distribution if few runs determine a
-        number."""
+        """Half widths of the symmetric 95 % intervals, (K,), by Student's t distribution if few runs of neighbors
+        determine a number."""
         return quantiles(self.degrees) * self.errors
 
     @property
@@ -197,7 +197,7 @@ def fit(
     param     path -> value of parameters that stay fixed
     free      paths of additional parameters to fit that are fixed by default: scale factors of 1
     grazing   degrees; values with a direction beyond this angle from the normal are excluded
-    progress  called with a text that states the loss, after each start and at the end
+    progress  called with a message that states the loss, after each start and at the end
     The solver is Levenberg-Marquardt from several starting points with different lobe widths, first on subsets, finally
     on all values.
     Raises InputError for invalid files, models and paths.

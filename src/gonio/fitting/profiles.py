@@ -35,7 +35,7 @@ SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the
 
 
 class Costs(Residuals, Protocol):
-    """A least-squares problem whose sum of squares can be evaluated by itself."""
+    """A least-squares problem whose sum of squares can be evaluated without derivatives."""
 
     def cost(self, numbers: Floats) -> float: ...
 

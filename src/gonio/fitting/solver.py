@@ -39,7 +39,10 @@ METRICS = {
 
 
 def metric(name: str, value: Array, floor: Array) -> Array:
-    """Transform a value of one channel to the scale of the metric; for "relative" see `deviance`."""
+    """Transform a value of one channel to the scale of the metric; for "relative" see `deviance`.
+
+    floor  value below which a "log" difference becomes an absolute one
+    """
     dr = backend.drjit()
     if name in ("linear", "relative"):
         return value
@@ -107,8 +110,8 @@ class Problem:
     material  the material to fit
     free      its free parameters
     name      name of the metric
-    floor     value below which "log" is absolute
-    floors    (3,), value per channel below which "relative" is absolute
+    floor     value below which a "log" difference becomes an absolute one
+    floors    (3,), value per channel below which a "relative" difference becomes an absolute one
     """
 
     material: BSDF
@@ -230,8 +233,9 @@ class Problem:
 
 
 def floors_of(value: Floats) -> Floats:
-    """Values per channel below which "relative" is absolute, (3,): a thousandth of the brightest values in the data.
-    Negative values are ignored: in measured files, they lie in highlights whose color is out of gamut."""
+    """Values per channel below which a "relative" difference becomes an absolute one, (3,): a thousandth of the
+    brightest values in the data. Negative values are ignored: in measured files, they are in highlights whose color is
+    out of gamut."""
     brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
     return np.maximum(SMALL * brightest, 1e-6)
 

@@ -18,7 +18,7 @@ OPEN = 4.0  # upper limit for random values of unbounded parameters
 
 
 def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
-    """Starting points: the values of the material, and combinations of other lobe widths and indices."""
+    """The starting points: the values of the material, and combinations of other lobe widths and indices."""
     first = start_of(material, free)
     starts = [first]
     open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
@@ -36,7 +36,11 @@ def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
 
 
 def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: int = 23) -> list[Floats]:
-    """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`."""
+    """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`.
+
+    first  values of the free parameters in the material, (K,)
+    seed   seed of the random numbers
+    """
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)

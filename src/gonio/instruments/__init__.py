@@ -1,1 +1,1 @@
-"""Instruments that measure materials: a virtual goniometer, photographs of a sphere, and fits to pictures."""
+"""Measure materials: with a virtual goniometer, from photographs of a sphere, and by fits to pictures."""

@@ -109,7 +109,7 @@ class PictureFit:
 
 @dataclass(frozen=True)
 class Fitting:
-    """How pictures are rendered during a fit; the fields are arguments of `fit_picture`."""
+    """Options of the renders during a fit; the fields are arguments of `fit_picture`."""
 
     spp: int = SPP
     seed: int | None = None
@@ -300,7 +300,7 @@ class Problem:
         return Settings("path", max_depth=self.depth, seed=seed)
 
     def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
-        """Render the picture with these parameters."""
+        """Render the picture with these parameters; None selects the fit's own samples per pixel or seed."""
         self.put(numbers)
         render = Render(self.scene, self._settings(self.seed if seed is None else seed))
         render.advance(spp or self.spp)

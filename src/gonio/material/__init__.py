@@ -73,12 +73,12 @@ def models() -> dict[str, type[BSDF]]:
 
 
 def is_model(name: str) -> bool:
-    """Whether there is a class of that name, as for `model`."""
+    """Whether a material class of this name exists, ignoring underscores, hyphens and case."""
     return bool(_key(name))
 
 
 def model(name: str) -> type[BSDF]:
-    """The class of that name, ignoring underscores, hyphens and case. Raises InputError if there is none."""
+    """The material class of this name, ignoring underscores, hyphens and case. Raises InputError if there is none."""
     key = _key(name)
     if not key:
         raise InputError(f"unknown material '{name}'", "model", did_you_mean(_plain(name), list(models())))
@@ -86,7 +86,7 @@ def model(name: str) -> type[BSDF]:
 
 
 def _key(name: str) -> str:
-    """The name under which a class is registered; "" if it is not."""
+    """The name under which a class is registered; "" if it is not registered."""
     known = models()
     by_class = {cls.__name__.lower(): key for key, cls in known.items()}
     return _plain(name) if _plain(name) in known else by_class.get(name.lower(), "")

@@ -1,4 +1,4 @@
-"""The angles at which a material's values are known: all, unless it is a table of measurements that ends earlier."""
+"""The angles at which a material's values are known: all, unless it is a measured table that covers fewer."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ SLACK = 0.1  # degrees by which the last node of a table may lie above the horiz
 
 
 class AngularRange(NamedTuple):
-    """Lowest and highest angle, degrees.
+    """The smallest and largest of each angle, in degrees.
 
-    view     of wo from the normal
-    light    of wi from the normal, on either side of the surface
-    azimuth  between the two, 0 to 180
+    view     angle between wo and the normal, 0 to 90
+    light    angle between wi and the normal or its opposite, 0 to 90
+    azimuth  difference between the azimuths of wo and wi, 0 to 180
     """
 
     view: Ends = (0.0, 90.0)
@@ -29,12 +29,12 @@ class AngularRange(NamedTuple):
         return self == EVERYWHERE
 
     def within(self, other: AngularRange) -> AngularRange:
-        """The intersection of two ranges."""
+        """The intersection with another range."""
         ends = [(max(a[0], b[0]), min(a[1], b[1])) for a, b in zip(self, other, strict=True)]
         return AngularRange(*ends)
 
     def holds(self, wo: NDArray[np.floating], wi: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Which pairs of unit vectors, (N, 3) each, lie in the range."""
+        """Whether each pair of unit vectors, (N, 3) each, lies in the range."""
         known = np.ones(len(wi), bool)
         azimuth = np.abs(np.arctan2(wo[:, 0] * wi[:, 1] - wo[:, 1] * wi[:, 0], np.sum(wo[:, :2] * wi[:, :2], axis=1)))
         angles = (
@@ -63,7 +63,7 @@ EVERYWHERE = AngularRange()
 
 
 def of_nodes(view: NDArray[np.floating], light: NDArray[np.floating], azimuth: NDArray[np.floating]) -> AngularRange:
-    """The range of a table's nodes in radians; an axis without nodes has the full range."""
+    """The range that a table covers, from its sorted nodes in radians; an axis without nodes has the full range."""
     ranges = []
     for nodes, (lowest, highest) in zip((view, light, azimuth), EVERYWHERE, strict=True):
         low, high = (np.degrees(nodes[0]), np.degrees(nodes[-1])) if len(nodes) else (lowest, highest)

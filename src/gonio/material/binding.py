@@ -1,7 +1,8 @@
 """The bound copy of a material: its numbers are Dr.Jit values (or symbols), ready for `eval`, `pdf` and `sample`.
 
-Binding converts each number to an evaluated array of one entry instead of a literal, so that a changed value compiles
-nothing. Values that depend on the parameters only (`BSDF.derive`) are computed once and stored in the bound copy.
+Binding converts each number to an evaluated array of one entry instead of a literal, so that changing a value does not
+require compilation. Values that depend only on the parameters (`BSDF.derive`) are computed once and stored in the bound
+copy.
 
 Bound copies are made in this file only.
 """
@@ -21,7 +22,11 @@ DERIVED = "derived"  # the part of a bound copy that holds the result of `derive
 
 
 def bound_copy(material: M, values: Mapping[str, object], derived: object = None) -> M:
-    """A copy with these bound values of all numeric parameters and inner materials."""
+    """A bound copy with the given values.
+
+    values   parameter name -> bound value or bound inner material; other parameters keep their values
+    derived  the result of `derive`; None if it is not known
+    """
     copy: M = object.__new__(type(material))
     state = vars(copy)
     state.update(vars(material))
@@ -31,7 +36,7 @@ def bound_copy(material: M, values: Mapping[str, object], derived: object = None
 
 
 def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
-    """A bound copy with `convert(parameter, value)` for every number, including those of inner materials."""
+    """A bound copy in which each number, including those of inner materials, is `convert(parameter, value)`."""
     values = {}
     for name, parameter in material.parameters().items():
         if parameter.inner:
@@ -63,7 +68,7 @@ def with_derived(material: M, derived: object) -> M:
 
 def evaluate_derived(material: Material, rays: int = 1) -> object:
     """The derived values of a bound copy, evaluated. None if a parameter is being differentiated or has values for more
-    than `rays` rays, and while Dr.Jit records a loop, inside which nothing can be evaluated."""
+    than `rays` rays, or while Dr.Jit records a loop, inside which nothing can be evaluated."""
     if not material.derives:
         return None
     dr = backend.drjit()
@@ -94,12 +99,12 @@ def values(material: Material) -> Iterator[Scalar | Vector]:
 
 
 def shift(material: M, path: str, change: Callable[[Value], Value]) -> M:
-    """The bound copy with one value replaced."""
+    """The bound copy with the value at a path ("base.alpha") replaced by `change(value)`."""
     name, _, rest = path.partition(".")
     value = getattr(material, name)
     return bound_copy(material, {name: shift(value, rest, change) if rest else change(value)})
 
 
 def _plain(material: Material) -> bool:
-    """Whether all numbers are plain numbers; arrays could be modified by their owner."""
+    """Whether all numbers are plain numbers, since arrays could be modified by their owner."""
     return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

@@ -1,9 +1,10 @@
-"""Transfer of many rows between NumPy and Dr.Jit, in the kernel that computes the results.
+"""Transfer of large arrays between NumPy and Dr.Jit, in the kernel that computes the results.
 
-Rows are interleaved, x y z x y z. NumPy takes ten times as long to separate and convert their components, and to check
-that they are unit vectors, as the kernel takes to evaluate a metal; here the kernel does all this, on all threads. This
-kernel differs from the one for few rows and must be compiled separately, so it pays off for many rows only. Results
-consist of separate components, since a kernel would take three times as long to write interleaved rows.
+The rows of an array are interleaved, x y z x y z. NumPy takes ten times as long to separate and convert their
+components, and to check that they are unit vectors, as the kernel takes to evaluate a metal; here the kernel does all
+this, on all threads. This kernel must be compiled separately from the one for small arrays, so it pays off for large
+arrays only. Results consist of separate components, since a kernel would take three times as long to write interleaved
+rows.
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ UNIT = 1e-2  # tolerance of a direction's length, for rounding errors and values
 
 
 def vector_of(rows: np.ndarray, count: int, types: backend.Types) -> backend.Array:
-    """Rows of shape (N, 3), (1, 3) or (3,), float32 or float64, as a Dr.Jit vector that reads them in a kernel."""
+    """An array as a Dr.Jit vector of `count` entries; the kernel that uses the vector reads the array's memory.
+
+    rows  (N, 3), (1, 3) or (3,), float32 or float64
+    """
     if rows.size == 3:
         return backend.vector_of(rows.reshape(3), 3, types)
     dr = backend.drjit()
@@ -45,9 +49,10 @@ def is_random(u: backend.Array) -> backend.Array:
 def to_numpy(
     values: Sequence[backend.Array], shape: tuple[int, ...], checks: Sequence[backend.Array]
 ) -> tuple[list[np.ndarray], list[bool]]:
-    """(each value as an array of a shape, (*shape, size) for a vector; whether each check holds in all rows).
+    """Evaluate values and checks in one kernel.
 
-    One kernel computes everything. The array of a vector is a view of separate components, as Dr.Jit stores them.
+    Returns two lists: one array of the given shape per value, (*shape, size) for a vector; and, for each check, whether
+    it holds in all rows. The array of a vector is a view of separate components, as Dr.Jit stores them.
     """
     dr = backend.drjit()
     dr.eval(values, checks)

@@ -7,8 +7,9 @@
         def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
             return self.albedo * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
-Only `eval` must be defined. `pdf` and `sample` default to a guide computed from it (`gonio.material.guide`), `f`
-follows from it, and every fact has a safe default. Other packages query these members and never test for a class.
+Only `eval` must be defined. `pdf` and `sample` default to a guide, a density tabulated from it
+(`gonio.material.guide`), `f` is computed from it, and every fact has a safe default. Other packages query these members
+and never test for a class.
 
 The formulas are written in the vocabulary of `gonio.ops` and use *bound* parameters (`gonio.material.binding`): Dr.Jit
 values, or symbols while recording. Callers pass NumPy arrays, lists or Dr.Jit vectors (`gonio.material.calling`).
@@ -45,7 +46,12 @@ if TYPE_CHECKING:
 
 
 class StatedAlbedo(NamedTuple):
-    """An albedo stated by the authors of a model: its source, values (N, 3), and the error that they allow."""
+    """A directional albedo stated by the authors of a model.
+
+    source     the reference and equation
+    value      the albedo, (N, 3)
+    tolerance  the largest absolute error that the authors claim
+    """
 
     source: str
     value: NDArray[np.float64]
@@ -63,14 +69,16 @@ class BSDF(Material):
     """Base of every material. Subclasses are frozen dataclasses; `name` is derived from the class name by default.
 
     known_violations    law -> KnownViolation, for laws that the model violates by design (Phong: reciprocity, energy)
-    limits      values at which a part of the model is switched off, and what the model then equals
-    spelling    the file that a class was made from, by which texts name it; "" for classes written in Python
-    only_rgb    whether eval returns red, green and blue regardless of the renderer's channels
-    stochastic  whether eval, pdf and weight are random estimates whose expectation is the exact value
-    reads_wavelengths  whether it needs the rays' wavelengths, as `wavelengths` of its bound copy
-    reads_surface  whether it needs dp/du.x, dp/dv.x and dp/dv.y at a hit, as `surface` of its bound copy
-    fits_factors  whether fits vary parameters whose default and maximum are 1, in other models redundant factors
-    lossless_tolerance  the largest loss allowed in a white furnace (F = 1, every albedo 1); None makes no claim
+    limits              values at which a part of the model is switched off, and what the model then equals
+    spelling            path of the file that defines the class, used as its name in strings; "" if written in Python
+    only_rgb            whether `eval` returns red, green and blue regardless of the renderer's channels
+    stochastic          whether `eval`, `pdf` and the weight are random estimates whose expectation is the exact value
+    reads_wavelengths   whether its bound copy needs the rays' wavelengths, as the attribute `wavelengths`
+    reads_surface       whether its bound copy needs dp/du.x, dp/dv.x and dp/dv.y at a hit, as the attribute `surface`
+    fits_factors        whether fits vary parameters whose default and maximum are 1, which are redundant factors in
+                        other models
+    lossless_tolerance  the largest loss allowed in a white furnace (F = 1, every albedo 1); None if the model makes no
+                        claim
     """
 
     family: ClassVar[Family[type[BSDF]]]
@@ -130,40 +138,43 @@ class BSDF(Material):
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """f(wo, wi) |cos theta_i|, a spectrum, 1/sr; 0 for delta lobes.
 
-        wo, wi  (N, 3) unit vectors away from the surface: toward the viewer, toward the light
-        mode    "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
+        wo, wi       (N, 3), unit vectors away from the surface: toward the viewer and toward the light
+        mode         "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
+        precision    for arrays and tensors: "float32" or "float64"; None is the precision of the tensors, or for arrays
+                     that of `go.set_precision`
         derivatives  for arrays: paths of parameters; the result stacks the values and one derivative per path
-        wavelengths  for arrays: nm, (M,); the result is (N, M). Colors must be gray: three numbers are not a spectrum
+        wavelengths  for arrays: wavelengths in nm, (M,); the result is (N, M). Colors must be gray: three numbers are
+                     not a spectrum
         parameters   for tensors of PyTorch or JAX (wo, wi or these): path -> tensor, which receives gradients
-        Returns (N, channels); for arrays of shape (..., 3), (..., channels); for tensors a tensor, on the device of wo.
+        Returns (N, channels); for arrays of shape (..., 3), (..., channels); for tensors, a tensor on the device of wo.
         """
         raise NotImplementedError(f"{type(self).__name__} has no eval")
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes.
+        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes. Arguments as for `eval`.
 
-        The default, if `sample` is not defined either, is the density of a guide (`gonio.material.guide`).
+        If neither `pdf` nor `sample` is defined, it is the density of a guide (`gonio.material.guide`).
         """
         return _guide(self).pdf(self, wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """Sample wi for wo.
+        """Sample wi for wo; returns a `Sample`.
 
-        u  three numbers in [0, 1) per ray, (N, 3): the first selects the lobe, the others the direction
-        The default uses a guide computed from `eval`.
+        u  three random numbers in [0, 1) per ray, (N, 3): the first selects the lobe, the others the direction
+        The default uses a guide computed from `eval`. For `mode`, `precision` and `parameters`, see `eval`.
         """
         wi = _guide(self).draw(self, wo, u)
         return self._weighted(wo, wi, mode)
 
     def sample_cosine(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A `sample` for classes whose `pdf` is |cos theta_i| / pi on wo's side: the cosine-weighted hemisphere."""
+        """An implementation of `sample` for classes whose `pdf` is |cos theta_i| / pi on wo's side."""
         local = warp.square_to_cosine_hemisphere(u.y, u.z)
         return self._weighted(wo, ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z)), mode)
 
     def _weighted(self, wo: Direction, wi: Direction, mode: Mode) -> Sample:
-        """The sample for a direction with density `pdf`."""
+        """The `Sample` for a direction wi drawn with density `pdf`."""
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)
@@ -171,19 +182,22 @@ class BSDF(Material):
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
-        """The factors of `eval` as a NamedTuple, for inspection; for a microfacet lobe D, G and F."""
+        """The factors of `eval` as a NamedTuple, for inspection: D, G and F for a microfacet lobe.
+
+        Raises InputError if the class does not define `terms`; see `has_terms`.
+        """
         raise InputError(f"{type(self).__name__} has no terms", "terms", "see `has_terms`")
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The parts of the light from wi to wo with known polarization: light scattered by single smooth facets. The
-        remainder of `eval` is unpolarized; by default, that is all light.
+        """The parts of the light from wi to wo whose polarization is known: light scattered once, by a smooth facet.
+        The remainder of `eval` is unpolarized; by default, all light is.
 
-        delta  rays whose two directions are joined by delta lobes; the values are then the weights of the lobes
+        delta  mask of rays whose wo and wi are connected by a delta lobe; their values are the weights of the lobes
         """
         return ()
 
     def tint(self, wo: Direction) -> Spectrum:
-        """A noise-free color near the albedo for wo, by which denoisers distinguish materials."""
+        """A noise-free color close to the albedo for wo, by which denoisers distinguish materials."""
         shares = [name for name, p in self.parameters().items() if p.white == 1.0]
         white: Value = 1.0
         return getattr(self, shares[0]) if shares else white
@@ -202,7 +216,8 @@ class BSDF(Material):
 
     @property
     def isotropic(self) -> bool:
-        """Whether rotation about the normal changes nothing: no width is anisotropic, here and in inner materials."""
+        """Whether `eval` is invariant under rotation about the normal. By default, true if no width is anisotropic,
+        here and in inner materials."""
         return all(
             equality.alike(*pair_of(leaf.value)) for leaf in tree.leaves(self.plain) if leaf.parameter.kind == "alpha"
         )
@@ -222,82 +237,91 @@ class BSDF(Material):
 
     @property
     def two_sided(self) -> bool:
-        """Whether a surface that does not transmit looks the same from below as from above."""
+        """For a surface that does not transmit: whether it reflects the same from below as from above."""
         return False
 
     @property
     def back_differs(self) -> bool:
-        """Whether a surface that does not transmit, that of an inner material included, also reflects from below, with
-        other values than from above."""
+        """For a surface that does not transmit: whether it, or an inner material, also reflects from below, but with
+        different values than from above."""
         return any(inner.back_differs for inner in tree.children(self).values())
 
     @property
     def ambient(self) -> Spectrum | None:
-        """Factor of the scene's ambient light, for empirical models; None for all others."""
+        """The factor by which the scene's ambient light is multiplied, for empirical models; None for all others."""
         return None
 
     @property
     def microsurface(self) -> Microsurface | None:
-        """The rough surface that scatters the light, for which energy tables exist; None for other materials."""
+        """The rough surface that scatters the light, for which energy tables exist; None if there is none."""
         return None
 
     @property
     def interior(self) -> Interior | None:
-        """The medium behind a surface that transmits, or behind the first inner material that does; else None."""
+        """The medium behind a surface that transmits, or behind the first inner material that does; None if there is
+        none."""
         interiors = (inner.interior for inner in tree.children(self).values())
         return next((interior for interior in interiors if interior is not None), None)
 
     @property
     def needs_uniform(self) -> bool:
-        """Whether its parameters, inner ones included, must be the same for all rays: no textures, no arrays."""
+        """Whether its parameters, including those of inner materials, must be the same for all rays, so that they accept
+        no textures and no arrays."""
         return any(inner.needs_uniform for inner in tree.children(self).values())
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Paths of the parameters that must be the same for all rays, because tables are computed from them once."""
+        """Paths of the parameters that must be the same for all rays because tables are computed from them once."""
         paths = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
         return frozenset(paths)
 
     def normal_reflectance(self) -> Spectrum | None:
-        """F0, the reflectance at normal incidence including its albedo; None if it is undefined."""
+        """F0, the reflectance at normal incidence including the albedo; None if it is undefined."""
         return None
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum | Scalar | None:
         """F_avg = 2 int F(mu) mu dmu, the average Fresnel reflectance without the albedo; None without a Fresnel term.
 
-        average  "exact", or the name of a fit
+        average  "exact", or the name of a published fit to the integral
         """
         return None
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """Directional albedo in power, (N, 3), if it is known better than by integrating `eval`; else None.
+        """Directional albedo in power, without the factor (eta_o/eta_i)^2, (N, 3), if it is known more accurately than
+        by integrating `eval`; else None.
 
-        mu, phi  cosine and azimuth of wo, (N,)
-        inner    the albedo of an inner material, if known
+        mu, phi  cosine of the polar angle of wo, and its azimuth, (N,)
+        inner    function (material, mu, phi) that returns the albedo of an inner material, or None if it is not known
         nodes    number of nodes for a quadrature by the material itself; None requests closed forms only
         """
         return None
 
     def stated_albedo(self, wo: NDArray[np.float64]) -> StatedAlbedo | None:
-        """The albedo that the authors of the model use elsewhere, such as a fit by which they weight a base below it,
-        for wo (N, 3); the law `energy` compares it with the integral of `eval`."""
+        """The albedo for wo, (N, 3), that the authors of the model state, such as a fit by which they weight the base
+        below a layer. The law `energy` compares it with the integral of `eval`."""
         return None
 
     @classmethod
     def reads(cls, text: str) -> bool:
-        """Whether a text names a file of this material: "gold.binary". The path then becomes the parameter `file`."""
+        """Whether a string is the path of a file that this material reads, such as "gold.binary". The path then becomes
+        the parameter `file`."""
         return False
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
-        """Named values of its parameters, by short name ("Au"); empty if there are none."""
+        """The presets of this class by short name ("Au"); empty if there are none."""
         return {}
 
     @classmethod
     def preset(cls, name: str, **parameters: Value) -> Self:
-        """A material by a preset's name: Conductor.preset("Au", alpha=0.2). Raises InputError if it is unknown."""
+        """A material with the values of a preset: Conductor.preset("Au", alpha=0.2).
+
+        name        short name or title of the preset, ignoring case
+        parameters  values of parameters, which override those of the preset
+        Raises InputError if the name is unknown.
+        """
         parameters = with_pair(cls.parameters(), parameters, cls.__name__)
         known = cls.presets()
         by_name = {key.lower(): key for key in known} | {p.title.lower(): key for key, p in known.items()}
@@ -310,11 +334,15 @@ class BSDF(Material):
         return cls(**{**known[key].values, **parameters})
 
     def renderer_calls(self, seed: int) -> Iterable[Any]:
-        """Calls of a renderer other than eval, pdf and sample, with results, for the verifier; by default none."""
+        """Calls of a renderer other than eval, pdf and sample, each with its results, for the law `calls`; by default
+        none.
+
+        seed  seed of the directions and random numbers
+        """
         return ()
 
     def violations(self) -> dict[str, KnownViolation]:
-        """The laws that it, or an inner material, violates with these parameters, with sizes as numbers."""
+        """The laws that this material, or an inner one, violates with these parameters; each size is a number."""
         violated: dict[str, KnownViolation] = {}
         for name, inner in tree.children(self).items():
             for law, one in inner.violations().items():
@@ -327,8 +355,11 @@ class BSDF(Material):
         return violated
 
     def lossless(self) -> Self:
-        """The lossless variant: every albedo 1 and F = 1, here and in inner materials; itself if nothing changes. Loss
-        that remains in a furnace is due to the shape of the lobe. The variant of a bound copy is bound."""
+        """The lossless variant, in which every albedo is 1 and F = 1, here and in inner materials; the material itself
+        if nothing changes. Any loss that remains in a furnace is due to the shape of the lobe.
+
+        The variant of a bound copy is bound.
+        """
         values: dict[str, object] = {}
         for name, parameter in self.parameters().items():
             value = getattr(self, name)
@@ -354,16 +385,21 @@ class BSDF(Material):
         return binding.bind_to(self, types)
 
     def record(self, method: str = "eval", mode: Mode = "radiance") -> graph.Graph:
-        """A method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
+        """A method as a typed graph. Its inputs are the material's parameters, "self.alpha", ..., then the arguments of
+        the method.
+
+        method  "eval", "pdf", "sample" or "terms"
+        mode    as in `eval`; the mode is fixed in the graph
+        """
         return recording.record(self, method, mode)
 
     def __parts__(self) -> dict[str, object]:
-        """The parts that a recording follows: the parameters, and the derived values if this copy holds them."""
+        """The values that are inputs of a recording: the parameters, and the derived values if this copy holds them."""
         parts = {name: getattr(self, name) for name, parameter in self.parameters().items() if not parameter.inside}
         return parts if self._derived is None else {**parts, binding.DERIVED: self._derived}
 
     def __with_parts__(self, parts: Mapping[str, object]) -> Self:
-        """A copy with these parts replaced."""
+        """A copy with these values replaced."""
         values = dict(parts)
         return binding.bound_copy(self, values, values.pop(binding.DERIVED, None))
 
@@ -394,7 +430,7 @@ class BSDF(Material):
         *,
         parameters: Mapping[str, tensors.Tensor] | None = None,
     ) -> object:
-        """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Shapes and `parameters` as in `eval`."""
+        """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Arguments and shapes as in `eval`."""
         value = self.eval(wo, wi, mode=mode, precision=precision, parameters=parameters or {})
         if backend.is_drjit(wi):
             return value * ops.safe_div(1.0, ops.abs(wi.z))
@@ -408,11 +444,11 @@ class BSDF(Material):
         return f"{type(self).__name__}({set_})"
 
     def _repr_html_(self) -> str:
-        """An HTML table for notebooks: every parameter with its value and documentation."""
+        """An HTML table for notebooks, with the value and documentation of every parameter."""
         return notebook.table(type(self).__name__, tree.leaves(self))
 
     def __eq__(self, other: object) -> bool:
-        """Same class, same values: a material equals its pickled copy."""
+        """Whether the other material is of the same class and has the same values, as a pickled copy has."""
         if self is other:
             return True
         if not isinstance(other, BSDF) or type(self) is not type(other) or self.is_bound or other.is_bound:
@@ -440,7 +476,7 @@ BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), 
 
 
 def _guide(material: BSDF) -> Guide:
-    """The guide of a material that defines `eval` alone."""
+    """The guide of a material that defines only `eval`."""
     from . import guide_search  # only such a material needs it, and the import takes 10 ms
 
     return guide_search.guide_of(material.plain)

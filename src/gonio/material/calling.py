@@ -1,7 +1,7 @@
-"""Calls from outside: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
+"""Calls of a material's methods by users: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
 
-`method` wraps the formulas of a material. Called with bound parameters (by another formula, a renderer, a recording),
-the formula runs unchanged; otherwise the material is bound, and the arguments and the result are converted.
+`method` wraps the formulas of a material. If the parameters are bound (in calls by another formula, a renderer or a
+recording), the formula runs unchanged; otherwise the material is bound, and the arguments and the result are converted.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ EXTRAS = ("derivatives", "wavelengths", "parameters")  # arguments of eval and p
 
 
 class EvalMethod(Protocol):
-    """`eval` as callers see it: a spectrum per ray, (N, 3)."""
+    """The signature of `eval` for callers: it returns one spectrum per ray, (N, 3)."""
 
     @overload
     def __call__(self, wo: Direction, wi: Direction, mode: Mode = ...) -> Spectrum: ...
@@ -71,7 +71,7 @@ class EvalMethod(Protocol):
 
 
 class PdfMethod(Protocol):
-    """`pdf` as callers see it: a number per ray, (N,)."""
+    """The signature of `pdf` for callers: it returns one number per ray, (N,)."""
 
     @overload
     def __call__(self, wo: Vector3[S], wi: Vector3[S], *, precision: Precision | None = ...) -> S: ...
@@ -97,7 +97,7 @@ class PdfMethod(Protocol):
 
 
 class SampleMethod(Protocol):
-    """`sample` as callers see it."""
+    """The signature of `sample` for callers."""
 
     @overload
     def __call__(self, wo: Direction, u: Direction, mode: Mode = ...) -> Sample: ...
@@ -122,7 +122,8 @@ class SampleMethod(Protocol):
 
 
 class TermsMethod(Protocol[T_co]):
-    """`terms` as callers see it: a NamedTuple, with arrays (N,) or (N, 3) as fields for callers outside formulas."""
+    """The signature of `terms` for callers: it returns a NamedTuple, whose fields are arrays (N,) or (N, 3) outside
+    formulas."""
 
     @overload
     def __call__(self, wo: Direction, wi: Direction, *, precision: None = ...) -> T_co: ...
@@ -139,8 +140,8 @@ def method(formula: Callable[[M, Direction, Direction, Mode], Sample], /) -> _Sa
 @overload
 def method(formula: Callable[[M, Direction, Direction], T], /) -> _Terms[T]: ...
 def method(formula: Callable[..., object], /) -> object:
-    """Mark `eval`, `pdf`, `sample` or `terms` of a material, so that editors show the types for callers, who may pass
-    NumPy arrays, lists or Dr.Jit vectors. Methods of these names are wrapped even without the mark."""
+    """Decorate `eval`, `pdf`, `sample` or `terms` of a material, so that editors show the types for callers, who may
+    pass NumPy arrays, lists or Dr.Jit vectors. Methods of these names are wrapped even without the decorator."""
     if hasattr(formula, "__wrapped__"):
         return formula
     inner = ops.function(formula)
@@ -249,7 +250,7 @@ def _on_tensors(
     parameters: Mapping[str, Given],
     extra: Mapping[str, Given],
 ) -> object:
-    """`eval`, `pdf` and `sample` for tensors of PyTorch or JAX."""
+    """The result of `eval`, `pdf` or `sample` for tensors of PyTorch or JAX."""
     wo, other, mode, precision = arguments
     if not kind:
         hint = "give the values to the material: go.Conductor(alpha=0.2)"
@@ -302,8 +303,8 @@ def _on_request(
 
 
 def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
-    """Two arguments as arrays of shape (N, 3) or (3,), and the shape of the results: (N,), or that of arrays with more
-    axes, without the last. The values of many rows are checked later, with the results."""
+    """Two arguments as arrays of shape (N, 3) or (3,), and the shape of the results: (N,), or for arrays with more
+    axes, their shape without the last axis. The values of large arrays are checked later, together with the results."""
     arrays = []
     for label, value in (("wo", wo), ("u" if name == "sample" else "wi", other)):
         where = f"{name}: {label}"
@@ -357,7 +358,7 @@ def _check_unit(array: np.ndarray, location: str) -> None:
 
 
 def _check_rows(material: Material, count: int) -> None:
-    """Raise InputError if a parameter has one value per ray for another number of rays."""
+    """Raise InputError if a parameter has one value per ray, but for a different number of rays."""
     if count == 1:
         return
     for leaf in tree.leaves(material):

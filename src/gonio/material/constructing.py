@@ -1,6 +1,6 @@
-"""Names that constructors of materials accept besides the declared parameters: Mitsuba's names of the two widths.
+"""Names that constructors of materials accept besides the declared parameters: Mitsuba's names for the two widths.
 
-go.Conductor(alpha_u=0.1, alpha_v=0.3)        alpha=(0.1, 0.3)
+go.Conductor(alpha_u=0.1, alpha_v=0.3)        is go.Conductor(alpha=(0.1, 0.3))
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ WIDTHS = ("alpha_u", "alpha_v")  # along x and along y
 def with_pair(known: Mapping[str, object], given: Mapping[str, Any], where: str) -> dict[str, Any]:
     """The arguments with `alpha_u` and `alpha_v` as the pair `alpha`, if the material has `alpha` but not these names.
 
-    Raises InputError for only one of the two, and for these together with `alpha`.
+    known  the material's declared parameters
+    given  the arguments of its constructor
+    where  the name of the class, for errors
+    Raises InputError if only one of the two is given, or if either is given together with `alpha`.
     """
     named = [name for name in WIDTHS if name in given and name not in known]
     if not named or "alpha" not in known:
@@ -31,7 +34,8 @@ def with_pair(known: Mapping[str, object], given: Mapping[str, Any], where: str)
 
 
 def accepted(construct: Callable[..., None]) -> Callable[..., None]:
-    """A constructor that accepts the names of `with_pair`; for `preset`, its error suggests the method of that name."""
+    """A constructor that also accepts `alpha_u` and `alpha_v`. If `preset` is passed as an argument, its error suggests
+    the method `preset`."""
 
     @functools.wraps(construct)
     def __init__(self: Any, *args: Any, **given: Any) -> None:

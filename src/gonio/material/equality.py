@@ -1,4 +1,4 @@
-"""Comparison and hashes of the values of parameters."""
+"""Comparison and hashing of the values of parameters."""
 
 from __future__ import annotations
 

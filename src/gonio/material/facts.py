@@ -12,11 +12,11 @@ from .parameters import Value
 class KnownViolation(NamedTuple):
     """A law that a model violates by design.
 
-    reason   why, as part of a sentence; the manual and the verifier print it
+    reason   the reason, as a clause; the manual and the verifier print it
     size     the largest violation, in the unit of the law's measured value (for `energy`, the gain of the lossless
              variant): a number, or a function of the model; 0 if the law holds with these parameters, math.inf if
-             nothing bounds the violation
-    certain  whether the violation is always present: the verifier then fails a model that satisfies the law
+             the violation is unbounded
+    certain  whether the violation is always present; if so, the verifier fails a model that satisfies the law
     """
 
     reason: str
@@ -25,16 +25,16 @@ class KnownViolation(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """Values at which a part of a model is switched off, and the consequences, which the law `limits` tests.
+    """Values at which a part of a model is switched off, and the consequences, which are tested by the law `limits`.
 
         limits = (
             Limit({"coat_weight": 0.0}, mutes=("coat_*",)),
             Limit({"thickness": 0.0}, equals=lambda one: one.base),
         )
 
-    values  the parameters that switch it off, by name; numbers within their ranges
-    mutes   patterns, as in `fnmatch`, of the parameters that then have no effect on `eval`
-    equals  function of the model with these values that returns the model without that part; None to state only `mutes`
+    values  parameter name -> the number, within its range, that switches the part off
+    mutes   patterns, as in `fnmatch`, for the names of parameters that then have no effect on `eval`
+    equals  function that maps the model with these values to an equal model without the part; None if not stated
     """
 
     values: Mapping[str, float]
@@ -45,8 +45,8 @@ class Limit(NamedTuple):
 class Preset(NamedTuple):
     """Named values of some parameters.
 
-    title   the long name, "gold"
-    values  parameter -> value
+    title   the long name, such as "gold"
+    values  parameter name -> value
     source  the reference for the values
     """
 
@@ -56,10 +56,10 @@ class Preset(NamedTuple):
 
 
 class Microsurface(NamedTuple):
-    """The rough surface that a material consists of, for which `gonio.energy` has tables.
+    """The rough surface of a material, for which `gonio.energy` computes tables.
 
-    ndf, masking, fresnel  by name
-    alpha, rotation        widths and rotation, as the parameters hold them
+    ndf, masking, fresnel  names of the distribution of normals, the masking term and the Fresnel term
+    alpha, rotation        the two widths and the rotation, as in the material's parameters
     eta                    index inside divided by index outside, for a dielectric; None for a conductor
     albedo                 factor on all scattered light
     transmits              whether light is refracted into the material
@@ -78,9 +78,9 @@ class Microsurface(NamedTuple):
 class Interior(NamedTuple):
     """The medium behind a surface.
 
-    eta         index inside, relative to vacuum if media are nested, else relative to the outside
-    absorption  absorbed fraction per unit length (absorption coefficient)
-    priority    where media overlap, the one with the highest priority is present
+    eta         index of the medium, relative to vacuum if media are nested, else relative to the outside
+    absorption  absorption coefficient, per unit length
+    priority    priority of the medium; where media overlap, the one with the highest priority is present
     """
 
     eta: Scalar

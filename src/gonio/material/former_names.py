@@ -9,7 +9,7 @@ from .parameters import Value
 
 
 class _FormerName:
-    """A member's name in Gonio 0.1: returns the renamed member with a warning."""
+    """A descriptor for a member's name in Gonio 0.1: it warns and returns the renamed member."""
 
     def __init__(self, new: str) -> None:
         self.new = new
@@ -33,7 +33,7 @@ FORMER_NAMES = {
 
 
 def add_former_names(cls: type) -> None:
-    """Add the names of Gonio 0.1 to the members of a class."""
+    """Make the members of a class accessible by their names in Gonio 0.1."""
     for old, new in FORMER_NAMES.items():
         former = _FormerName(new)
         former.__set_name__(cls, old)
@@ -45,7 +45,7 @@ def _warn_of_former(cls: type, old: str, new: str) -> None:
 
 
 def move_former_names(cls: type) -> None:
-    """Rename members that a class defines under names of Gonio 0.1."""
+    """Rename members that a class defines under their names in Gonio 0.1, with a warning."""
     own = vars(cls)
     former = [(old, new) for old, new in FORMER_NAMES.items() if old in own and not isinstance(own[old], Field)]
     if "lossless" in own and not callable(own["lossless"]):

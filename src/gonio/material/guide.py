@@ -1,15 +1,16 @@
-"""Sampling for a material with `eval` only: a density proportional to the light, tabulated from `eval` itself.
+"""Sampling for a material that defines only `eval`: a density proportional to `eval`, tabulated from it.
 
-A guide is tabulated over a *chart*: directions by distance and azimuth about an axis. For half vectors the axis is the
-surface normal, so that a glossy lobe does not move with the viewer (as in Dupuy2018); a broad or asymmetric lobe is
-charted directly, about the normal or about the lobe's center. With q = |v - axis|^2 = 2 (1 - cos),
+A guide is tabulated over a *chart*, which maps directions to a distance from an axis and an azimuth about it. A glossy
+lobe is charted by half vectors about the surface normal, so that it does not move with the viewer (as in Dupuy2018); a
+broad or asymmetric lobe is charted by wi, about the normal or about the lobe's center. With v the half vector or wi,
+and q = |v - axis|^2 = 2 (1 - cos), the coordinates are phi and
 
     s = log(1 + q / q0) / log(1 + q_max / q0),    dw = dq dphi / 2,    dq = (q + q0) log(1 + q_max / q0) ds,
 
-so that equal steps of s resolve a lobe of width sqrt(q0) and anything wider. A density over (s, phi) is stored for each
-of a few angles of wo (and, if `eval` depends on them, azimuths of wo and values of parameters that vary over the
-surface). It is bilinear between nodes, and a mixture of two slices between their angles. A fraction of the samples
-follows the cosine, to cover light that the nodes miss.
+so that equal steps of s resolve a lobe of width sqrt(q0) and anything wider. A density over (s, phi), called a slice,
+is stored for each of a few angles of wo (and, if `eval` depends on them, for azimuths of wo and values of parameters
+that vary over the surface). A slice is bilinear between its nodes; between two angles, the density is a mixture of two
+slices. A fraction of the samples follows the cosine, to cover light that the nodes miss.
 
 `pdf` is the density of `sample`, whatever the tables contain: a guide that fits badly causes noise but no bias.
 `guide_search` computes the tables.
@@ -48,14 +49,15 @@ class Lobe(NamedTuple):
     """The distribution of light on one side of the surface.
 
     across   whether it is the side opposite to wo
-    chart    "half", "normal" or "center"
+    chart    "half" (half vectors about the normal), "normal" or "center" (wi about the normal or the lobe's center)
     q_max    largest q of the chart: 2 about the normal, else 4
-    full     whether azimuths cover the full circle from the tangent; else from wo's azimuth, with symmetric halves
-    density  over (s, phi), per slice: its integral over s and phi is 1
-    below    its integral over phi up to each node, per slice and node of s
-    rows     its integral over s and phi up to each node of s, per slice
+    full     whether phi covers the full circle and starts at the tangent; else it starts at wo's azimuth and covers one
+             of two symmetric halves
+    density  density over (s, phi), per slice; its integral over s and phi is 1
+    below    integral of the density over phi up to each node, per slice and node of s
+    rows     integral of the density over all phi and over s up to each node, per slice
     scales   q0 and 1 / log(1 + q_max / q0)
-    centers  sine and cosine of the center's angle to the normal, per slice: positive on wo's side
+    centers  sine and cosine of the angle between the lobe's center and the normal, per slice; positive on wo's side
     """
 
     across: bool
@@ -81,7 +83,7 @@ class Lobe(NamedTuple):
         return x * scale, z * scale
 
     def chart_of(self, place: Place, wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
-        """(s, phi, dw / (ds dphi) at wi) of a direction above the surface, for wo in the x-z plane."""
+        """(s, phi, dw / (ds dphi)) at a direction wi above the surface, for wo in the x-z plane."""
         v = half_vector(wo, wi) if self.chart == "half" else wi
         sine, cosine = self.axis(place)
         x, z = cosine * v.x - sine * v.z, sine * v.x + cosine * v.z
@@ -110,7 +112,7 @@ class Lobe(NamedTuple):
 
     @property
     def span(self) -> float:
-        """Length of the azimuth axis."""
+        """The range of phi: 2 pi or pi."""
         return 2.0 * ops.pi if self.full else ops.pi
 
     def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:
@@ -125,7 +127,7 @@ class Lobe(NamedTuple):
 
     @function
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
-        """(s, phi) with the density of a slice: first s, from the integrals over phi, then phi for that s."""
+        """(s, phi) drawn from the density of a slice: first s, from the integrals over phi, then phi for that s."""
         _, rows, columns = self.density.shape
 
         def row_below(row: Scalar) -> Scalar:
@@ -153,17 +155,17 @@ class Lobe(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The slices from which a ray's density is mixed, with their weights."""
+    """The slices of which a ray's density is a mixture, with their weights."""
 
     slices: tuple[Scalar, ...]
     weights: tuple[Scalar, ...]
 
 
 class Axis(NamedTuple):
-    """An axis of slices: a parameter that varies over the surface.
+    """An axis along which slices are stored: a parameter that varies over the surface.
 
-    read    its value in a bound material, as a position from 0 to 1
-    slices  number of slices along it
+    read    function that returns the parameter's value in a bound material, as a position from 0 to 1
+    slices  number of slices along the axis
     """
 
     read: Callable[[object], Scalar]
@@ -173,15 +175,15 @@ class Axis(NamedTuple):
 class Guide(NamedTuple):
     """The sampling tables of a material.
 
-    lobes      on wo's side, on the opposite side, or both; empty if nothing is scattered
+    lobes      the lobes on wo's side, on the opposite side, or on both; empty if nothing is scattered
     angles     number of slices over the angle of wo, from the normal to the horizon
     azimuths   number of slices over the azimuth of wo; 1 if `eval` is invariant under rotation
-    behind     whether slices for wo below the surface follow those for wo above; else the same slices serve for both
-    above      whether anything is scattered toward a wo above the surface
-    below      the same for a wo below the surface
-    axes       parameters that vary
-    shares     per slice: the fraction of the light in the lobe on the opposite side
-    cosine     fraction of samples that follow the cosine
+    behind     whether slices for wo below the surface follow those for wo above; else both use the same slices
+    above      whether light is scattered toward a wo above the surface
+    below      whether light is scattered toward a wo below the surface
+    axes       parameters that vary over the surface
+    shares     fraction of the light in the lobe on the side opposite to wo, per slice
+    cosine     fraction of the samples that follow the cosine
     """
 
     lobes: tuple[Lobe, ...]
@@ -219,7 +221,7 @@ class Guide(NamedTuple):
         return where(visible & (wi.z != 0.0), density, 0.0)
 
     def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
-        """A direction; u1 selects the slice and the side. On a side without scattering its pdf is 0."""
+        """A direction drawn for wo; u.x selects the slice and the side. Its pdf is 0 on a side without scattering."""
         broad = square_to_cosine_hemisphere(u.y, u.z)
         facing = where(wo.z < 0.0, -1.0, 1.0)
         if not self.lobes:
@@ -260,7 +262,8 @@ class Guide(NamedTuple):
         return across if lobe.across else 1.0 - across
 
     def _turn(self, wo: Direction) -> Direction:
-        """(cos, sin, 0) of the azimuth where charts start: wo's, or the tangent's if `eval` depends on the azimuth."""
+        """(cos, sin, 0) of the azimuth at which phi = 0: that of wo, or of the tangent if `eval` depends on wo's
+        azimuth."""
         zero = ops.zeros_like(wo.z)
         if self.azimuths > 1:
             return vec3(1.0 + zero, zero, zero)
@@ -270,7 +273,7 @@ class Guide(NamedTuple):
         return vec3(where(at_pole, 1.0, wo.x * scale), where(at_pole, 0.0, wo.y * scale), zero)
 
     def _place(self, material: object, wo: Direction) -> Place:
-        """The slices adjacent to wo's angle and to the position on every other axis."""
+        """The slices adjacent to wo's angle and to the position along every other axis, with their weights."""
         cos = ops.abs(wo.z)
         angle = ops.atan2(safe_sqrt(1.0 - cos * cos), cos) * (2.0 * inv_pi)
         ways = [_cell(angle * (self.angles - 1.0), self.angles)]
@@ -322,7 +325,7 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
 
 
 def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
-    """The last node, up to the second to last of all, at which `below` is at most u."""
+    """The last of the first count - 1 nodes at which `below` is at most u."""
     node: Array = ops.zeros_like(u)
     step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
     while step:
@@ -335,13 +338,13 @@ def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
 
 @function
 def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """Fraction of a cell of width 1 that contains `area` of a density linear from low to high."""
+    """The x in [0, 1] up to which the integral of a density, linear from `low` at 0 to `high` at 1, is `area`."""
     root = safe_sqrt(low * low + 2.0 * (high - low) * area)
     return ops.clamp(ops.safe_div(2.0 * area, low + root), 0.0, 1.0)
 
 
 def _pick(place: Place, u: Scalar) -> tuple[Scalar, Scalar]:
-    """A slice selected by its weight, and the rescaled u, in [0, 1)."""
+    """A slice, chosen by u with probabilities equal to the weights, and u rescaled to [0, 1)."""
     index, start, width = place.slices[0], ops.zeros_like(u), place.weights[0]
     below: Array = place.weights[0]
     for other, weight in zip(place.slices[1:], place.weights[1:], strict=True):

@@ -1,4 +1,4 @@
-"""The charts of a guide: `eval` over (s, phi), and the chart of smallest variance (see `gonio.material.guide`)."""
+"""The charts of a guide (see `gonio.material.guide`): `eval` over (s, phi), and the chart of smallest variance."""
 
 from __future__ import annotations
 
@@ -34,7 +34,12 @@ CHARTS = ("half", "normal", "center")
 
 @dataclass(frozen=True)
 class Chart:
-    """The chart of `guide.Lobe` in NumPy: directions from (s, phi)."""
+    """A chart, as in `guide.Lobe`, for NumPy arrays.
+
+    name    "half", "normal" or "center"
+    across  whether it covers the side opposite to wo
+    q0      squared width of the narrowest lobe that the chart resolves
+    """
 
     name: str
     across: bool
@@ -52,7 +57,10 @@ class Chart:
     def direction(
         self, wo: tuple[Grid, ...], s: Grid, phi: NDArray[np.floating], center: tuple[Any, Any]
     ) -> tuple[tuple[Grid, ...], Grid]:
-        """(wi, dw / (ds dphi)) for wo above the surface; wi may lie below."""
+        """(wi, dw / (ds dphi)) at (s, phi), for wo above the surface; wi may lie below.
+
+        center  sine and cosine of the angle between the lobe's center and the normal
+        """
         q = self.q0 * np.expm1(s * self.span)
         jacobian = 0.5 * self.span * (q + self.q0)
         radius = np.sqrt(np.maximum(q * (1.0 - 0.25 * q), 0.0))
@@ -70,14 +78,14 @@ class Chart:
 
 @dataclass(frozen=True)
 class _Fine:
-    """`eval` and the cosine on the fine grid, as densities over s and phi; (angles, s, phi)."""
+    """`eval` and the cosine-weighted density on the fine grid, as densities over s and phi; (angles, s, phi)."""
 
     light: Grid
     cosine: Grid
 
 
 def _steps(count: int, round_: bool) -> tuple[Grid, Grid, Grid]:
-    """(fine positions in [0, 1], nodes from fine values, fine values from nodes) of an axis of `count` nodes."""
+    """For an axis of `count` nodes: fine positions in [0, 1], and the matrices from fine values to nodes and back."""
     fine = (np.arange((count - 1) * FINE) + 0.5) / FINE
     hat = np.maximum(1.0 - np.abs(fine[None] - np.arange(count)[:, None]), 0.0)
     gather = hat.copy()
@@ -103,7 +111,7 @@ class _Best:
         return self.chart.across
 
     def lobe(self) -> Lobe:
-        """The tables as formulas read them."""
+        """The tables in the form that formulas read."""
         span = 2.0 * np.pi if self.full else np.pi
         g = self.density
         steps = np.cumsum(0.5 * (g[..., 1:] + g[..., :-1]), axis=-1) * (span / (g.shape[-1] - 1))
@@ -125,7 +133,12 @@ class _Best:
 
 
 class Slices:
-    """All slices: angles of wo, within versions of the material, within azimuths, within sides of the surface."""
+    """The slices of a guide. Angles of wo vary fastest, then versions of the material, azimuths and sides.
+
+    versions  the material with uniform parameters, one copy per combination of nodes of varying parameters
+    azimuths  number of azimuths of wo; 1 if `eval` is invariant under rotation
+    sides     sides of wo: 1 above the surface, -1 below
+    """
 
     def __init__(self, versions: list[Any], azimuths: int, sides: list[float]) -> None:
         self.versions, self.azimuths, self.sides = versions, azimuths, sides
@@ -153,7 +166,10 @@ class Slices:
     def fine(
         self, chart: Chart, material: Any, angles: Grid, azimuth: float, side: float, centers: Grid | None = None
     ) -> _Fine:
-        """`eval` in a chart."""
+        """`eval` on the fine grid of a chart, for wo at the given angles and azimuth on one side.
+
+        centers  sine and cosine of the angle between the lobe's center and the normal, per angle
+        """
         wo = tuple(x[..., None, None] for x in direction(np.minimum(angles, HORIZON), azimuth, 1.0))
         center = np.array([[0.0, 1.0]]) if centers is None else centers
         wi, jacobian = chart.direction(
@@ -167,7 +183,10 @@ class Slices:
         return _Fine(np.broadcast_to(light, shape), np.broadcast_to(cosine, shape))
 
     def best(self, across: bool) -> _Best | None:
-        """The chart of smallest variance, with its tables; None if there is no light on that side."""
+        """The chart of smallest variance with its tables; None if that side of the surface is dark.
+
+        across  whether the side is the one opposite to wo
+        """
         names = [name for name in CHARTS if not (name == "half" and across) and not (name == "center" and self.full)]
         tried = [best for name in names if (best := self._in_chart(name, across)) is not None]
         return min(tried, key=lambda best: best.variance, default=None)
@@ -195,7 +214,11 @@ class Slices:
         return self._judged(chart, nodes, middles, np.concatenate(centers))
 
     def _judged(self, chart: Chart, nodes: list[_Fine], middles: list[_Fine], centers: Grid) -> _Best:
-        """The tables, and the resulting variance midway between slices."""
+        """The tables of a chart, with the sampling variance midway between slices.
+
+        nodes    `eval` at the slices
+        middles  `eval` midway between them
+        """
         light = np.array([fine.light.sum((1, 2)) * self.cell for fine in nodes])
         density = np.array([self._fitted(fine.light) for fine in nodes])
         sums = (_trapezoid(density.shape[-2], 1.0), _trapezoid(density.shape[-1], self.span))
@@ -224,10 +247,10 @@ class Slices:
         return _Best(chart, self.full, density.reshape(shape), light.ravel(), centers, *best)
 
     def _fitted(self, light: Grid) -> Grid:
-        """Values at the nodes: initially the means around each, then refined for a smaller moment of light / density.
+        """Values at the nodes: the means around each, refined to reduce the integral of light^2 / density.
 
-        At the minimum of the integral of light^2 / density, the mean of (light / density)^2 around each node is the
-        same, so nodes are multiplied by its root, in steps that preserve positivity.
+        At the minimum, the mean of (light / density)^2 is the same around every node, so each node is multiplied by
+        the square root of this mean, in steps that preserve positivity.
         """
         means = nodes = self._rows @ light @ self._columns.T
         for _ in range(REFINEMENTS):
@@ -237,7 +260,7 @@ class Slices:
         return nodes
 
     def _width(self, name: str, across: bool, group: tuple[Any, float, float], centers: Grid) -> float | None:
-        """q within which the fraction `WIDTH_SHARE` of the light lies, averaged over angles; None without light."""
+        """The q within which the fraction `WIDTH_SHARE` of the light lies, averaged over angles; None without light."""
         material, azimuth, side = group
         chart = Chart(name, across, NARROWEST)
         q = np.geomspace(NARROWEST, chart.q_max, 320)
@@ -268,7 +291,7 @@ class Slices:
         return np.concatenate([np.sin(middle), np.cos(middle)], axis=1)
 
     def _side_light(self, material: Any, across: bool, side: float, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid:
-        """Light for pairs of directions, both of which are given as if above the surface."""
+        """Mean |eval| for pairs of directions, both of which are given as if they were above the surface."""
         return mean_light(material, (wo[0], wo[1], side * wo[2]), (wi[0], wi[1], (-side if across else side) * wi[2]))
 
 

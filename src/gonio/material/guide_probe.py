@@ -16,7 +16,7 @@ SAME = 0.02  # relative difference below which two sides, or two azimuths, count
 
 
 class Guided(Protocol):
-    """The members of a material that are used here."""
+    """The members of a material that a guide needs."""
 
     @property
     def transmits(self) -> bool: ...
@@ -44,7 +44,8 @@ def mean_light(material: Guided, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> 
 
 
 def _pairs(side: float) -> tuple[Grid, Grid]:
-    """Pairs of test directions, wo on one side: arbitrary, or near reflection, retro-reflection and transmission."""
+    """Pairs of test directions with wo on one side: wi is near reflection, retro-reflection or transmission, or
+    arbitrary."""
     rng = np.random.default_rng(7)
     wo, wi = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, PROBES, 3)))
     wo[:, 2] = side * np.abs(wo[:, 2])
@@ -56,14 +57,17 @@ def _pairs(side: float) -> tuple[Grid, Grid]:
 
 
 def probe(material: Guided, side: float) -> Grid:
-    """The values of `eval` at the pairs; pairs from below are mirror images of those from above."""
+    """The mean of |eval| at the test pairs.
+
+    side  1 for wo above the surface; -1 for wo below, where the pairs are mirror images of those above
+    """
     wo, wi = _pairs(1.0)
     flip = np.array([1.0, 1.0, side])
     return mean_light(material, tuple((wo * flip).T), tuple((wi * flip).T))
 
 
 def _differ(a: Grid, b: Grid) -> bool:
-    """Whether more than 2 % of the pairs differ."""
+    """Whether the values of more than 2 % of the pairs differ."""
     largest = np.maximum(a, b)
     lit = largest > 1e-6 * float(np.max(largest, initial=0.0))
     return bool(np.mean(np.abs(a - b)[lit] > SAME * largest[lit]) > 0.02) if np.any(lit) else False

@@ -29,7 +29,10 @@ CACHED = 16  # guides in memory, per class
 
 
 def guide_of(material: Material) -> Guide:
-    """The cached guide of an unbound material; raises InputError if it must be computed while a loop is recorded."""
+    """The guide of an unbound material, from the cache if possible.
+
+    Raises InputError if it must be computed while Dr.Jit records a loop.
+    """
     own = vars(material).get("_guide")
     if own is None:
         plain = tree.plain_values(material)
@@ -43,7 +46,8 @@ def guide_of(material: Material) -> Guide:
 
 
 def lend(material: Material, other: Material) -> None:
-    """Let another material sample by this one's guide: correct for any values, though noisier than with its own."""
+    """Make another material sample by this one's guide. The samples are correct for any values, though noisier than
+    with the other material's own guide."""
     if material.guided:
         vars(other)["_guide"] = guide_of(material)
 
@@ -57,8 +61,8 @@ def _cached(cls: type) -> OrderedDict[Material, Guide]:
 
 
 def prepare(material: Material) -> None:
-    """Compute everything that the materials of a tree need before a loop is recorded: guides of those without their own
-    sampling, and tables."""
+    """Compute everything that the materials of a tree need before a loop is recorded: tables, and guides for materials
+    that define only `eval`."""
     for _, one in tree.walk(material):
         if one.guided:
             guide_of(one)
@@ -66,7 +70,7 @@ def prepare(material: Material) -> None:
 
 
 def find(material: Any) -> Guide:
-    """The guide of a material with plain values; raises InputError while Dr.Jit records a loop."""
+    """Compute the guide of a material with plain values. Raises InputError while Dr.Jit records a loop."""
     dr = backend.drjit()
     if dr.flag(dr.JitFlag.SymbolicScope):
         what = f"{type(material).__name__} has no `sample`, and its guide cannot be computed while a loop is recorded"
@@ -83,12 +87,12 @@ def find(material: Any) -> Guide:
 
 
 def of_values(values: Guided) -> Guide:
-    """The guide of a uniform object with `eval` and `transmits`, such as a measured table."""
+    """Compute the guide of a uniform object with `eval` and `transmits`, such as a measured table."""
     return _search([values], ())
 
 
 def _search(versions: list[Any], axes: tuple[Axis, ...]) -> Guide:
-    """The guide of a uniform material, or of versions of one along axes, the first of which varies fastest."""
+    """Compute the guide of a uniform material, or of versions of one along axes, the first of which varies fastest."""
     probed = versions[len(versions) // 2]
     above, below = (probe(probed, side) for side in (1.0, -1.0))
     lit = [side for side, values in ((1.0, above), (-1.0, below)) if np.any(values > 0.0)]

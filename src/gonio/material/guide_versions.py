@@ -22,7 +22,10 @@ SMALLEST = 1.0 / 64.0  # lower limit of the range of a varying width, relative t
 
 @dataclass(frozen=True)
 class _Varying:
-    """A parameter that varies over the surface: its path, kind, and range as one number."""
+    """A parameter that varies over the surface: its path, its kind, and its range.
+
+    low, high  smallest and largest value as a number: the mean of a color, the geometric mean of two widths
+    """
 
     path: str
     kind: str
@@ -30,11 +33,14 @@ class _Varying:
     high: float
 
     def value(self, share: float) -> float:
-        """The value at a position from 0 to 1; widths in equal steps of their square root."""
+        """The value at a position from 0 to 1, along which the square root of a width increases linearly."""
         return self.low + (self.high - self.low) * (share * share if self.kind == "alpha" else share)
 
     def axis(self, count: int) -> Axis:
-        """The axis of its slices."""
+        """The axis along which slices for this parameter are stored.
+
+        count  number of slices
+        """
         ends = named("ends", np.array([[self.low, 1.0 / (self.high - self.low)]]))
 
         def read(material: Any) -> Scalar:
@@ -51,7 +57,7 @@ class _Varying:
 
 
 def _ends(parameter: Parameter, value: Value) -> tuple[float, float] | None:
-    """The range of a value that varies from ray to ray, as one number; None if it does not vary."""
+    """The range (low, high) of a value that varies from ray to ray, as in `_Varying`; None if it does not vary."""
     if not parameter.numeric or value is None or parameter.rows(value) <= 1:
         return None
     if parameter.kind == "alpha":
@@ -68,7 +74,8 @@ def _ends(parameter: Parameter, value: Value) -> tuple[float, float] | None:
 
 
 def version(material: Any, places: dict[_Varying, float]) -> Any:
-    """The material with uniform values: some parameters at given positions, others at the middle of their range."""
+    """The material with uniform values: the given parameters at positions from 0 to 1, other varying ones at the middle
+    of their ranges."""
     values: dict[str, Value] = {}
     for leaf in tree.leaves(material):
         ends = _ends(leaf.parameter, leaf.value)
@@ -79,7 +86,7 @@ def version(material: Any, places: dict[_Varying, float]) -> Any:
 
 
 def varying_parameters(material: Any) -> list[_Varying]:
-    """The varying parameters with the largest effect on the light, at most two."""
+    """The varying parameters with the largest effect on the distribution of the light, at most two."""
     moved: list[tuple[float, _Varying]] = []
     for leaf in tree.leaves(material):
         ends = _ends(leaf.parameter, leaf.value)
@@ -95,7 +102,7 @@ def varying_parameters(material: Any) -> list[_Varying]:
 
 
 def _moved(one: Guided, other: Guided) -> float:
-    """The fraction of the light that goes to other directions."""
+    """The fraction of the light that two materials scatter in different directions."""
     weights = []
     chart = Chart("half", False, MIDDLING)
     for material in (one, other):

@@ -26,7 +26,7 @@ Floats: TypeAlias = "NDArray[np.floating]"
 
 
 class Material:
-    """Base of `BSDF`, as far as parameters are concerned: a node of the tree of materials."""
+    """The part of `BSDF` that parameters need: a node of a tree of materials."""
 
     derives: ClassVar[bool] = False  # whether `derive` is defined
     guided: ClassVar[bool] = False  # whether only `eval` is defined, so that a guide is computed for sampling
@@ -42,11 +42,11 @@ class Material:
         raise NotImplementedError
 
     def derive(self) -> object:
-        """Values that follow from the parameters only and are expensive to compute per ray: a NamedTuple, or None."""
+        """Values that depend only on the parameters and are expensive to compute per ray: a NamedTuple, or None."""
         return None
 
     def prepare(self) -> None:
-        """Compute tables from the unbound parameters, which is impossible while a loop is recorded."""
+        """Compute the tables that depend on unbound parameters, which is impossible while a loop is recorded."""
 
     @property
     def is_bound(self) -> bool:
@@ -55,18 +55,24 @@ class Material:
 
     @property
     def plain(self) -> Self:
-        """The material before binding: itself, or the origin of a bound copy. It provides facts that shape code."""
+        """The unbound material: itself, or the one from which this copy was bound. It provides the facts that shape
+        code."""
         return self if self._plain is None else self._plain
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Declaration of one parameter; a kind is a subclass.
+    """The declaration of one parameter. Each kind of parameter is a subclass.
 
-    low, high  closed range; a value outside is an error, above `high` only a warning if `soft_high`
+    name       name of the parameter
+    default    its default value; `dataclasses.MISSING` if it is required
+    doc        one line of documentation
+    low, high  closed range; a value outside is an error, but one above `high` only a warning if `soft_high`
+    unit       unit, such as "rad"; "" if dimensionless
     white      its value in the material's lossless variant (`BSDF.lossless`); None leaves it unchanged
     inside     whether it describes the medium behind the surface, on which no formula of the surface depends
-    off        the value at which the weighted component vanishes, so that code can be written without it
+    off        the value at which the component that it weights vanishes, so that code can be written without that
+               component; None if there is no such value
     """
 
     kind: ClassVar[str] = ""
@@ -95,19 +101,22 @@ class Parameter:
 
     @property
     def choices(self) -> dict[str, str]:
-        """Name -> description, for a choice."""
+        """Name -> description of each option, for a choice; else empty."""
         return {}
 
     def check(self, value: object, location: str) -> None:
-        """Raise InputError, or warn, if `value` is not valid for this parameter."""
+        """Raise InputError, or warn, if `value` is not valid for this parameter.
+
+        location  the place of the value, for the message: "Conductor.alpha"
+        """
 
     def coerce(self, value: object, location: str) -> Value:
-        """The value that a material stores for a given `value`: by default the value itself, once checked."""
+        """The value that a material stores for a given `value`, which is checked: by default the same value."""
         self.check(value, location)
         return value
 
     def portable(self, value: object) -> object:
-        """The value as stored in a pickled material."""
+        """The value to store in a pickled material."""
         return value
 
     def bind(self, value: object, types: backend.Types) -> Value:
@@ -123,7 +132,7 @@ class Parameter:
         return self.off is not None and isinstance(value, int | float) and value == self.off
 
     def rows(self, value: object) -> int:
-        """Number of rays for which the value has entries; 1 if it is the same for all."""
+        """The number of rays for which an array has entries; 1 if the value is the same for all rays."""
         return 1
 
 
@@ -183,7 +192,7 @@ class _Numeric(Parameter):
 
 
 class NumberParameter(_Numeric):
-    """A number; bound: a Dr.Jit float."""
+    """A number. Bound, it is a Dr.Jit float."""
 
     kind = "float"
 
@@ -199,7 +208,7 @@ class IndexParameter(NumberParameter):
 
 
 class ColorParameter(_Numeric):
-    """A color: a number (gray), three values, or an array (N, 3); bound: a spectrum."""
+    """A color: a number (gray), three values, or an array (N, 3). Bound, it is a spectrum."""
 
     kind = "spectrum"
     dimensions = 1
@@ -218,7 +227,7 @@ class ColorParameter(_Numeric):
 
 
 class WidthParameter(_Numeric):
-    """A microfacet width alpha, or a tuple of two (along x, along y); bound: a pair."""
+    """A microfacet width alpha, or a tuple of two (along x, along y). Bound, it is a pair."""
 
     kind = "alpha"
     symbol_type = "vec2"
@@ -239,14 +248,15 @@ class WidthParameter(_Numeric):
 
 
 class AngleParameter(_Numeric):
-    """An angle in radians; bound: the pair (cos, sin), or None for the plain number 0: no rotation is compiled."""
+    """An angle in radians. Bound, it is the pair (cos, sin), or None for the plain number 0, for which no rotation is
+    compiled."""
 
     kind = "angle"
     symbol_type = "vec2"
 
     @staticmethod
     def none(value: object) -> bool:
-        """Whether a value is statically known to be no rotation."""
+        """Whether a value is statically known to cause no rotation."""
         return value is None or (isinstance(value, int | float) and value == 0)
 
     def bind(self, value: object, types: backend.Types) -> Value:
@@ -263,7 +273,7 @@ class AngleParameter(_Numeric):
 
 @dataclass(frozen=True)
 class ChoiceParameter(Parameter):
-    """A choice between names; it shapes the code, so it is static."""
+    """A choice between names. It shapes the code, so it is static."""
 
     kind = "choice"
     members: Choices = dataclasses.field(default_factory=dict)
@@ -287,7 +297,7 @@ class ChoiceParameter(Parameter):
         return self.members if isinstance(self.members, Family) else None
 
     def spelled(self, name: str) -> str:
-        """The name for another process: FILE.py:NAME for a member that only this program has."""
+        """The name by which another process finds a member: FILE.py:NAME for one that only this program registered."""
         return name if self.family is None else self.family.spelled(name)
 
     def portable(self, value: object) -> object:
@@ -304,9 +314,9 @@ class ChoiceParameter(Parameter):
 
 @dataclass(frozen=True)
 class IntegerParameter(ChoiceParameter):
-    """A whole number that shapes the code, stored as text: a choice that accepts every whole number of its range.
+    """A whole number that shapes the code, stored as a string: a choice that accepts every whole number in its range.
 
-    `choices` lists the numbers that are tried: the first ones of a large range.
+    `choices` lists the numbers to be tested, which are the first ones of a large range.
     """
 
     @property
@@ -349,7 +359,7 @@ class FlagParameter(Parameter):
 
 
 class FileParameter(Parameter):
-    """The path of a file, which the material reads."""
+    """The path of a file that the material reads."""
 
     kind = "file"
 
@@ -359,7 +369,7 @@ class FileParameter(Parameter):
 
 
 class MaterialParameter(Parameter):
-    """A material inside a material."""
+    """A material inside another material."""
 
     kind = "bsdf"
     inner = True
@@ -371,7 +381,11 @@ class MaterialParameter(Parameter):
 
 
 def pair_of(value: object, location: str = "") -> tuple[Value, Value]:
-    """The two widths (x, y) of a user-given width: one value twice, or the two of a tuple."""
+    """The two widths (along x, along y) of a value given by the user: one number twice, or the entries of a tuple.
+
+    location  the place of the value, for errors
+    Raises InputError for a tuple of any other length.
+    """
     if not isinstance(value, tuple | list):
         return value, value
     if len(value) != 2:

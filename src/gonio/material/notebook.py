@@ -1,4 +1,4 @@
-"""Materials in notebooks: an HTML table of their parameters."""
+"""The display of materials in notebooks: an HTML table of their parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from .tree import Leaf, M
 
 
 def table(title: str, leaves: Iterable[Leaf[M]]) -> str:
-    """The HTML of a table: every parameter with its value and documentation."""
+    """The HTML of a table with the value and documentation of every parameter.
+
+    title   heading of the table
+    leaves  the parameters
+    """
     rows = "".join(
         f"<tr><td><code>{html.escape(leaf.path)}</code></td><td>{html.escape(_short(leaf.value))}</td>"
         f"<td style='text-align:left'>{html.escape(leaf.parameter.doc)}</td></tr>"

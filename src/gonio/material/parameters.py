@@ -1,9 +1,9 @@
-"""A parameter of a material, declared once with kind, range, unit and a line of documentation.
+"""Declarations of a material's parameters, each with kind, range, unit and a line of documentation.
 
     `albedo: Colour = spectrum(0.5, "fraction of light that is reflected", high=1.0)`
 
-The command line, scenes, plugins, sliders, shaders and the manual all read this declaration. Each kind is a class that
-defines which values are valid, how a value is bound, and which symbol stands for it in a recording.
+The command line, scenes, plugins, sliders, shaders and the manual all read this one declaration. Each kind is a class
+that defines which values are valid, how a value is bound, and which symbol represents it in a recording.
 
 The annotation (`Colour`, `Number`, `Width`, `Angle`) tells type checkers the type that the constructor accepts and the
 type inside `eval`, where every number is a Dr.Jit value or a symbol.
@@ -79,7 +79,7 @@ else:
 
 
 def _declare(kind: type[Parameter], default: object, doc: str, **more: object) -> Value:
-    """A dataclass field with its declaration; required if it has no default."""
+    """A dataclass field that contains the declaration; required if `default` is None."""
     if default is None:
         return dataclasses.field(metadata={"kind": kind, "doc": doc, **more})
     return dataclasses.field(default=default, metadata={"kind": kind, "doc": doc, **more})
@@ -97,15 +97,19 @@ def number(
 ) -> Number:
     """Declare a number with its closed range and unit.
 
-    inside  it describes the medium behind the surface, on which no formula of the surface depends
-    off     the plain number, such as a layer's weight of 0, at which `eval`, `pdf`, `sample` and `derive` omit the
-            weighted component; shaders are then written without it
+    default    default value; None makes the parameter required
+    doc        one line of documentation
+    low, high  closed range
+    unit       unit, such as "nm"; "" if dimensionless
+    inside     whether it describes the medium behind the surface, on which no formula of the surface depends
+    off        the plain number, such as a layer's weight of 0, at which `eval`, `pdf`, `sample` and `derive` omit the
+               component that it weights; shaders are then written without that component
     """
     return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit, inside=inside, off=off)
 
 
 def index(default: PlainIndex, doc: str, *, low: float, high: float) -> Index:
-    """Declare a refractive index: a number, or a name of `go.indices()`."""
+    """Declare a refractive index: a number, or the name of a substance of `go.indices()`."""
     return _declare(IndexParameter, default, doc, low=low, high=high)
 
 
@@ -121,9 +125,11 @@ def spectrum(
 ) -> Colour:
     """Declare a color: a number (gray), three values, or an array (N, channels).
 
-    A color whose range ends at 1 is a fraction of the light: it is 1 in the material's lossless variant.
+    A color whose range ends at 1 is a fraction of the light and is 1 in the material's lossless variant.
 
-    inside  it describes the medium behind the surface, on which no formula of the surface depends
+    soft_high  whether a value above `high` causes only a warning
+    inside     whether it describes the medium behind the surface, on which no formula of the surface depends
+    For the other arguments, see `number`.
     """
     white = 1.0 if high == 1.0 else None
     return _declare(
@@ -132,25 +138,25 @@ def spectrum(
 
 
 def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Width:
-    """Declare a microfacet width alpha, or a tuple of two (along x, along y); bound: a vector of two.
+    """Declare a microfacet width alpha, or a tuple of two (along x, along y). Bound, it is a vector of two.
 
-    low  0 if the model includes the mirror; a model that divides by alpha gives the smallest alpha at which it is valid
+    low  the smallest alpha at which the model is valid: 0 if it becomes a mirror there, positive if it divides by alpha
     """
     return _declare(WidthParameter, default, doc, low=low, high=high)
 
 
 def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
-    """Declare an angle in radians; bound: the vector (cos, sin), or None for the plain number 0."""
+    """Declare an angle in radians. Bound, it is the vector (cos, sin), or None for the plain number 0."""
     return _declare(AngleParameter, default, doc, unit="rad")
 
 
 def choice(default: PlainMember, doc: str, choices: Choices, *, white: str | None = None) -> str:
-    """Declare a choice between names; it shapes the code, so it is static.
+    """Declare a choice between names. It shapes the code, so it is static.
 
     default  a name; for a family also a class, an instance, or FILE.py:CLASS relative to the file of the declaration
-    choices  name -> description, or a function that returns such a mapping; or a family, `go.NDF.family`, whose members
-             may also be given as classes, instances and FILE.py:CLASS
-    white    the name used in the material's lossless variant, such as F = 1
+    choices  name -> description, or a function that returns such a mapping; or a family, such as `go.NDF.family`, whose
+             members may also be given as classes, instances or FILE.py:CLASS
+    white    the name used in the material's lossless variant, such as that of F = 1; None leaves the choice unchanged
     """
     return _declare(
         ChoiceParameter,
@@ -162,22 +168,22 @@ def choice(default: PlainMember, doc: str, choices: Choices, *, white: str | Non
 
 
 def flag(default: bool, doc: str) -> bool:
-    """Declare a switch that shapes the code."""
+    """Declare a switch, True or False, that shapes the code."""
     return _declare(FlagParameter, default, doc)
 
 
 def file(default: str | None = None, doc: str = "") -> Value:
-    """Declare the path of a data file; it shapes the code, so it is read when the material is constructed."""
+    """Declare the path of a data file. The file shapes the code, so it is read when the material is constructed."""
     return _declare(FileParameter, default, doc)
 
 
 def bsdf(doc: str, default: Material | None = None) -> Value:
-    """Declare a material inside a material."""
+    """Declare a material inside another material; required if `default` is None."""
     return _declare(MaterialParameter, default, doc)
 
 
 def declared(cls: type) -> dict[str, Parameter]:
-    """The parameters that a class declares, by name, in order."""
+    """The parameters that a class declares, by name, in order of declaration."""
     parameters = {}
     for field in dataclasses.fields(cls):
         if field.metadata:

@@ -1,4 +1,4 @@
-"""The polarization of a material: light that single smooth facets have reflected or refracted."""
+"""The polarization of light that a material has scattered once, at a smooth facet."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class Polarized(NamedTuple):
     """A part of the light scattered from one direction to another, with known polarization.
 
     value    its contribution to `eval`, or to a delta lobe's weight
-    normal   of the scattering facets, in the local frame, on either side
-    matrix   the Mueller matrix of such a facet, in the plane of incidence, divided by its first entry
+    normal   the normal of the scattering facets in the local frame, on either side of the surface
+    matrix   the Mueller matrix of such a facet, relative to the plane of incidence, divided by its first entry
     """
 
     value: Spectrum
@@ -21,5 +21,5 @@ class Polarized(NamedTuple):
     matrix: Diattenuation[Spectrum] | Diattenuation[Scalar]
 
     def times(self, factor: Scalar) -> Polarized:
-        """This part, scaled by the fraction of its material in a mixture."""
+        """This part multiplied by a factor, such as the weight of its material in a mixture."""
         return self._replace(value=self.value * factor)

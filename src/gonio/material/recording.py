@@ -1,4 +1,4 @@
-"""Recordings of materials: the methods run on symbols and produce a typed graph, from which shaders are written."""
+"""Recordings of materials: run on symbols, a method produces a typed graph, from which shaders are written."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ M = TypeVar("M", bound=Material)
 def symbols(material: M, without: Iterable[str] = ()) -> M:
     """A copy bound to symbols, one per numeric parameter; an angle given as the plain number 0 has none.
 
-    without  paths of parameters that are off (`switched_off`) and remain plain numbers, so that their code is omitted
+    without  paths of parameters that remain plain numbers, since they switch a component off (`switched_off`), so that
+             the code of the component is omitted
     """
     bound = binding.bind(material, lambda parameter, value: parameter.symbol(value))
     for path in without:
@@ -26,12 +27,13 @@ def symbols(material: M, without: Iterable[str] = ()) -> M:
 
 
 def switched_off(material: Material) -> list[str]:
-    """Paths of the parameters at whose values the weighted components vanish."""
+    """Paths of the parameters whose values switch off the components that they weight."""
     return [leaf.path for leaf in tree.leaves(material) if leaf.parameter.is_off(leaf.value)]
 
 
 def record(material: Material, method: str = "eval", mode: Mode = "radiance") -> graph.Graph:
-    """A method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
+    """A method as a typed graph. Its inputs are the material's parameters, "self.alpha", ..., then the arguments of the
+    method."""
     inner = inspect.unwrap(getattr(type(material), method))
     more: dict[str, Any] = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
     kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}

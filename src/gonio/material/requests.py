@@ -25,11 +25,12 @@ Formula = Callable[[Any], Any]
 
 
 def slopes(material: Material, paths: Sequence[str], formula: Formula, types: backend.Types) -> list[backend.Array]:
-    """The value of a formula, and its derivative with respect to each parameter, in forward mode.
+    """The value of a formula, followed by its derivative with respect to each parameter, in forward mode.
 
-    paths  numbers and colors: "alpha", "base.albedo", or one channel of a color, "albedo.r". For a pair of widths or a
-           whole color, all values change together
-    Raises InputError for anything else.
+    paths    paths of numbers and colors, "alpha" or "base.albedo", or of one channel of a color, "albedo.r". The
+             derivative for a pair of widths or a whole color is that for an equal change of all its values
+    formula  function of a bound material that returns a Dr.Jit value
+    Raises InputError for any other path.
     """
     results = [formula(binding.bind_to(material, types))]
     dr = backend.drjit()
@@ -48,7 +49,7 @@ def slopes(material: Material, paths: Sequence[str], formula: Formula, types: ba
 
 
 def _leaf(material: Material, path: str) -> tuple[tree.Leaf[Any], int | None]:
-    """The parameter at a path, and the channel of its color; None for all of it."""
+    """The parameter at a path, and the index of the color channel in the path; None if the path names no channel."""
     leaves = {leaf.path: leaf for leaf in tree.leaves(material) if leaf.parameter.numeric}
     if path in leaves:
         return leaves[path], None
@@ -62,11 +63,11 @@ def _leaf(material: Material, path: str) -> tuple[tree.Leaf[Any], int | None]:
 def at_wavelengths(
     material: Any, wavelengths: ArrayLike, formula: Formula, types: backend.Types
 ) -> list[backend.Array]:
-    """The values of a formula at each wavelength, one Dr.Jit float each.
+    """The values of a formula at each wavelength, including the dispersion of named indices and interference in films.
 
-    wavelengths  nm, in vacuum
-    Dispersion of named indices and interference in films are included. Raises InputError for colors whose channels
-    differ, since three numbers are not a spectrum.
+    wavelengths  wavelengths in vacuum, nm, (M,)
+    formula      function of a bound material that returns a Dr.Jit value
+    Raises InputError for colors whose channels differ, since three numbers are not a spectrum.
     """
     nm = np.atleast_1d(np.asarray(wavelengths, float))
     if nm.ndim != 1 or not nm.size or not np.all(np.isfinite(nm) & (nm > 0.0)):

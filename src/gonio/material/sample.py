@@ -25,13 +25,13 @@ else:
 
 
 class Sample(NamedTuple, Generic[D, C, N, B]):
-    """A sampled direction with its weight. For callers, its types are those of their arguments.
+    """A sampled direction with its weight. The fields have the types of the caller's arguments.
 
-    wi      sampled direction, unit
+    wi      sampled direction, a unit vector
     weight  eval / pdf; for a delta lobe, its reflectance divided by its probability; 0 where sampling failed
     pdf     density of wi, 1/sr; for a delta lobe, its discrete probability; 0 where sampling failed
     delta   whether wi was chosen from a delta lobe
-    eta     index on wi's side divided by index on wo's side: 1 for reflection
+    eta     refractive index on wi's side divided by that on wo's side; 1 for reflection
 
     Shapes, for N rays: wi (N, 3), weight (N, channels), pdf, delta and eta (N,).
     """
@@ -44,12 +44,15 @@ class Sample(NamedTuple, Generic[D, C, N, B]):
 
     @staticmethod
     def of_density(wi: Direction, weight: Spectrum, pdf: Scalar) -> Sample:
-        """A reflection sampled from a finite density: no ray is in a delta lobe, and eta is 1."""
+        """A sample of a reflection with finite density: `delta` is false and eta is 1 for all rays."""
         return Sample(wi, weight, pdf, never(pdf), ops.ones_like(pdf))
 
 
 def never(like: Scalar) -> Mask:
-    """False for every ray."""
+    """A mask that is false for every ray.
+
+    like  any value with one entry per ray, such as the pdf
+    """
     return like != like
 
 
@@ -61,8 +64,8 @@ def checked(result: object, where: str) -> Sample:
     """Validate the result of a material's `sample`, and expand plain numbers and booleans in `pdf`, `delta` and `eta`
     to one value per ray.
 
-    where  the method, for errors
-    Raises InputError if the result is not a Sample, or `delta` is not a mask.
+    where  the name of the method, for errors
+    Raises InputError if the result is not a Sample, or if `delta` is not a mask.
     """
     if not isinstance(result, Sample):
         what = f"returned {type(result).__name__}, expected go.Sample"

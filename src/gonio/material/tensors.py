@@ -1,11 +1,11 @@
-"""Tensors of PyTorch, exchanged by DLPack, and arrays of JAX, exchanged as NumPy arrays, with gradients.
+"""Calls with tensors of PyTorch (passed by DLPack) or arrays of JAX (passed as NumPy arrays), with gradients.
 
 value = gold.eval(wo, wi, parameters={"alpha": alpha})     # tensors in, a tensor out
 value.sum().backward()                                     # alpha.grad, wo.grad, wi.grad
 drawn = gold.sample(wo, u, parameters={"alpha": alpha})    # a Sample of tensors, with gradients at fixed u
 
-Neither library is imported unless one of its tensors is given. Values are computed by Dr.Jit on the CPU and returned on
-the device of wo. Gradients are those of reverse mode, of first order, for which the formula is evaluated once more.
+Neither library is imported unless one of its tensors is given. Dr.Jit computes the values on the CPU; they are returned
+on the device of wo. Gradients are of first order, in reverse mode, for which the formula is evaluated once more.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LIBRARIES = {"torch": "torch", "jax": "jax", "jaxlib": "jax"}  # by the first pa
 
 
 def library(*values: object) -> str:
-    """ "torch" or "jax" if a value is a tensor of that library, else ""."""
+    """The library of the first tensor among the values, "torch" or "jax"; "" if there is none."""
     for value in values:
         name = LIBRARIES.get(type(value).__module__.partition(".")[0], "")
         if name:
@@ -37,12 +37,12 @@ def library(*values: object) -> str:
 
 
 class Call(NamedTuple):
-    """A call of a material with arrays in place of tensors. `other` is wi, or the random numbers of "sample".
+    """A call of a material with arrays in place of tensors. `other` is wi, or u for "sample".
 
-    material, name   the material, and "eval", "pdf" or "sample"
-    paths            the parameters that are given besides wo and `other`
+    material, name   the material and its method, "eval", "pdf" or "sample"
+    paths            paths of the parameters that are given besides wo and `other`
     mode, precision  as in `eval`
-    rows             function (wo, other, name) that returns both as arrays (N, 3), and the shape of the results
+    rows             function (wo, other, name) that returns wo and other as arrays (N, 3), and the shape of the results
     """
 
     material: Material
@@ -53,7 +53,7 @@ class Call(NamedTuple):
     rows: Callable[[Any, Any, str], tuple[np.ndarray, np.ndarray, tuple[int, ...]]]
 
     def values(self, arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """The results for wo, `other` and the parameters: one, or the fields of a `Sample`."""
+        """The results for wo, `other` and the parameters: one array, or the fields of a `Sample`."""
         wo, other, *given = arrays
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.material)}
         plain = {
@@ -64,7 +64,7 @@ class Call(NamedTuple):
         return [np.asarray(value) for value in _fields(result)]
 
     def shapes(self, arrays: Sequence[Any]) -> list[tuple[tuple[int, ...], type]]:
-        """Shapes and types of the results for arrays of these shapes."""
+        """Shapes and types of the results for arrays of the given arrays' shapes."""
         wo, other = (np.broadcast_to(np.array([0.0, 0.0, 1.0]), tuple(x.shape)) for x in arrays[:2])
         shape = self.rows(wo, other, self.name)[2]
         number: type = np.float64 if self.precision == "float64" else np.float32
@@ -74,7 +74,10 @@ class Call(NamedTuple):
 
     def pullback(self, arrays: Sequence[np.ndarray], cotangents: Sequence[np.ndarray | None]) -> list[np.ndarray]:
         """The gradients of the sum of the results times their cotangents, with respect to wo, `other` and the
-        parameters, in their shapes. The cotangent of a result without gradients is None."""
+        parameters. Each has the shape of its argument.
+
+        cotangents  one array per result; None for a result without gradients
+        """
         dr, types = backend.drjit(), backend.types(self.precision)
         first, second, shape = self.rows(arrays[0], arrays[1], self.name)
         count = math.prod(shape)
@@ -104,7 +107,7 @@ class Call(NamedTuple):
 
 
 def _fields(result: Any) -> list[Any]:
-    """The fields of a `Sample`, or the one result of another method."""
+    """The fields of a `Sample`, or the only result of another method."""
     return list(result) if isinstance(result, Sample) else [result]
 
 
@@ -113,7 +116,7 @@ def _components(value: backend.Array) -> list[backend.Array]:
 
 
 def _plain(value: np.ndarray, kind: str) -> Any:
-    """A number, three numbers of a color, two widths, or an array with one value per ray."""
+    """The value of a parameter from an array: a number, three numbers of a color, two widths, or one value per ray."""
     if value.ndim == 0:
         return float(value)
     if value.shape == ((3,) if kind == "spectrum" else (2,)) and kind in ("spectrum", "alpha"):
@@ -122,7 +125,7 @@ def _plain(value: np.ndarray, kind: str) -> Any:
 
 
 def _like(components: list[np.ndarray], given: np.ndarray) -> np.ndarray:
-    """Gradients, one array per component, summed to the shape of what was given."""
+    """Gradients, one array per component, summed to the shape of the given argument."""
     columns = np.broadcast_arrays(*components)
     gradient = np.stack(columns, axis=-1)  # (rows, components)
     size = given.shape[-1] if given.ndim and given.shape[-1] == gradient.shape[1] else 1
@@ -136,7 +139,12 @@ def _like(components: list[np.ndarray], given: np.ndarray) -> np.ndarray:
 
 
 def called(call: Call, kind: str, wo: Tensor, other: Tensor, parameters: Mapping[str, Tensor]) -> Any:
-    """The result as a tensor of the library `kind`, or a `Sample` of tensors, with gradients for all tensors."""
+    """The result of a call as a tensor, or a `Sample` of tensors, with gradients for all tensors.
+
+    kind        "torch" or "jax"
+    parameters  path -> tensor
+    Raises InputError for a path that is not that of a number or color.
+    """
     known = {leaf.path for leaf in tree.leaves(call.material) if leaf.parameter.numeric}
     for path in parameters:
         if path not in known:

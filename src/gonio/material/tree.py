@@ -1,4 +1,4 @@
-"""The tree of materials, since parameters may hold materials: traversal, access by path, and replacement.
+"""Trees of materials, whose parameters may themselves be materials: traversal, access by path, and replacement.
 
     for path, parameter, value, owner in leaves(material): ...      "alpha", "base.alpha", "base.a.albedo"
     rougher = replace(material, {"base.alpha": 0.4})
@@ -23,7 +23,7 @@ M = TypeVar("M", bound=Material)
 class Leaf(NamedTuple, Generic[M]):
     """A parameter in a tree of materials.
 
-    path       "alpha", "base.alpha"
+    path       its path from the root: "alpha", "base.alpha"
     parameter  its declaration
     value      its value
     owner      the material to which it belongs
@@ -53,14 +53,20 @@ def children(material: M) -> dict[str, M]:
 
 
 def walk(material: M, path: str = "") -> Iterator[tuple[str, M]]:
-    """Every material in the tree with its path, the root ("") first: "base", "base.a"."""
+    """Every material in the tree with its path, parents first: "", "base", "base.a".
+
+    path  path of the material itself, which precedes the paths of inner materials
+    """
     yield path, material
     for name, inner in children(material).items():
         yield from walk(inner, join(path, name))
 
 
 def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
-    """Every parameter that does not hold a material, including those of inner materials, in order of declaration."""
+    """Every parameter that does not hold a material, including those of inner materials, in order of declaration.
+
+    path  path of the material itself, which precedes the paths of its parameters
+    """
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
         if parameter.inner:
@@ -70,17 +76,17 @@ def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
 
 
 def surface(material: M) -> Iterator[Leaf[M]]:
-    """The `leaves` on which the surface depends."""
+    """The `leaves` on which the formulas of the surface depend."""
     return (leaf for leaf in leaves(material) if not leaf.parameter.inside)
 
 
 def join(path: str, name: str) -> str:
-    """The path of a parameter of the material at a path."""
+    """The path of a parameter, from the path of its material and its name."""
     return f"{path}.{name}" if path else name
 
 
 def value_at(material: Material, path: str) -> Value:
-    """The value at a path; raises InputError if there is none."""
+    """The value of the parameter at a path. Raises InputError if there is no such parameter."""
     value: Value = material
     for name in path.split("."):
         value = getattr(value, _known(value, name, path))
@@ -88,7 +94,12 @@ def value_at(material: Material, path: str) -> Value:
 
 
 def replace(material: M, values: Mapping[str, object], location: str = "replace") -> M:
-    """The material with values or inner materials at some paths replaced; raises InputError for invalid ones."""
+    """A new material in which the values or inner materials at some paths are replaced.
+
+    values    path -> new value
+    location  the place of the values, for errors
+    Raises InputError for unknown paths and invalid values.
+    """
     own: dict[str, Value] = {}
     below: dict[str, dict[str, object]] = {}
     for path, value in values.items():
@@ -104,12 +115,12 @@ def replace(material: M, values: Mapping[str, object], location: str = "replace"
 
 
 def rebuild(material: M, values: Mapping[str, object]) -> M:
-    """A new material, hence checked, with some of its own parameters replaced."""
+    """A new material in which some parameters, not those of inner materials, are replaced. All values are checked."""
     return type(material)(**{**{name: getattr(material, name) for name in material.parameters()}, **values})
 
 
 def map_leaves(material: M, change: Callable[[Parameter, object], object]) -> M:
-    """A new material with `change(parameter, value)` for every leaf."""
+    """A new material in which the value of every leaf is `change(parameter, value)`."""
     values = {
         name: map_leaves(getattr(material, name), change) if p.inner else change(p, getattr(material, name))
         for name, p in material.parameters().items()
@@ -126,12 +137,12 @@ def _known(material: Material, name: str, location: str) -> str:
 
 
 def rebuild_from(cls: type[M], values: Mapping[str, object]) -> M:
-    """A material from its class and values, as unpickling calls it."""
+    """A material from its class and values; called by unpickling."""
     return cls(**values)
 
 
 def plain_values(material: M) -> M:
-    """The material with NumPy arrays in place of Dr.Jit's."""
+    """The material with NumPy arrays in place of Dr.Jit arrays."""
     values: dict[str, Value] = {}
     for leaf in leaves(material):
         parts = pair_of(leaf.value) if leaf.parameter.kind == "alpha" else (leaf.value,)

@@ -1,7 +1,7 @@
-"""Python files of the user: FILE.py:NAME, which is code.
+"""Classes in Python files of the user, named by FILE.py:NAME.
 
-A file runs only if the user named it or allowed a scene to name it: on the command line, in a program, in another such
-file, and in scenes for which code is allowed.
+Loading such a class runs the file. A file runs only if the user named it (on the command line, in a program or in
+another such file) or if a scene for which code is allowed names it.
 """
 
 from __future__ import annotations
@@ -29,26 +29,31 @@ _loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
 
 
 def names_code(text: str) -> bool:
-    """Whether a text is FILE.py:CLASS."""
+    """Whether a string has the form FILE.py:CLASS."""
     return _CODE.fullmatch(text.strip()) is not None
 
 
 def member(
     text: str, folder: Path | None = None, where: str = "MODEL", family: members.Family[Any] | None = None
 ) -> str:
-    """The name of the member that FILE.py:NAME refers to, a distribution, a masking term etc.; it is registered.
+    """Register the member that FILE.py:NAME refers to (a distribution, a masking term etc.) and return its name.
 
-    family  the family it must belong to, else InputError
+    text    FILE.py:NAME
+    folder  the folder to which the path is relative; by default the current folder
+    where   the place of the string, for errors
+    family  the family to which the member must belong; None accepts any
+    Raises InputError if there is no such file or member, or if it belongs to another family.
     """
     named = thing(text, folder, where)
     return _added(named, place_of(named), family)
 
 
 def member_name(value: object, where: str, family: members.Family[Any] | None = None) -> object:
-    """The name of a member that a program gives: a class of a family or an instance of one, which is registered, or
+    """The name of a member that a program passes: a class of a family or an instance of one, which is registered, or
     FILE.py:NAME, relative to the file of the calling line. Any other value is returned unchanged.
 
-    A text runs code only if a program's own line calls Gonio with it: not from scenes, pages or documents.
+    A string runs code only if a line of a program passes it to Gonio, never if it comes from a scene, page or document.
+    For `where` and `family`, see `member`.
     """
     if isinstance(value, str):
         folder = _folder_of_caller() if names_code(value) else None
@@ -67,7 +72,9 @@ def _added(named: object, where: str, family: members.Family[Any] | None) -> str
 def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object:
     """The object that FILE.py:NAME refers to: a class, or an instance of a distribution, a masking term etc.
 
-    folder  the base of a relative path; by default the current folder
+    folder  the folder to which the path is relative; by default the current folder
+    where   the place of the string, for errors
+    Raises InputError if there is no such file or object, or if running the file fails.
     """
     match = _CODE.fullmatch(text.strip())
     if match is None:
@@ -95,7 +102,7 @@ _CONSTRUCTING = (
 
 def _folder_of_caller() -> Path | None:
     """The folder of the file whose line called a material's constructor or declared a parameter; the current folder at
-    a prompt. None if that line is Gonio's own, which passes on a scene's or page's text."""
+    a prompt. None if that line is in Gonio, which passes on strings of scenes and pages."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         code, module = frame.f_code, str(frame.f_globals.get("__name__", ""))
@@ -110,12 +117,12 @@ def _folder_of_caller() -> Path | None:
 
 
 def files_in(text: str) -> list[Path]:
-    """The files that a material's text names, for inner materials and members too."""
+    """The Python files that a material's description names, including those of inner materials and members."""
     return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w[\w-]*", text)]
 
 
 def with_imports(path: Path) -> list[Path]:
-    """A Python file and the local files that it imports, recursively: its meaning depends on all of them."""
+    """A Python file and the local files that it imports, recursively, since its behavior depends on all of them."""
     files: dict[Path, None] = {}
     waiting = [path]
     while waiting:
@@ -141,12 +148,13 @@ def with_imports(path: Path) -> list[Path]:
 
 
 def forget() -> None:
-    """Run all files again on their next use, even unchanged ones, since their imports may have changed."""
+    """Discard all loaded files: each is run again on its next use, even if unchanged, since its imports may have
+    changed."""
     _loaded.clear()
 
 
 def is_outside(cls: type) -> bool:
-    """Whether a class comes from a file that `load` ran."""
+    """Whether a class comes from a file of the user."""
     return cls.__module__.startswith(PREFIX)
 
 
@@ -154,7 +162,11 @@ def is_outside(cls: type) -> bool:
 
 
 def module_of(path: Path, where: str) -> ModuleType:
-    """The file's module; the file is run if it has changed since its last run."""
+    """The module of a file, which is run if it has not been run or has changed since.
+
+    where  the place of the file's name, for errors
+    Raises InputError if the file cannot be read or fails to run.
+    """
     try:
         about = path.stat()
         source = path.read_bytes() if path.is_file() else None
@@ -188,7 +200,7 @@ def module_of(path: Path, where: str) -> ModuleType:
 
 
 def _located(error: BaseException, path: Path) -> GonioError:
-    """The error raised while a file ran, with file and line."""
+    """An error, raised while a file ran, as a GonioError with file and line."""
     if isinstance(error, SyntaxError) and error.filename:
         text = f": {error.text.strip()}" if error.text else ""
         return InputError(
@@ -205,13 +217,13 @@ def _located(error: BaseException, path: Path) -> GonioError:
 
 
 def line_in(error: BaseException, path: Path) -> str:
-    """file:line of the innermost frame in a file, "" if there is none."""
+    """FILE:LINE of the innermost frame of an error's traceback in a file; "" if there is none."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
     return f"{path}:{frames[-1].lineno}" if frames else ""
 
 
 def place_of(thing: object) -> str:
-    """FILE:LINE of a class, or of an instance's class, as far as known."""
+    """FILE:LINE of a class, or of an instance's class; the name of the class if they are unknown."""
     cls = thing if isinstance(thing, type) else type(thing)
     try:
         file = inspect.getsourcefile(cls)

@@ -30,7 +30,7 @@ def parted(file: str) -> tuple[str, str]:
 
 
 def names_table(text: str) -> bool:
-    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome".
+    """Whether a string names a file of measurements, by the suffix: "gold.binary", "merl.npz:chrome".
 
     For a format with several materials per file, an item is required: a plain .npz may contain anything.
     """
@@ -40,10 +40,10 @@ def names_table(text: str) -> bool:
 
 
 def format_of(path: Path, data: bytes | None = None) -> Format:
-    """The format of a file, by its suffix, and by its contents if formats share the suffix; raises InputError if none
-    fits.
+    """The format of a file, by its suffix, and by its contents if formats share the suffix.
 
-    data  None if the file is to be written
+    data  the contents; None if the file is to be written
+    Raises InputError for a file of no known format.
     """
     formats = by_suffix(path)
     if not formats:

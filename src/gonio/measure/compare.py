@@ -36,12 +36,16 @@ class Comparable(Protocol):
 
 
 def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: int = 1) -> float:
-    """E |other - table| / E |table| of f cos theta_i, over views of uniform cosine and all light, mean of the channels.
+    """E |other - table| / E |table| of f cos theta_i, averaged over the channels, for views of uniform cosine and
+    light from all directions.
 
     The pairs are sampled by the densities of the two tables and by the cosine, a third each, so that narrow lobes count
     by their energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the
-    relative standard error of the result is below `SURE`, or `ROUNDS` are done: a spike outside every density requires
-    many.
+    relative standard error of the result is below `SURE`, or `ROUNDS` are done: a spike where all three densities are
+    low requires many.
+
+    pairs  pairs of directions per round
+    seed   seed of the pairs
     """
     rng = np.random.default_rng([seed, 83])
     sums, squares, total = 0.0, 0.0, 0.0
@@ -83,14 +87,15 @@ def _round(
 class Converted:
     """A table in another format.
 
-    path       the file
-    kind       kind of the table in it
-    resampled  whether its values were computed by evaluating the source; otherwise the numbers are the same
-    error      its difference from the source, see `difference`
-    size       bytes
-    resolution, reciprocity  the difference of the file from the source's reciprocal part, due to the size of the cells,
-               and that of this part from the source, due to a format with one value for a pair and its swapped pair;
-               these overlap
+    path         the file
+    kind         kind of the table in it
+    resampled    whether its values were computed by evaluating the source; otherwise the numbers are the same
+    error        its difference from the source, see `difference`
+    size         bytes
+    resolution   the part of the error due to the size of the cells: the difference of the file from the source's
+                 reciprocal part
+    reciprocity  the part due to a format that stores one value for a pair and its swapped pair: the difference of the
+                 reciprocal part from the source. The two parts overlap
     """
 
     path: Path
@@ -117,9 +122,10 @@ class ReciprocalPart:
 
 
 def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi: int | None = None) -> Converted:
-    """Write a table in the format of another suffix; its error is measured on the written file.
+    """Write a table in the format of the output's suffix; its error is measured on the written file.
 
-    phi  cells of phi_d in a MERL file: 180, or 360 for nonreciprocal tables
+    source  a file, as `read` takes it
+    phi     cells of phi_d in a MERL file: 180, or 360 for nonreciprocal tables; None: as `Merl.resampled` chooses
     Raises InputError if the source cannot be read, or the format cannot be written.
     """
     table, path = read(source), Path(output)
@@ -149,7 +155,7 @@ def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats
 
 
 def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
-    """E |f(wo, wi) - f(wi, wo)| / E f over cosine-distributed pairs: 0 if the table is reciprocal."""
+    """E |f(wo, wi) - f(wi, wo)| / E f for cosine-distributed pairs: 0 if the table is reciprocal."""
     rng = np.random.default_rng([1, 84])
     u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
     wo, wi = (

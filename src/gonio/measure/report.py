@@ -19,7 +19,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
     """The content of a file: format, kind, dimensions, range of the values, measured angles ("known"), flaws, albedo
     by angle of view, reciprocity.
 
-    For a file with several materials, if none is named, only their names ("items").
+    If the file has several materials and none is named, the result has only their names ("items").
     Raises InputError as `read` does.
     """
     text, item = parted(os.fspath(file))
@@ -63,7 +63,7 @@ def _typical_error(table: Measurement) -> float | None:
 
 
 def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
-    """The description as text, (name, value) each."""
+    """The description as lines of text, (name, value) each."""
     if "items" in about:
         return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
     nm = about["wavelengths"]

@@ -189,7 +189,7 @@ def clamp(x: T, low: T | float, high: T | float) -> T:
 
 
 def rsqrt(x: T) -> T:
-    """1 / sqrt(x); in float32 by the processor's estimate and one Newton step, within 2 ulp."""
+    """1 / sqrt(x); in float32 computed from the processor's estimate and one Newton step, within 2 ulp."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 

@@ -53,7 +53,7 @@ def get_precision() -> Precision:
 
 @lru_cache
 def drjit() -> ModuleType:
-    """The module Dr.Jit, imported on first use."""
+    """The Dr.Jit module, imported on first use."""
     import drjit as dr
 
     return dr
@@ -161,7 +161,7 @@ def aligned(array: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
 
 
 def vector_of(value: object, size: int, kind: Types) -> Array:
-    """Rows of shape (N, size) or one of shape (size,) as a Dr.Jit vector of `size` components."""
+    """An array of shape (N, size) or (size,) as a Dr.Jit vector of `size` components."""
     if is_drjit(value):
         return value
     array = np.asarray(value, dtype=np.float64)

@@ -38,11 +38,11 @@ _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 
 class RecordingError(GonioError):
-    """Code that cannot be recorded; names the file and line."""
+    """Code cannot be recorded; the error names the file and line."""
 
 
 class ForbiddenOperator(RecordingError):
-    """A Python operator with no meaning on a value, or a different one: `if`, `and`, `**`."""
+    """Code applies a Python operator to a value for which it has no meaning or another one: `if`, `and`, `**`."""
 
 
 foreign = ""  # "file:line" of the text that is being read, if the values do not come from Python code
@@ -65,7 +65,7 @@ def _logical(op: str) -> Callable[[Node, object], Node]:
 class Node:
     """One value in a recorded function: an operation, its arguments, its type and its source line.
 
-    name  name of the Python variable that held it, or ""; with the key inside a tuple or dict, "result.bend"
+    name  name of the Python variable that held it, or ""; in a tuple or dict followed by the key, "result.bend"
     """
 
     __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
@@ -316,7 +316,7 @@ def first_free(name: str, used: Container[str]) -> str:
 def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: bool = False) -> Value:
     """Record a call of a `@function`, which is defined first if this combination of argument types is new.
 
-    constants  results that are plain numbers remain plain numbers
+    constants  whether results that are plain numbers remain plain numbers
     """
     bound = inspect.signature(python_function).bind(*args, **kwargs)
     bound.apply_defaults()
@@ -386,6 +386,7 @@ def record(
     """Record a function of named arguments.
 
     types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; may also be given as keywords
+    name   name of the function in the graph; "": its own
     into   an empty graph to record into, for a graph with replacements
     more   arguments that are not symbols, passed on unchanged; objects may have symbolic fields
     """
@@ -408,7 +409,7 @@ def record(
 
 
 def symbol(kind: str) -> Node:
-    """A free-standing symbol, for a field of an object that is passed to `record`."""
+    """A free-standing symbol of the type `kind`, for a field of an object that is passed to `record`."""
     return Node(Function("outer", "", ""), "parameter", kind, ())
 
 

@@ -12,7 +12,7 @@ from .types import Value
 
 
 class Composite(Protocol):
-    """An object whose parts a recording follows, such as a material."""
+    """An object whose fields a recording treats as separate values, such as a material."""
 
     def __parts__(self) -> Mapping[str, object]:
         """The parts that may contain values, by name."""

@@ -22,7 +22,7 @@ from .backend import Array, Types, drjit
 class Table:
     """Numbers on a grid of one to three axes, channels last; compared by identity.
 
-    name    what it holds, as used in shader code and manifests; characters that identifiers do not allow become _
+    name    its name in shader code and manifests; characters that identifiers do not allow become _
     values  shape (axis, ..., channels), float64
     """
 

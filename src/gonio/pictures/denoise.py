@@ -1,5 +1,5 @@
-"""Denoising of pictures with Intel Open Image Denoise, which is installed with Gonio on platforms for which pyoidn has
-a wheel."""
+"""Denoise pictures with Intel Open Image Denoise, which is installed with Gonio on platforms for which pyoidn has a
+wheel."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _HINT = f"{INSTALL}, or leave --denoise out"
 
 
 def available() -> str:
-    """The version of the installed pyoidn, "" if there is none; does not load it."""
+    """The version of the installed pyoidn, "" if there is none. The library is not loaded."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

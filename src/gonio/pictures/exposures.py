@@ -32,7 +32,7 @@ def parse(text: str) -> Exposure:
 
 
 def check(exposure: Exposure) -> Exposure:
-    """The exposure. Raises InputError if it is invalid."""
+    """Return the exposure. Raises InputError if it is invalid."""
     if isinstance(exposure, str) and exposure == "auto":
         return exposure
     if not (isinstance(exposure, int | float) and abs(exposure) <= 100):

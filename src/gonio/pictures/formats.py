@@ -1,4 +1,4 @@
-"""Decoding of untrusted picture files.
+"""Decode untrusted picture files.
 
 The header of a file (sizes, chunks, attributes) is checked against the file's length before a C++ library reads it.
 Radiance files are decoded here, since Mitsuba's reader writes past its buffer if run lengths are wrong.
@@ -37,7 +37,7 @@ _MAGIC = {
 
 
 def kind_of(content: bytes) -> str | None:
-    """The format by its first bytes, "PNG", "JPEG", "OpenEXR" or "RGBE"; None for any other."""
+    """The format of a file by its first bytes: "PNG", "JPEG", "OpenEXR" or "RGBE"; None for any other."""
     return next((kind for magic, kind in _MAGIC.items() if content.startswith(magic)), None)
 
 
@@ -71,7 +71,7 @@ class Decoded(NamedTuple):
 
 
 def decode(path: Path, content: bytes, kind: str) -> Decoded:
-    """The values of a file with that content. Raises Unreadable if it is damaged."""
+    """The values of a file with that content and of that `kind`. Raises Unreadable if it is damaged."""
     claimed = check(content, kind)
     if kind == "RGBE":
         return Decoded(_radiance(content, claimed), False)

@@ -69,8 +69,9 @@ def _suffix(path: str | Path) -> str:
 
 @exclusive
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
-    """Write a picture in the format of its suffix, completely or not at all.
+    """Write a picture in the format of its suffix, completely or not at all. Returns the path that was written.
 
+    metadata  the settings that made the picture, stored in the file
     exposure  stops; PNG only, since the other formats store radiance unchanged
     Raises InputError for an invalid picture or file name. If the file cannot be written, raises InputError or
     MachineError, which names the file in which the picture was saved instead.
@@ -104,7 +105,8 @@ def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> 
 
 
 class Shown(NamedTuple):
-    """How a picture was written: exposure of a .png in stops, None for other formats; a notice for the user, or ""."""
+    """The result of writing a picture: the exposure of a .png in stops, None for other formats, and a notice for the
+    user, or ""."""
 
     exposure: float | None
     notice: str

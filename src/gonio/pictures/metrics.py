@@ -43,7 +43,7 @@ READ_AS = {
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The metric and the largest value that passes; with None, any value passes."""
+    """The metric of a comparison and the largest value that passes; with None, any value passes."""
 
     metric: str = "relmse"
     most: float | None = None

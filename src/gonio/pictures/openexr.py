@@ -16,7 +16,7 @@ MAX_CHANNELS = 1024  # some files have one channel per object
 
 
 class Unreadable(ValueError):
-    """A picture that is damaged or contradicts itself; the text is the reason."""
+    """A picture is damaged or contradicts itself; the message gives the reason."""
 
 
 class Claimed(NamedTuple):

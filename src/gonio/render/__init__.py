@@ -1,4 +1,4 @@
-"""From scenes to pictures: preparing a render, running it, checkpoints, and image files."""
+"""From scene to picture: prepare a render, run it, write checkpoints and image files."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def render(
                    to each, (1 + paths, height, width, 3). "....albedo.r" is one channel of a color. Shapes with equal
                    materials are differentiated together
     Warns (GonioWarning) about suspicious scenes, about a .png that clips, and when it continues from a checkpoint.
-    Raises InputError, MachineError.
+    Raises InputError for an invalid scene or option, MachineError if this machine cannot render it.
     """
     from .request import Request
 
@@ -114,9 +114,12 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None writes the output of the original request, if it named one: to that file if it lies
-                in the checkpoint's folder, else to a file of that name next to the checkpoint, with a warning
-    spp         samples per pixel in all; None uses those of the original request
+    output      file to write. None writes to the output of the original request, if it named one, provided that this
+                file is in the checkpoint's folder; otherwise to a file of that name next to the checkpoint, with a
+                warning
+    spp         samples per pixel in total; None uses the number of the original request
+    threads     CPU cores to use; None uses all
+    timeout     seconds after which the render stops and returns the picture so far
     allow_code  allow the scene to run the Python files that it names
     Raises InputError if the checkpoint is damaged or if anything that the picture depends on has changed.
     """

@@ -35,7 +35,10 @@ class Row:
 
 
 def measure(device: str = "cpu") -> tuple[str, list[Row]]:
-    """A description of the machine, and the table. Raises MachineError if there is no such device."""
+    """A description of the machine, and the table. Raises MachineError if the device is missing.
+
+    device  "cpu", "cuda" or "auto"
+    """
     mi = engine.load(device)
     lanes, size = (by_kind[mi.variant()[:4]] for by_kind in (LANES, SIZE))
     import drjit as dr

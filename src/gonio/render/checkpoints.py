@@ -61,7 +61,7 @@ class _Facts(BaseModel):
 
 
 def restore(render: Renders, saved: kept.Kept, where: str) -> None:
-    """Copy the sums of a checkpoint into a render. Raises InputError if they do not fit it."""
+    """Copy the sums of a checkpoint into a render. Raises InputError, which names `where`, if they do not fit it."""
     try:
         render.restore(int(saved.facts["done"]), saved.arrays)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -72,6 +72,7 @@ class Keeper:
     """Writes checkpoints during a render, in a separate thread.
 
     path       the file; None writes nothing
+    prepared   the render whose sums are written
     temporary  whether the checkpoint is automatic: written only once the job is expected to take more than `LONG_JOB`
                seconds, and removed after the picture has been written
     long       seconds to use instead of `LONG_JOB`
@@ -180,8 +181,9 @@ def default_path(output: Path) -> Path:
 
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
-    """Continue from a checkpoint that an earlier run of the same render left. Returns a notice, and whether the
-    checkpoint is automatic.
+    """Continue from a checkpoint that an earlier run of the same render left.
+
+    Returns a notice for the user, "" if there is none, and whether the checkpoint is automatic.
 
     temporary  whether no checkpoint was requested; one that does not fit is then removed, with a notice
     """
@@ -192,7 +194,7 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
         check(saved.facts, prepared.sources.identity(), str(path))
         done = int(saved.facts["done"])
         if done > prepared.spp:
-            what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are requested"
+            what = f"the checkpoint holds {done} samples per pixel, but {prepared.spp} are requested"
             raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
         restore(prepared.render, saved, str(path))
     except InputError as error:
@@ -209,9 +211,11 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
     """The request of a checkpoint with the options of `gonio resume` (output, spp, timeout, threads), and a notice
-    about where its picture is written.
+    that states where its picture is written.
 
-    writes  whether the picture will be written, to the file that the scene names if the original request named none
+    change      the options to replace; None keeps the option of the original request
+    allow_code  whether the scene may run the Python files that it names
+    writes      whether the picture will be written; if the original request named no file, to the scene's
     """
     saved = load(path)
     if saved.facts["request"] is None:

@@ -1,4 +1,4 @@
-"""Running a prepared render up to its sample count, in this process or on workers, with checkpoints."""
+"""Run a prepared render up to its sample count, in this process or on workers, with checkpoints."""
 
 from __future__ import annotations
 
@@ -42,9 +42,11 @@ def execute(
     Returns why it ended, as `run` does, and the writer of the checkpoints, whose `remove` is to be called after the
     picture has been written.
 
-    temporary  path of an automatic checkpoint, used for long jobs whose request names none
-    long       seconds above which a job counts as long; a minute if None
-    tell       called at the start with a notice if there is a checkpoint
+    temporary    path of an automatic checkpoint, used for long jobs whose request names none
+    long         seconds above which a job counts as long; a minute if None
+    report       called with the progress after each pass
+    interrupted  called after each pass; a true result ends the render
+    tell         called at the start with a notice if there is a checkpoint
     """
     from . import tiles
 
@@ -116,7 +118,11 @@ def execute_all(
     interrupted: Callable[[], object] = lambda: False,
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
-    """Run several renders at once on the current executor; `finished` is called with the index of each that is done."""
+    """Run several renders at once on the current executor. Returns why this ended, as `run` does.
+
+    interrupted  called after each part; a true result ends the renders
+    finished     called with the index of each render that is done
+    """
     from ..transport import integrators
     from . import tiles
 

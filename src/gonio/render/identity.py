@@ -20,9 +20,9 @@ class Sources:
 
     text     returns the scene as it is rendered, including overrides, as text; slow for large scenes
     files    the files that the scene uses, by their names in the scene
-    how      integrator, sampler, seed and all other settings
+    how      integrator, sampler, seed and all other settings, as text
     version  versions of Gonio, Mitsuba and Dr.Jit
-    device   processor or GPU, and its compiler
+    device   name of the processor or GPU, and its compiler
     """
 
     text: Callable[[], str]
@@ -36,7 +36,7 @@ class Sources:
         return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
-        """A hash or name of each input of the picture, by the names that errors use."""
+        """A hash or description of each input of the picture, keyed by the name that errors use for the input."""
         identity = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
         identity |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
@@ -55,7 +55,7 @@ def _device(mi: ModuleType) -> str:
 
 
 def check(saved: Facts, identity: Mapping[str, str], where: str) -> None:
-    """Raise an InputError that names the first input that has changed."""
+    """Raise an InputError that names the first input that has changed since the checkpoint at `where` was written."""
     before = saved.get("identity")
     before = before if isinstance(before, dict) else {}
     for name in [*identity, *before]:

@@ -22,7 +22,7 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # fewer methods to compile whenever `gonio` starts
 class RenderOptions:
-    """Options of a render; None means the scene's value."""
+    """Options of a render; None selects the scene's value."""
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None

@@ -1,4 +1,4 @@
-"""Preparing a render: read the scene of a request, start Mitsuba, and choose the integrator."""
+"""Prepare a render: read the scene of a request, start Mitsuba, and choose the integrator."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Prepared:
 def prepare(request: Request, writes: bool = False) -> Prepared:
     """Read the scene, start Mitsuba and create the render. Raises InputError or MachineError.
 
-    writes  whether the picture will be written, to the file that the scene names if the request names no output
+    writes  whether the picture will be written; if the request names no output, to the file that the scene names
     """
     request.check()
     if request.material is None and not os.path.exists(request.scene):

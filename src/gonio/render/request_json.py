@@ -49,7 +49,11 @@ def _plain(value: Any) -> Any:
 
 
 def request_of(given: Facts, where: str, allow_code: bool) -> Request:
-    """The inverse of `described`. A file alone cannot make Gonio run Python: `allow_code` is required again."""
+    """The request in a file; the inverse of `described`.
+
+    where       the location that errors name
+    allow_code  whether materials may be classes in Python files; the file itself cannot grant this
+    """
     if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
         raise InputError(
             "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
@@ -81,6 +85,7 @@ Model = TypeVar("Model", bound=BaseModel)
 def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -> Model:
     """The facts of an untrusted file, validated by `model`.
 
+    where    name of the file in errors
     pointer  JSON pointer to the facts in the file
     Raises InputError with the location and the expected value.
     """

@@ -69,22 +69,27 @@ def bake(
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
-    target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"; or a picture of an
+    target    a distribution by name (F = 1), or a material, such as "conductor(preset=Au)"; or a picture of an
               environment (.hdr, .exr, .npz; latitude-longitude), for which "prefiltered" is the only table
     output    folder to write to, all files or none; None writes nothing
     lut       any of "E", "Eavg", "dfg", "glass"; None bakes all that the target has, except glass. Or "ltc" alone:
               linearly transformed cosines of the target, with shader code for light from quadrilaterals
-    resolution  texels along each axis, 1 to 4096; None is 128, or 64 for "ltc" (anisotropic: 16), which has at most 256
-    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then with `samples` per
-              texel by the `sampler` "hammersley", "stratified" or "independent" (with `seed`, 0 if None)
+    resolution  texels along each axis, 1 to 4096; None: 128, or for "ltc" 64 (anisotropic: 16), where at most 256
+    method    "quadrature", or the density to sample: "cosine", the distribution's name, or "visible"
+    samples   samples per texel, for a `method` that samples
+    sampler   their points: "hammersley", "stratified" or "independent"
+    seed      seed of independent points; None: 0
     masking   masking of a distribution; a material has its own
-    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures with `store` and `flip`)
+    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures)
+    store     what the homework's pictures hold: "E" or "1-E"
+    flip      whether their bottom row has the lowest roughness
+    wrap      convert them to bytes as the homework's program does: rounded down, and 256 becomes 0
     aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
     floor     lower bound of the denominator of D, for method "cosine"
-    wrap      convert the homework's pictures to bytes as its program does: rounded down, and 256 becomes 0
     preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
-    ndf       for an environment: the distribution for prefiltering (default ggx) into `levels` levels of roughness
-              0 to 1 (default 6); the error of the split sum is measured with `masking`
+    ndf       for an environment: the distribution for prefiltering; None: ggx. The error of the split sum is measured
+              with `masking`
+    levels    for an environment: number of levels, of roughness 0 to 1; None: 6
     Tables baked before come from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
     """

@@ -1,4 +1,4 @@
-"""Rendering one picture on several workers: each part is a range of its lanes, with all their samples.
+"""Render one picture on several workers: each part is a range of its lanes, with all their samples.
 
 Lanes are independent, and every part begins at a multiple of the processor's vector width, so that the same rays are
 traced together: the sums are bit-identical to those of a single process. A worker loads the scene from copies of its
@@ -109,8 +109,10 @@ def advance(
     """Advance every lane of several renders to its sample count on the workers; return why this ended, as `passes.run`
     does.
 
-    report    called after each part, with the progress of all renders together
-    finished  called with the index of a render when its last part has arrived
+    report       called after each part, with the progress of all renders together
+    interrupted  called after each part; a true result ends the renders
+    timeout      time limit, in the unit of `clock` (s); None: none
+    finished     called with the index of a render when its last part has arrived
     """
     begin, parts, arguments = clock(), [], []
     files: dict[str, Path] = {}
@@ -165,7 +167,7 @@ def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
 
 
 def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
-    """A prepared render as text from which a worker can rebuild it, and the files that it needs, by hash of content.
+    """A prepared render as a string from which a worker can rebuild it, and the files that it needs, by content hash.
 
     Raises InputError for a render that cannot be distributed.
     """
@@ -202,7 +204,10 @@ _rates: dict[str, float] = {}  # samples per second of the scene's last part
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
-    """The sums of lanes [begin, end): samples [first, last) added to `start`."""
+    """The sums of lanes [begin, end): samples [first, last) added to `start`, None for no sums.
+
+    spec  the render, as returned by `travelling`
+    """
     with _places_as_given():
         render = _prepared(spec).render
         assert isinstance(render, Render)

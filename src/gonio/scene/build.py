@@ -123,7 +123,7 @@ class _Builder:
                     raise MachineError(what, at, hint) from None
                 raise InputError(what, self.description.where(where), hint) from None
             raise InputError(
-                f"Mitsuba refuses it: {text.splitlines()[-1][:200]}",
+                f"Mitsuba rejects it: {text.splitlines()[-1][:200]}",
                 self.description.where(where),
                 "simplify this part, and report it if it should work",
             ) from error
@@ -133,7 +133,7 @@ class _Builder:
         placed = camera.transform
         width, height = camera.film.size
         if camera.polarizer is not None and not self.mi.is_polarized:
-            what = f"a polarizer needs a polarized variant, {self.mi.variant()} is not"
+            what = f"a polarizer needs a polarized variant, which {self.mi.variant()} is not"
             hint = "`gonio render` and go.render choose one; otherwise set the variant llvm_ad_spectral_polarized first"
             raise InputError(what, self.description.where("/camera/polarizer"), hint)
         return {
@@ -321,7 +321,7 @@ class _Builder:
     def normal_mapped(self, plugin: PluginDict, texture: NormalMap, where: str) -> PluginDict:
         pixels = self.image(texture, where)
         if pixels.shape[2] != 3:
-            raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
+            raise InputError("a one-channel normal map, three expected", self.description.where(where), "use RGB")
         return self.perturbing_normal("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
 
     def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:

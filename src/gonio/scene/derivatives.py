@@ -13,7 +13,10 @@ CHANNELS = ("r", "g", "b")
 
 
 def place_of(path: str, where: str) -> tuple[str, str]:
-    """A path in two parts: ("shapes.0.material", "base.alpha") for "shapes.0.material.base.alpha"."""
+    """A path in two parts: ("shapes.0.material", "base.alpha") for "shapes.0.material.base.alpha".
+
+    where  the location that errors name
+    """
     steps = path.removeprefix("scene.").split(".")
     if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdecimal() or steps[2] != "material":
         raise InputError(f"'{path}' names no material of a shape", where, 'such as "shapes.0.material.alpha"')
@@ -21,14 +24,14 @@ def place_of(path: str, where: str) -> tuple[str, str]:
 
 
 def material_at(description: SceneDescription, built: Built, place: str, where: str) -> BSDFPlugin:
-    """The plugin of a material in the scene. Raises InputError if it is not one of Gonio's."""
+    """The plugin of the material at the path `place`. Raises InputError, which names `where`, if it is not Gonio's."""
     index = int(place.split(".")[1])
     if index >= len(description.shapes):
         raise InputError(f"no shape {index}", where, f"the scene has {len(description.shapes)}")
     part = description.shapes[index].material
     plugin = None if part is None else built.bsdfs.get(part)
     if plugin is None or not hasattr(plugin, "placed"):
-        raise InputError("no material of Gonio's there, or a normal map over it", where, "name another")
+        raise InputError("not a Gonio material, or one with a normal map", where, "name another")
     return plugin
 
 
@@ -53,6 +56,6 @@ def along(description: SceneDescription, built: Built, path: str) -> Along:
     if known[name].kind == "angle" or name.rpartition(".")[2] in ("absorption", "priority"):
         raise InputError(f"'{name}' has no derivative here", where, "name a width, a color or an index")
     if model.delta != "never" or model.stochastic:
-        what = "mirrors and smooth glass turn light by an index" if not model.stochastic else "its values are random"
+        what = "mirrors and smooth glass deflect light by an index" if not model.stochastic else "its values are random"
         raise InputError(f"{what}: no derivative", where, "name a material that is rough")
     return target

@@ -1,4 +1,4 @@
-"""Locating the files that a scene names."""
+"""Locate the files that a scene names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from ..errors import InputError, did_you_mean
 
 
 def located(file: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
-    """The path of a file named by a file in `folder`. Raises InputError if it is missing or outside that folder."""
+    """The path of a file named by a file in `folder`. Raises InputError if it is missing or outside that folder.
+
+    where          the location that errors name
+    allow_outside  allow files outside the folder
+    """
     file = documents.inside(file)[0]
     return checked(Path(folder, file), file, folder, where, allow_outside)
 
@@ -18,7 +22,9 @@ def located(file: str, folder: Path, where: str, allow_outside: bool = False) ->
 def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
     """The path of a file with links resolved. Raises InputError if it is missing, empty or outside the folder.
 
-    name  the file's name in errors
+    name           the file's name in errors
+    where          the location that errors name
+    allow_outside  allow files outside the folder
     """
     try:
         folder = folder.resolve()

@@ -1,4 +1,4 @@
-"""Checking the size of a film against the memory of this machine."""
+"""Check the size of a film against the memory of this machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_SIDE = 1 << 16  # pixels
 
 
 def check_film(size: tuple[int, int], where: str) -> None:
-    """Raise InputError for a film without pixels, or for one that is too large for this machine's memory."""
+    """Raise InputError, which names `where`, for a film without pixels or one too large for this machine's memory."""
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
@@ -23,7 +23,7 @@ def check_film(size: tuple[int, int], where: str) -> None:
         what = f"a film of {width}x{height} needs about {needed / gib:.0f} GiB"
         raise InputError(f"{what}, this machine has {memory() / gib:.0f} GiB", where, "give a smaller size")
     if max(width, height) > MAX_SIDE:
-        what = f"a film of {width}x{height} is longer than {MAX_SIDE} pixels"
+        what = f"a film of {width}x{height} is larger than {MAX_SIDE} pixels along a side"
         raise InputError(what, where, "give a smaller size")
 
 

@@ -125,7 +125,7 @@ class MaterialPart(Part):
     bump: BumpMap | None = None
     """An image of heights."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """Whether both sides reflect alike. The default is true for all materials that transmit no light."""
+    """Whether both sides reflect in the same way. The default is true for all materials that transmit no light."""
 
     _given: bool = PrivateAttr(False)  # whether a program made it; paths of files are then used unchanged
     _source: str = PrivateAttr("")  # the document that contains the material
@@ -502,7 +502,7 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
         path = located(part.file, context.get("folder", Path()), "", context.get("allow_outside", False))
         if path.suffix.lower() not in document.suffixes:
             known = ", ".join(document.suffixes)
-            raise InputError(f"'{part.file}' is no {part.type} file by its name", "", f"it ends in {known}")
+            raise InputError(f"'{part.file}' is not a {part.type} file by its name", "", f"it ends in {known}")
         described = documents.read(document, path, part.material or "")
     except GonioError as error:
         what = f"{error.where}: {error.what}" if error.where else error.what
@@ -565,13 +565,13 @@ def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart
     """A shader in the scene's folder, which cannot run code on the machine."""
     file = value.get("file")
     if not isinstance(file, str) or not file:
-        raise invalid("a shader without a 'file'", 'such as {"type": "shader", "file": "my.glsl"}', "file")
+        raise invalid("a shader needs a 'file'", 'such as {"type": "shader", "file": "my.glsl"}', "file")
     folder, anywhere = context.get("folder", Path()), context.get("allow_outside", False)
     try:
         name, options = shaders.parted(file)
         path = located(name, folder, "", anywhere)
         if not shaders.names_shader(str(path)):
-            raise InputError(f"'{file}' is no shader by its name", "", ", ".join(shaders.SUFFIXES))
+            raise InputError(f"'{file}' is not a shader by its name", "", ", ".join(shaders.SUFFIXES))
         model: Any = shaders.class_of(f"{path}?{options}" if options else str(path), None if anywhere else folder)
     except GonioError as error:
         raise invalid(f"{error.where}: {error.what}" if error.where else error.what, error.hint, "file") from None

@@ -168,12 +168,13 @@ def is_ply(path: Path) -> bool:
 def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
     """The triangles of an .obj or .ply file. Raises InputError, with the line if the format has lines.
 
-    kind  suffix of the format, instead of that of the name
+    where  the location in the scene that errors name
+    kind   suffix of the format, instead of the path's own
     """
     readers = {".obj": read_obj, ".ply": read_ply}
     kind = kind or path.suffix.lower()
     if kind not in readers:
-        raise InputError(f"'{path.name}' is no known kind of mesh", where, "use .obj or .ply")
+        raise InputError(f"'{path.name}' is not a known kind of mesh", where, "use .obj or .ply")
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise InputError(
@@ -223,7 +224,10 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """Wavefront OBJ: v, vt, vn, f. Polygons become fans, negative indices count from the end; ignores other lines."""
+    """The triangles of Wavefront OBJ data, from its lines v, vt, vn and f; other lines are ignored.
+
+    Polygons become fans, and negative indices count from the end. Errors name `path` and `where`.
+    """
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}
@@ -240,7 +244,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
             try:
                 number = int(text)
             except ValueError:
-                refuse(line, f"'{_show(token)}' is no vertex of a face", "write f 1 2 3, f 1/1 2/2 3/3 or f 1/1/1 ...")
+                refuse(line, f"'{_show(token)}' is not a face vertex", "write f 1 2 3, f 1/1 2/2 3/3 or f 1/1/1 ...")
             count = len(counts[slot])
             index = number - 1 if number > 0 else count + number
             if number == 0 or not 0 <= index < count:
@@ -258,7 +262,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
             try:
                 values = [float(word) for word in words[1 : 1 + needed[key]]]
             except ValueError:
-                refuse(number, f"'{_show(line)}' holds something that is no number")
+                refuse(number, f"'{_show(line)}' contains something that is not a number")
             if len(values) < needed[key]:
                 refuse(number, f"'{_show(line)}': {needed[key]} numbers expected")
             columns[key].append(values)
@@ -294,7 +298,10 @@ _PLY_TYPES = {
 
 
 def read_ply(data: bytes, path: Path, where: str) -> Triangles:
-    """Stanford PLY, ASCII or binary: vertex x y z [nx ny nz] [u v | s t | texture_u texture_v], face lists."""
+    """The triangles of Stanford PLY data, ASCII or binary; errors name `path` and `where`.
+
+    Reads the elements vertex, with x y z [nx ny nz] [u v | s t | texture_u texture_v], and face, with index lists.
+    """
 
     def refuse(what: str, hint: str = "export the mesh again") -> NoReturn:
         raise InputError(f"'{path.name}': {what}", where, hint)

@@ -1,4 +1,4 @@
-"""Loading Mitsuba XML files, scenes and single BSDFs, with the same checks as for the lab's scenes."""
+"""Load Mitsuba XML files, scenes and single BSDFs, with the same checks as for the lab's scenes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ def read(
 ) -> SceneText:
     """The text of a Mitsuba XML file; see `mitsuba_xml.read`.
 
-    parameters  values of its `$parameters`: strings, numbers or lists of numbers
+    parameters     values of its `$parameters`: strings, numbers or lists of numbers
+    allow_outside  allow the scene to name files outside its folder
+    allow_code     allow the scene to load native plugins from the folder `plugins` next to it
     """
     values = {key: _as_xml(value) for key, value in parameters.items()}
     return mitsuba_xml.read(file, values, allow_outside, allow_code)
@@ -40,7 +42,7 @@ def load(
 
     size            size of the film in pixels; None keeps the scene's
     own_integrator  whether the scene must name an integrator
-    Raises InputError.
+    Raises InputError if Mitsuba rejects the scene.
     """
     location = str(file)
     try:

@@ -1,4 +1,4 @@
-"""Rewriting the XML of a Mitsuba scene as a single text without names that Mitsuba would have to look up.
+"""Rewrite the XML of a Mitsuba scene as a single document without names that Mitsuba would have to look up.
 
 Includes, search paths and parameters have the same meaning as in Mitsuba:
 
@@ -93,7 +93,8 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
     """The absolute path of a file of a scene, for Mitsuba.
 
-    name  the file's name in errors
+    name      the file's name in errors
+    location  file and line that errors name
     Raises InputError for a file that must not be opened: one outside the scene's folder, or an inconsistent one that
     could corrupt the memory of a C++ library.
     """
@@ -114,9 +115,11 @@ def property_value(
 ) -> str:
     """The value of a string property of a plugin; if it names a file, the path of that file.
 
-    kind    type of the plugin
-    locate  function that returns the path of a file that may be read, given its name
-    Raises InputError for code, and if Mitsuba would search other folders for a file of that name.
+    kind        type of the plugin
+    location    file and line that errors name
+    locate      function that returns the path of a file that may be read, given its name
+    allow_code  whether the property may name code
+    Raises InputError for code that is not allowed, and if Mitsuba would search other folders for a file of that name.
     """
     if outside.names_code(value) and not allow_code:
         what = f"'{value}' is code, which a scene alone does not run"
@@ -284,10 +287,10 @@ class _File:
         scene = self.scene
         scene.count(self.location)
         if len(self.open) >= MAX_DEPTH:
-            raise InputError(f"more than {MAX_DEPTH} elements inside each other", self.location)
+            raise InputError(f"more than {MAX_DEPTH} nested elements", self.location)
         if len(self.open) > 1 and not self.open[-1]:
             raise InputError(
-                f"<{tag}> stands inside an element that cannot contain any", self.location, "correct it there"
+                f"<{tag}> is inside an element that cannot contain other elements", self.location, "correct it there"
             )
         attributes = {name: scene.replaced(value, self.location) for name, value in given.items()}
         written = tag
@@ -344,7 +347,7 @@ class _File:
     def _path(self, attributes: Mapping[str, str]) -> None:
         (value,) = self._required("path", attributes, "value")
         if len(self.open) != 1:
-            raise InputError("<path> stands inside another element", self.location, "put it into <scene> itself")
+            raise InputError("<path> is inside another element", self.location, "put it into <scene> itself")
         try:
             choices = [folder / value for folder in (self.file.parent.resolve(), *self.folders)]
             path = next((choice for choice in choices if choice.is_dir()), None)
@@ -361,7 +364,7 @@ class _File:
     def _include(self, attributes: Mapping[str, str]) -> None:
         (name,) = self._required("include", attributes, "filename")
         if self.level + 1 >= MAX_INCLUDES:
-            raise InputError(f"more than {MAX_INCLUDES} includes inside each other", self.location)
+            raise InputError(f"more than {MAX_INCLUDES} nested includes", self.location)
         folders = [self.file.parent.resolve(), *self.folders]
         path = Path(self.scene.located(name, folders, self.location))
         self.scene.parse(path, folders, attributes, self.level + 1)

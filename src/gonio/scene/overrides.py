@@ -40,13 +40,13 @@ def _plain(value: object, path: str) -> Json:
         _check_text(value, path)
     if value is None or isinstance(value, str | int | float):
         return value
-    raise InputError(f"{value!r} cannot stand in a scene", f"path {path}", "give a number, a name, a list or an object")
+    raise InputError(f"{value!r} is not a scene value", f"path {path}", "give a number, a name, a list or an object")
 
 
 def _check_text(text: str, path: str) -> None:
     """Raise InputError for bytes from the command line that are not UTF-8, which no scene file can contain."""
     if encodable(text) != text:
-        raise InputError(f"'{text}' is no text", f"path {path}", "write it in UTF-8")
+        raise InputError(f"'{text}' is not valid text", f"path {path}", "write it in UTF-8")
 
 
 def _set(raw: dict[str, Json], path: str, value: Json) -> None:
@@ -111,7 +111,7 @@ def _below(holder: Json, step: str, path: str, before: list[str], steps: list[st
         return [holder[_index(holder, step, path)]]
     if "*" in before:
         return []
-    raise InputError(f"'{'.'.join(before)}' holds nothing that could be named '{step}'", f"path {path}", "shorten it")
+    raise InputError(f"'{'.'.join(before)}' contains nothing named '{step}'", f"path {path}", "shorten it")
 
 
 def _index(holder: list[Json], step: str, path: str) -> int:

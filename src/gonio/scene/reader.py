@@ -1,4 +1,4 @@
-"""Reading a scene: parse the file, apply overrides, validate, and locate the files that it names."""
+"""Read a scene: parse the file, apply overrides, validate, and locate the files that it names."""
 
 from __future__ import annotations
 
@@ -172,7 +172,10 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
 
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
-    """The first error with location, problem and hint; the next few in one line each, with the hint in parentheses."""
+    """The errors of a validation as one InputError.
+
+    The first one has a location, problem and hint; each of the next few is a line with the hint in parentheses.
+    """
     problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
         where, what, hint = _one(detail, raw)

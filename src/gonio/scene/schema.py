@@ -40,23 +40,23 @@ class Output(Part):
         named = (info.context or {}).get("names_output", True)
         if named and Path(self.filename).suffix.lower() not in SUFFIXES:
             hint = f"end it in {', '.join(SUFFIXES)}, or give -o FILE"
-            raise invalid(f"'{self.filename}' is no known kind of picture", hint, "filename")
+            raise invalid(f"'{self.filename}' is not a known kind of picture", hint, "filename")
         return self
 
 
 class Sampler(Part):
-    """The number of samples per pixel, and their point set. Give either xSamples and ySamples or samples."""
+    """The number of samples per pixel and their random numbers. Give `samples`, or both `xSamples` and `ySamples`."""
 
     type: str = "independent"
-    """Lab 2's "independent" expresses no preference and means "default"; any other name selects that sampler."""
+    """Name of the random-number sampler. Lab 2's value, "independent", expresses no preference and means "default"."""
     x_samples: Whole | None = Field(None, alias="xSamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     y_samples: Whole | None = Field(None, alias="ySamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     samples: Whole | None = Field(None, ge=1, le=MAX_SAMPLES)
-    """Samples per pixel, in place of xSamples and ySamples."""
+    """Samples per pixel, in place of `xSamples` and `ySamples`."""
     seed: Whole | None = Field(None, ge=0, lt=2**32)
-    """The same seed gives a bit-identical picture."""
+    """Seed of the random numbers. The same seed gives a bit-identical picture."""
 
     @model_validator(mode="after")
     def _counts(self) -> Sampler:
@@ -90,14 +90,14 @@ class Sampler(Part):
 
 
 class CameraTransform(Part):
-    """Position and orientation of the camera; right = forward x up."""
+    """Position and orientation of the camera. The cross product forward x up points to the right in the picture."""
 
     position: Vector
     """Position of the camera."""
     look_at: Vector = Field(alias="lookAt")
     """The point at the center of the picture."""
     up: Vector
-    """The direction that points up in the picture; it need not be perpendicular to the view."""
+    """The direction that points up in the picture; it need not be perpendicular to the viewing direction."""
 
     @model_validator(mode="after")
     def _spans_a_frame(self) -> CameraTransform:
@@ -114,7 +114,7 @@ class CameraTransform(Part):
 
 
 class Film(Part):
-    """The picture."""
+    """The size of the picture."""
 
     size: tuple[Whole, Whole]
     """[width, height] in pixels."""
@@ -142,16 +142,16 @@ class Camera(Part):
     type: Literal["pinhole"] = "pinhole"
     transform: CameraTransform
     vertical_fov: Number = Field(alias="verticalFov", gt=0, lt=180)
-    """Angle between the lower and the upper edge of the picture, in degrees."""
+    """Vertical field of view, in degrees."""
     film: Film
     t_near: Positive = Field(1e-4, alias="tNear")
     """Near clipping distance."""
     t_far: Positive = Field(1e10, alias="tFar")
     """Far clipping distance."""
     polarizer: Number | None = None
-    """The direction of polarization that an ideal linear polarizer in front of the lens transmits, in degrees
-    counterclockwise from the picture's horizontal. Unpolarized light loses half of its power. Mitsuba's path tracer
-    renders the scene, in a polarized variant.
+    """Adds an ideal linear polarizer in front of the lens: the direction of polarization that it transmits, in degrees
+    counterclockwise from the picture's horizontal. Unpolarized light loses half of its power. The scene is then
+    rendered by Mitsuba's path tracer in a polarized variant.
     """
     time_start: Number = Field(0.0, alias="timeStart")
     """No effect: scenes are static."""
@@ -206,7 +206,9 @@ class Rotation(Part):
     """A rotation about an axis through the origin, counterclockwise as seen from the tip of the axis."""
 
     axis: Vector
+    """Direction of the axis; its length has no effect."""
     radian: Number
+    """Angle of the rotation, in radians."""
 
     @model_validator(mode="after")
     def _has_an_axis(self) -> Rotation:
@@ -222,7 +224,7 @@ class Rotation(Part):
 
 
 class Transform(Part):
-    """translate * rotate * scale: the scale is applied first."""
+    """The shape is first scaled, then rotated, then translated: the matrix is translate * rotate * scale."""
 
     translate: Vector = (0.0, 0.0, 0.0)
     rotate: Rotation | None = None
@@ -249,21 +251,24 @@ class ShapePart(Part):
     """The keys that all shapes share."""
 
     material: Material | None = None
-    """The default is matte with albedo 0.5."""
+    """The default is `matte` with an albedo of 0.5."""
     transform: Transform = Transform()
 
 
 class Sphere(ShapePart):
-    """A sphere; u = atan2(x, z) / (2 pi), v = (angle from +y) / pi."""
+    """A sphere, with texture coordinates u = atan2(x, z) / (2 pi) and v = (angle from +y) / pi."""
 
     type: Literal["sphere"]
     center: Vector
     radius: Positive
-    """Not scaled by `transform`."""
+    """`transform` does not scale the radius."""
 
 
 class Parallelogram(ShapePart):
-    """The points base + u edge0 + v edge1, with u and v in [0, 1]; the normal is normalize(edge0 x edge1)."""
+    """The points base + u edge0 + v edge1, where the texture coordinates u and v range from 0 to 1.
+
+    The normal is normalize(edge0 x edge1).
+    """
 
     type: Literal["parallelogram"]
     base: Vector
@@ -282,7 +287,9 @@ class Parallelogram(ShapePart):
 
 
 class Cube(ShapePart):
-    """The cube [-1, 1]^3. On faces normal to axis i, u runs along axis i + 1 and v along axis i + 2, from -1 to 1."""
+    """The cube [-1, 1]^3. On the faces normal to axis i, the texture coordinates u and v run along the axes i + 1 and
+    i + 2 from -1 to 1.
+    """
 
     type: Literal["cube"]
 
@@ -297,14 +304,16 @@ Turn = Annotated[Positive, AfterValidator(_turn)]
 
 
 class Disk(ShapePart):
-    """A disk in z = 0 with normal +z; u = phi / phi_max from +x toward +y, v from the rim inward."""
+    """A disk in the plane z = 0 with normal +z. The texture coordinate u is phi / phi_max, where phi is measured from
+    +x toward +y; v is 0 at the rim and 1 at the center.
+    """
 
     type: Literal["disk"]
     radius: Positive = 1.0
     inner_radius: NonNegative = 0.0
-    """Radius of the hole."""
+    """Radius of the hole in the center."""
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, in radians."""
+    """Angle of the sector about the z axis, in radians. The default is a full turn."""
 
     @model_validator(mode="after")
     def _has_an_area(self) -> Disk:
@@ -318,23 +327,29 @@ class Disk(ShapePart):
 
 
 class Cylinder(ShapePart):
-    """A cylinder from z = 0 to z = height, open at both ends; u = phi / phi_max, v = z / height."""
+    """A cylinder about the z axis from z = 0 to z = height, open at both ends.
+
+    Its texture coordinates are u = phi / phi_max and v = z / height.
+    """
 
     type: Literal["cylinder"]
     radius: Positive = 1.0
     height: Positive = 1.0
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, in radians."""
+    """Angle of the sector about the z axis, in radians. The default is a full turn."""
 
 
 class Cone(ShapePart):
-    """A cone with its base in z = 0 and its apex at z = height, open below; u = phi / phi_max, v = z / height."""
+    """A cone about the z axis with its base in the plane z = 0 and its apex at z = height, open at the base.
+
+    Its texture coordinates are u = phi / phi_max and v = z / height.
+    """
 
     type: Literal["cone"]
     radius: Positive = 1.0
     height: Positive = 1.0
     phi_max: Turn = 2 * math.pi
-    """Angle of the sector, in radians."""
+    """Angle of the sector about the z axis, in radians. The default is a full turn."""
 
 
 class Mesh(ShapePart):
@@ -342,7 +357,9 @@ class Mesh(ShapePart):
 
     type: Literal["triangle", "mesh"]
     file: str = Field(min_length=1)
-    """Texture coordinates are used unchanged; v = 0 is the top of a texture. A mesh without normals is flat-shaded."""
+    """The mesh. Its texture coordinates are used unchanged, and v = 0 is the top of a texture. Without normals in the
+    file, the mesh is flat-shaded.
+    """
 
 
 Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
@@ -353,12 +370,12 @@ class AreaLight(Part):
 
     type: Literal["areaLight"]
     energy: Radiance
-    """Emitted radiance."""
+    """Emitted radiance, W/(m^2 sr)."""
     shape: Shape
 
 
 class SpotLight(Part):
-    """A point light with equal intensity in all directions (the name comes from Lab 2)."""
+    """A point light with equal intensity in all directions; the name `spotLight` is Lab 2's."""
 
     type: Literal["spotLight"]
     position: Vector
@@ -371,7 +388,7 @@ class DirectionalLight(Part):
 
     type: Literal["directionalLight"]
     direction: Vector
-    """The direction in which the light travels, of any length: [0, -1, 0] shines down."""
+    """The direction in which the light travels; its length has no effect. [0, -1, 0] shines down."""
     energy: Radiance
     """Irradiance on a surface perpendicular to the light, W/m^2."""
 
@@ -388,13 +405,16 @@ class DirectionalLight(Part):
 
 
 class EnvironmentLight(Part):
-    """Light from all directions; direction (sin t sin p, cos t, sin t cos p) has u = p / (2 pi), v = t / pi."""
+    """Light from infinitely far away, in all directions.
+
+    The direction (sin t sin p, cos t, sin t cos p) has the texture coordinates u = p / (2 pi) and v = t / pi.
+    """
 
     type: Literal["environmentLight"]
     texture: Sky | None = None
-    """Radiance from an image or [r, g, b]."""
+    """Radiance: an image, [r, g, b] or a number (gray)."""
     radiance: Radiance | None = None
-    """Constant radiance, in place of a texture."""
+    """The same radiance in all directions, in place of `texture`."""
 
     @model_validator(mode="after")
     def _one_source(self) -> EnvironmentLight:
@@ -411,11 +431,11 @@ class Contents(Part):
     """The shapes and lights of the scene."""
 
     acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
-    """No effect: Gonio uses Mitsuba's acceleration structure, or none for a few simple shapes."""
+    """No effect: Gonio uses Mitsuba's acceleration structure, or none if the scene has only a few simple shapes."""
     shapes: list[Shape] = Field(default_factory=list)
     lights: list[LightSource] = Field(default_factory=list)
     ambient: Light | None = None
-    """Radiance Ia of the ambient light in eq. 1 of the Lab 2 sheet; it applies to materials with `ka`."""
+    """Radiance of the ambient light, Ia in eq. 1 of the Lab 2 sheet. It affects only materials that have a `ka`."""
 
     @model_validator(mode="after")
     def _one_environment(self) -> Contents:
@@ -435,7 +455,7 @@ class SceneDescription(Part):
     integrator: Integrator
     contents: Contents = Field(alias="scene")
     top_ambient: Light | None = Field(None, alias="ambient")
-    """The same as scene.ambient."""
+    """The same as `scene.ambient`."""
 
     _path: Path = PrivateAttr(default=Path("scene.json"))
     _allow_outside: bool = PrivateAttr(default=False)

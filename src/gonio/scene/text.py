@@ -1,4 +1,4 @@
-"""Parsing the text of a scene file: strict JSON of bounded size and depth, as plain Python values.
+"""Parse the text of a scene file: strict JSON of bounded size and depth, as plain Python values.
 
 Python's own parser is too lenient for files that people edit by hand (of two equal keys it takes the last, and it
 accepts NaN) and fails on deep nesting. Here, each of these is an `InputError` with the location in the file.
@@ -178,7 +178,7 @@ def _syntax_hint(text: str, position: int) -> str:
     if text[position : position + 2] in ("//", "/*") or text[position : position + 1] == "#":
         return "JSON has no comments"
     if text[position : position + 1] == "'":
-        return 'JSON strings stand in double quotes: "..."'
+        return 'JSON strings are in double quotes: "..."'
     return "a comma, quote or bracket is missing or too many near here"
 
 

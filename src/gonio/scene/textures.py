@@ -19,7 +19,8 @@ from ..pictures.images import RGB
 def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | None = None, inside: str = "") -> RGB:
     """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded if `srgb`.
 
-    channel  "r", "g", "b" or "a" alone; alpha is never decoded, and is 1 if the image has none
+    where    the location in the scene that errors name
+    channel  the single channel to read, "r", "g", "b" or "a"; alpha is never decoded, and is 1 if the image has none
     inside   the number of the image in a document that contains several
     Raises InputError if the file is not an image, claims more pixels than it can hold, or contains NaN.
     """
@@ -60,7 +61,7 @@ def _inside(path: Path, index: str) -> bytes:
 def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decoded:
     kind = formats.kind_of(content)
     if kind is None:
-        raise InputError(f"'{name}' is no image that can be read", where, "use .png, .jpg, .exr or .hdr")
+        raise InputError(f"'{name}' is not a readable image", where, "use .png, .jpg, .exr or .hdr")
     try:
         return formats.decode(path, content, kind)
     except formats.Unreadable as error:

@@ -168,7 +168,9 @@ Factor = Annotated[
 
 
 class ImageTexture(Part):
-    """An image, mapped by the surface's uv; v = 0 is the top of the image. 8-bit values are divided by 255."""
+    """An image, mapped by the texture coordinates (u, v) of the surface; v = 0 is the top of the image. 8-bit values
+    are divided by 255.
+    """
 
     type: Literal["imageTex"]
     file: str = Field(min_length=1)
@@ -178,54 +180,58 @@ class ImageTexture(Part):
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """Interpolation between texels."""
     wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
-    """Continuation outside [0, 1]."""
+    """How the image continues outside [0, 1]."""
     channel: Literal["r", "g", "b", "a"] | None = None
-    """The single channel to use, as gray; without it, a scalar parameter takes the mean of red, green and blue."""
+    """The only channel to use, as gray. Without this key, a scalar parameter takes the mean of red, green and blue."""
     factor: Factor = 1.0
-    """Factor by which the image's values are multiplied: one number, or one per channel."""
+    """The values of the image are multiplied by this factor: one number, or one per channel."""
     mean: Annotated[bool, Strict()] = False
-    """Whether to use the image's mean everywhere, for a parameter that must not vary over a surface."""
+    """Whether to use the mean of the image everywhere, for a parameter that must not vary over a surface."""
 
 
 class NormalMap(Part):
-    """An image of normals: color c encodes 2c - 1 along tangent (dp/du), bitangent (normal x tangent) and normal."""
+    """An image of normals. A color c encodes the vector 2c - 1 in the frame of tangent (dp/du), bitangent
+    (normal x tangent) and normal.
+    """
 
     type: Literal["imageTex"] = "imageTex"
     file: str = Field(min_length=1)
     """An image in the scene's folder."""
     scale: Number = 1.0
-    """Factor by which the slopes are multiplied."""
+    """The slopes of the normals are multiplied by this factor."""
 
 
 class BumpMap(Part):
-    """An image of heights, mapped by the surface's uv: values from 0 to 1 (8-bit values: v/255) times `scale`."""
+    """An image of heights, mapped by the texture coordinates of the surface. A height is `scale` times the value of the
+    image, from 0 to 1 (8-bit values are divided by 255).
+    """
 
     type: Literal["imageTex"] = "imageTex"
     file: str = Field(min_length=1)
     """An image in the scene's folder."""
     scale: Number
-    """Height of the value 1, in units of the scene."""
+    """Height where the image is 1, in units of the scene."""
 
 
 class LightSpectrum(Part):
     """The spectrum of a lamp: rendered as a color in RGB, and as a spectrum with `--spectral`."""
 
     scale: NonNegative = 1.0
-    """The luminance is that of the radiance [scale, scale, scale]."""
+    """Brightness: the luminance equals that of the radiance [scale, scale, scale]."""
 
 
 class Daylight(LightSpectrum):
-    """CIE standard illuminant D65, which is white."""
+    """CIE standard illuminant D65 (daylight), the white of sRGB."""
 
     type: Literal["d65"]
 
 
 class Blackbody(LightSpectrum):
-    """A black body by Planck's law, such as a filament (2856 K, CIE illuminant A) or the sun (5778 K)."""
+    """A black body, by Planck's law: for example, a filament (2856 K, CIE illuminant A) or the sun (5778 K)."""
 
     type: Literal["blackbody"]
     temperature: Annotated[Number, Field(ge=500, le=1e6)]
-    """Temperature in kelvin."""
+    """Temperature, in kelvin."""
 
 
 class Led(LightSpectrum):
@@ -241,17 +247,18 @@ class Led(LightSpectrum):
             raise invalid("no peak has a height", "give one more than 0", "peaks")
         for wavelength, _, _ in self.peaks:
             if not VISIBLE[0] <= wavelength <= VISIBLE[1]:
-                raise invalid(f"{wavelength:g} nm is not visible", f"{VISIBLE[0]:g} to {VISIBLE[1]:g} nm", "peaks")
+                raise invalid(f"{wavelength:g} nm is not visible", f"give {VISIBLE[0]:g} to {VISIBLE[1]:g} nm", "peaks")
         return self
 
 
 class MeasuredLight(LightSpectrum):
-    """A lamp's measured spectrum: relative radiance by wavelength, interpolated linearly; 0 outside the range."""
+    """The measured spectrum of a lamp. It is interpolated linearly, and is 0 outside the range of the wavelengths."""
 
     type: Literal["spectrum"]
     wavelengths: list[Positive] = Field(min_length=2)
     """Wavelengths in nm, ascending."""
     values: list[NonNegative] = Field(min_length=2)
+    """Relative radiance at each of the wavelengths."""
 
     @model_validator(mode="after")
     def _curve(self) -> MeasuredLight:
@@ -261,7 +268,7 @@ class MeasuredLight(LightSpectrum):
         if any(b <= a for a, b in pairwise(self.wavelengths)):
             raise invalid("the wavelengths do not ascend", "sort them", "wavelengths")
         if self.wavelengths[0] >= VISIBLE[1] or self.wavelengths[-1] <= VISIBLE[0] or not any(self.values):
-            raise invalid("nothing of it is visible", "in nanometres, 380 to 780", "wavelengths")
+            raise invalid("no part of it is visible", "give nanometers, 380 to 780", "wavelengths")
         return self
 
 

@@ -18,9 +18,9 @@ the horizon is cut off. The tables are read over the roughness and sqrt(1 - cos 
 
 
 def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> Bundle:
-    """The function `area_light` with the tables of `energy.tables.ltc`.
+    """The function `area_light` as shader code, with the tables of `energy.tables.ltc`.
 
-    It takes `roughness` if the tables have this axis, and `f0` if they serve any Schlick reflectance.
+    The function takes `roughness` if the tables have this axis, and `f0` if they serve any Schlick reflectance.
     """
     inverse, norm = (Table(name, baked.arrays[name]) for name in ("ltc_inverse", "ltc_norm"))
     anisotropic, colored = inverse.channels == 8, norm.channels == 3

@@ -44,7 +44,8 @@ class Bundle:
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write the shader, manifest.json and one file per table, as `Placement.tables` says; returns their paths."""
+        """Write the shader, manifest.json and one file per table, in the format `Placement.tables`. Returns their
+        paths."""
         folder = files.check_folder(folder, parents=True)
         contents = {
             self.manifest["shader"]: self.text.encode(),
@@ -69,8 +70,8 @@ def bundle(
 ) -> Bundle:
     """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
 
-    arrays     whether numbered derived constants are arrays; not in the viewer, which passes them to pixels one by one
     on         paths of weights that stay fields of a lean shader although they are switched off
+    arrays     whether numbered derived constants are written as arrays; the viewer passes them to pixels one by one
     placement  prefix of the names, group and first number of the bindings, file format of the tables
     own        fields of `OwnValues`
     """
@@ -99,10 +100,10 @@ def _file(
 ) -> Bundle:
     """A standalone file, which contains its tables."""
     if place.prefix or place.first_binding or place.tables or place.half:
-        what = f"a prefix, a binding or a form of tables given, and {language.name} is a file of its own"
+        what = f"a prefix, a binding or a form of tables given, but a {language.name} file stands alone"
         raise InputError(what, "emit: lang", "import it under a name")
     if len(models) != 1:
-        what = f"{len(models)} materials given, and a file in {language.name} holds one"
+        what = f"{len(models)} materials given, but a {language.name} file holds one"
         raise InputError(what, "emit: lang", "write a file for each")
     made, numbers = _recorded(models[0], functions, own, (), single=False)
     names = Names(made, language)

@@ -15,7 +15,10 @@ from .placement import Placement
 
 
 def fitted(model: BSDF, order: str, lang: str, placement: Placement | None = None) -> tuple[Bundle, list[str]]:
-    """The curves of a material as code, and one line per curve with its errors."""
+    """The albedo curves of a material as code, and one line per curve with its errors.
+
+    order  order of the rational fits, "N" or "N/M"
+    """
     fits.degrees(order)  # raises before anything is computed
     curves = fits.fit(fits.sample(model), order)
     return curves_bundle(curves, repr(model), order, lang, placement), errors(curves)
@@ -52,7 +55,7 @@ def _types(curve: Curve) -> dict[str, str | None]:
 
 
 def written(curve: Curve) -> Callable:
-    """A curve as a function in the vocabulary, of a roughness and a cosine or of only one of them."""
+    """A curve as a function written in the vocabulary (`gonio.ops`), of a roughness and a cosine or of one of them."""
 
     def part(fitted: Rational, roughness: Scalar, cos_theta: Scalar) -> Scalar:
         return fitted(*fits.variables(fitted.forms, roughness, cos_theta))

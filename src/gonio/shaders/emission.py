@@ -37,12 +37,12 @@ class Choice:
         if count != 1 or (self.fit and (self.ibl or self.budget)):
             what = f"{count} materials given" if count != 1 else "--fit with --ibl or --budget"
             raise InputError(
-                what, "emit", "one material with one of --fit, --ibl and --budget; --ibl takes --budget as well"
+                what, "emit", "give one material and one of --fit, --ibl and --budget; --ibl also takes --budget"
             )
         if self.own != OwnValues() and (self.fit or self.ibl):
             given = "--lean" if self.own.lean else "--constants" if self.own.constants else "--fold"
-            what = f"{given} with {'--fit' if self.fit else '--ibl'}"
-            raise InputError(what, "emit", "it goes with whole materials")
+            what = f"{given} given with {'--fit' if self.fit else '--ibl'}"
+            raise InputError(what, "emit", "it applies only to whole materials")
 
 
 class EmitKeywords(OwnKeywords, PlacementKeywords, total=False):
@@ -69,8 +69,8 @@ def emit(
                    them, in which common functions are declared once
     lang           name of a language, such as "glsl"; `gonio.shaders.languages()` lists all of them
     functions      a choice of "eval", "pdf", "sample", "terms" (D, G, F, ..., if the model has them)
-    lean           omit what the material's own values switch off, such as a coat of weight 0; such a weight is then not
-                   a field. An eighth of the text of a default `openpbr` remains
+    lean           omit code that the material's own values switch off, such as a coat of weight 0; such a weight is
+                   then not a field. An eighth of the text of a default `openpbr` remains
     constants      also write the material's own values, as a constant of its struct: Conductor_values
     fold           write the material's own values into the code: expressions of them alone become numbers, and the
                    functions keep the struct as an argument but do not read it
@@ -78,10 +78,11 @@ def emit(
     group          binding group of the tables: WGSL's @group, HLSL's register space
     first_binding  binding number of the first table
     tables         format of the table files that the text names: "raw", "exr" or "ktx2"; see `Placement`
-    half           tables of 16 bits per number; the text states the measured error, also that of 16-bit parameters
+    half           write tables with 16 bits per number; the text states the measured error of 16-bit tables and
+                   parameters
     fit            write the albedos instead, as rational fits of this order, "N" or "N/M"; "N/0" are polynomials
     ibl            write the split sum of image-based lighting instead
-    budget         use the most accurate terms, table or fit within this number of operations; 0 is no limit
+    budget         use the most accurate terms, table or fit within this number of operations; 0: no limit
     Numeric parameters become the fields of a struct; choices shape the code. Spectra are RGB, and values are those of
     "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
     Raises InputError for a stochastic material (RandomWalk), which has no shader code, and where `fit`, `ibl` and
@@ -96,7 +97,7 @@ def emit(
 def shader(
     models: MaterialLike | Sequence[MaterialLike], lang: str, choice: Choice, placement: Placement
 ) -> tuple[Bundle, list[str]]:
-    """The shader, and lines that state the measured errors of an approximation."""
+    """The shader, and lines that state the measured errors of an approximation; arguments as in `emit`."""
     lines: list[str] = []
     several = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
     if placement.half and (choice.fit or choice.ibl or Language.family.get(str(lang)).standalone):

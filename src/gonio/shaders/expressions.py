@@ -190,7 +190,7 @@ class ExpressionWriter(ParameterWriter):
         return self.spread(type_, self.expression(value))
 
     def spread(self, type_: str, text: tuple[str, int]) -> str:
-        """The conversion of a float to a vector."""
+        """The conversion of a float to the vector type `type_`; `text` is its expression and precedence."""
         template = self.language.spreads.get(type_, self.language.spread)
         inside = f"({text[0]})" if "){1}" in template and text[1] != ATOM else text[0]
         return template.format(self.language.type(type_), inside)

@@ -17,7 +17,7 @@ SMALLEST, LARGEST = 1.2e-38, 3.4e38  # range of normal float32 numbers other tha
 def folded(recorded: graph.Graph, values: Mapping[str, Any]) -> dict[graph.Node, Numbers]:
     """The nodes of all functions that have the same value in every call if the parameters have these values.
 
-    values  name of the entry's parameter, "self.alpha" -> a number, or a list of components
+    values  name of the entry's parameter, such as "self.alpha" -> a number, or a list of components
     """
     known: dict[graph.Node, Any] = {}
     agreed: dict[graph.Function, list[Any]] = {}  # by callee, its arguments that are the same in all calls so far

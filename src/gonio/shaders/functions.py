@@ -55,8 +55,8 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
     functions  pairs of a function marked `@function` and the types of its arguments: name -> "float", "vec3", ...; or
                None for an argument that is None and shapes the code
     title      the comment at the beginning of the text
-    Raises InputError for a language of Python files.
-    The manifest has the keys lang, shader, functions, operations and textures of a material's.
+    The manifest has the keys lang, shader, functions, operations and textures of a material's manifest.
+    Raises InputError for a language that writes Python files.
     """
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)

@@ -87,7 +87,7 @@ def _errors(reference: Mapping[str, Array], changed: Mapping[str, Array]) -> Err
 
 
 def described(manifest: Mapping[str, Json]) -> str:
-    """A sentence on the errors, for the header."""
+    """A sentence that states the errors, for the shader's header."""
     half = manifest["half"]
 
     def listed(of: Errors) -> str:

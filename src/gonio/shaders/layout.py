@@ -14,7 +14,8 @@ def comment(doc: str) -> list[str]:
 def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
     """A statement in lines of at most `COLUMNS` characters, broken at the loosest operators.
 
-    hang  additional indentation of all lines but the first
+    indent  indentation of the first line
+    hang    additional indentation of all other lines
     """
     text = indent + line
     cut = _break(text) if len(text) > COLUMNS else None

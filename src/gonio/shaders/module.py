@@ -38,6 +38,8 @@ class Module:
         """Add a material's shader; returns its manifest.
 
         A name that is already declared differently, or that depends on such a name, is replaced by NAME_2.
+
+        numbers  values of the numeric parameters, by path
         """
         names = Names(made, self.language, self.placement)
         bindings = self._numbered(made, names)

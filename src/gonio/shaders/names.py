@@ -58,7 +58,8 @@ class Names:
         return self.public(self.language.word(name))
 
     def table(self, table: Table, start: str = "") -> str:
-        """The public name of a table; with the start "table_", "lookup_" or "fetch_", of its texture or functions."""
+        """The public name of a table, or with a `start` of "table_", "lookup_" or "fetch_" that of its texture or
+        function."""
         stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
         return f"{self.placement.prefix}{start}{stem}"
 

@@ -1,4 +1,4 @@
-"""The use that a shader makes of the values of the material from which it is written."""
+"""Options for the use of a material's own values in its shader."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class OwnKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class OwnValues:
-    """The use of a material's own values.
+    """Options for the use of a material's own values in its shader.
 
-    lean       omit what they switch off, such as a coat of weight 0
-    constants  also write them, as a constant of the struct
+    lean       omit code that they switch off, such as a coat of weight 0
+    constants  also write them, as a constant of the material's struct
     fold       write them into the code, where expressions of them alone become numbers
     """
 

@@ -50,12 +50,12 @@ class Placement:
             if isinstance(number, bool) or not isinstance(number, int) or number < 0:
                 raise InputError(f"{number!r} given, a whole number >= 0 expected", f"{LOCATION}: {name}")
         if self.group and not language.groups:
-            what = f"group {self.group} given, and {language.title or language.name} has no groups of bindings"
+            what = f"group {self.group} given, but {language.title or language.name} has no groups of bindings"
             raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl, slang or glsl-vulkan")
         if self.tables and self.tables not in CHOICES:
             raise InputError(f"unknown form '{self.tables}'", f"{LOCATION}: tables", did_you_mean(self.tables, CHOICES))
         if self.tables and language.tables not in CHOICES:
-            what = f"{self.tables} given, and {language.title or language.name} reads tables in a form of its own"
+            what = f"{self.tables} given, but {language.title or language.name} reads tables in its own form"
             raise InputError(what, f"{LOCATION}: tables", "leave it out")
 
     def form(self, language: Language) -> str:

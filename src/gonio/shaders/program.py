@@ -155,7 +155,7 @@ class Program(Routines):
     structs   of parameters, derived values and results, in order of use
     without   paths of parameters that are off and shape the code
     single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
-    values    of the parameters, by path, where they are folded into the code; `folds` says so
+    values    values of the parameters, by path, if these are folded into the code; None if they are not
     """
 
     bound: BSDF
@@ -318,9 +318,11 @@ def listed(doc: str) -> Iterator[tuple[str, str]]:
 
 
 def check(model: object, functions: str | Sequence[str], location: str) -> tuple[str, ...]:
-    """The requested functions that the model has, without repetition; InputError if no shader code can be written.
+    """Return those of the requested functions that the model has, without repetition.
 
     functions  names in a sequence, or in one string separated by commas
+    location   the place that errors name
+    Raises InputError for an unknown function, and for a model that cannot be written as shader code.
     """
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", location)
@@ -354,7 +356,7 @@ def stochastic(model: BSDF) -> BSDF | None:
 
 
 def written_from(model: object) -> str:
-    """A description of the source of a text: the class's Python source, or the shader that was read."""
+    """A description of the source of a material's code: the class's Python source, or the shader that was read."""
     shader = getattr(type(model), "program", None)
     return f"the shader {shader.where}" if shader else "its Python source"
 

@@ -24,7 +24,7 @@ from .values import Record
 
 
 def python_file(made: Program, names: Names, numbers: Mapping[str, Json]) -> str:
-    """The text of the file.
+    """The text of the Python file.
 
     numbers  values of the numeric parameters, by path; angles as (cos, sin)
     """

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 
 class Difference(NamedTuple):
-    """The largest difference of a function: relative to the larger value, with its row and the two values there."""
+    """The largest difference of a function, relative to the larger of the two values, with its row and these values."""
 
     function: str
     figure: float
@@ -49,10 +49,10 @@ class Difference(NamedTuple):
 class Original:
     """The values of a material's recording, with which the values of its texts are compared.
 
-    made    one of the texts, which may be in any language that is read
+    made    a shader of the material, in any language that can be read back
     wo, wi  directions, (N, 3)
     u       random numbers, (N, 3)
-    seed    of the parameter values of half of the rows, see `parameters`
+    seed    seed of the random parameter values of half of the rows, see `parameters`
     """
 
     def __init__(self, material: BSDF, made: Bundle, wo: Array, wi: Array, u: Array, seed: int = 0) -> None:
@@ -74,11 +74,13 @@ class Original:
 
 
 def parameters(manifest: Mapping[str, Json], count: int, seed: int) -> dict[str, Array]:
-    """A value of each field of the struct per row, by path: (N,) or (components, N), in 32 bits.
+    """Values of each field of the struct, by path: `count` rows, (N,) or (components, N), in 32 bits.
 
     Even rows have the material's values, odd rows random ones: a fifth at the ends of the range, half close to its
     lower end, where code has other branches. An open range extends to twice or half the value. Parameters on which
     tables depend keep their values.
+
+    seed  seed of the random values
     """
     random = np.random.default_rng([seed, 3])
     kinds = {one["path"]: one for one in manifest["parameters"]}
@@ -212,7 +214,11 @@ def recorded(material: BSDF, names: Sequence[str], bits: int = 32, without: Sequ
 def values_of(
     made: graph.Graph, names: Sequence[str], given: Mapping[str, Array], fields: Mapping[str, Array]
 ) -> dict[str, list[Array]]:
-    """The values of a recording's functions, component by component."""
+    """The values of a recording's functions, component by component.
+
+    given   values of the arguments, by name
+    fields  values of the parameters, by path
+    """
     values = {f"self_{path.replace('.', '_')}": column for path, column in fields.items()}
     result = made.evaluate(**values, **given)
     return {name: _numbers(one) for name, one in zip(names, result, strict=True)}

@@ -1,4 +1,4 @@
-"""Information in the Python source beyond the recording: the names of constants and of small helpers."""
+"""Names that are in the Python source but not in the recording: those of constants and of small helpers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from pathlib import Path
 
 @functools.cache
 def module_constant(number: float, source: str) -> tuple[str, str]:
-    """(name, comment) of a module's constant, if the line of the source uses it; else ("", "")."""
+    """(name, comment) of the module's constant with this value, if the line uses it; else ("", "").
+
+    source  the line, "file:line"
+    """
     path, _, line = source.rpartition(":")
     text = linecache.getline(path, int(line or 0))
     words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}

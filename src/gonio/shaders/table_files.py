@@ -17,8 +17,9 @@ Texels = NDArray[np.floating]  # x varies fastest, channels last
 class TableFormat(NamedTuple):
     """The format of a table's file.
 
-    suffix  of the file's name
-    write   contents of the file of (rows, columns, channels) or (layers, rows, columns, channels) float32 or float16
+    suffix  suffix of the file's name
+    write   returns the contents of the file for an array (rows, columns, channels) or (layers, rows, columns,
+            channels) of float32 or float16
     """
 
     suffix: str

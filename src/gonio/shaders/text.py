@@ -86,7 +86,10 @@ def _raw(names: Names, name: str) -> str:
 
 
 def joined(head: Sequence[str], declared: Sequence[Block], language: Language, prefix: str = "") -> str:
-    """The text of a shader: constants on consecutive lines, other declarations separated by empty lines."""
+    """The text of a shader: constants on consecutive lines, other declarations separated by empty lines.
+
+    head  lines at the beginning
+    """
     constants = [line for block in declared if block.kind == "constant" for line in block.lines]
     parts = [constants, *(block.lines for block in declared if block.kind != "constant")]
     lines = "\n\n".join("\n".join(part) for part in parts if part).split("\n")
@@ -114,7 +117,7 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
 
 
 def values(made: Program, names: Names, numbers: Mapping[str, Any]) -> Block:
-    """The material's own values as a constant of its struct."""
+    """The material's own values as a constant of its struct; `numbers` holds them by path."""
     struct = made.struct_of(made.bound)
     assert struct is not None
     language = names.language

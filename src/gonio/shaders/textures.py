@@ -33,11 +33,12 @@ def groups(table: Table) -> int:
 def pixels(table: Table, bits: int = 32) -> np.ndarray:
     """The texture's contents in the order of upload, x fastest, channels last; float32, or float16 for 16 bits.
 
+    bits  32, or 16 for half precision
     Raises InputError for numbers that overflow.
     """
     number = np.dtype(f"f{bits // 8}")
     if np.abs(table.values).max(initial=0.0) > np.finfo(number).max:
-        what = f"table {table.name} holds {np.abs(table.values).max():g}, more than {bits} bits"
+        what = f"table {table.name} holds {np.abs(table.values).max():g}, which {bits} bits cannot hold"
         raise InputError(what, "emit: half", "write it in 32 bits")
     padded = np.zeros((*table.shape, groups(table) * width(table)))
     padded[..., : table.channels] = table.values

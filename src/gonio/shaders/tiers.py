@@ -33,9 +33,10 @@ LOCATION = "emit: budget"
 class Tier(NamedTuple):
     """A form of a material.
 
-    name   what it is, such as "fresnel = schlick"
+    name   description, such as "fresnel = schlick"
     cost   operations of one call
-    error  the largest error, and `mean` the mean one
+    error  largest error
+    mean   mean error
     """
 
     name: str
@@ -50,9 +51,11 @@ class Tier(NamedTuple):
 def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
     """(the form of a material whose `eval` is most accurate within a number of operations, all forms that were tried).
 
-    The forms differ in the choices of `TERMS`. Errors are those of `eval` for 4096 random pairs, relative to the
-    largest channel of each pair, or to 1e-3 of the mean if that is larger. The chosen form comes first.
-    Raises InputError if none is within the budget.
+    The forms differ in the choices of `TERMS`. Errors are those of `eval` for 4096 random pairs of directions, relative
+    to the largest channel of each pair, or to 1e-3 of the mean if that is larger. The chosen form comes first.
+
+    budget  number of operations
+    Raises InputError if no form is within the budget.
     """
     wo, wi = _pairs(bool(model.transmits))
     reference = np.asarray(model.eval(wo, wi), float)
@@ -68,7 +71,7 @@ def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
     within = [pair for pair in tiers if pair[0].cost <= budget]
     if not within:
         least = min(tier.cost for tier, _ in tiers)
-        what = f"{budget} operations given, and the cheapest form of {type(model).__name__} takes {least}"
+        what = f"{budget} operations given, but the cheapest form of {type(model).__name__} takes {least}"
         raise InputError(what, LOCATION, f"give {least} or more")
     best = min(within, key=lambda pair: (pair[0].mean, pair[0].cost))
     return best[1], [best[0], *(tier for tier, _ in tiers if tier is not best[0])]
@@ -111,7 +114,7 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
 
     budget  operations of `dfg`: the most accurate of a table and several fits within this number is written; 0 for the
             table. A lookup counts as its four texels and their interpolation
-    Raises InputError for a material without a microsurface, or with two widths.
+    Raises InputError for a material without a microsurface, and for an anisotropic one.
     """
     surface = model.microsurface
     if surface is None or not model.isotropic:
@@ -121,7 +124,7 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
     within = [(tier, code) for tier, code in tiers if not budget or tier.cost <= budget]
     if not within:
         least = min(tier.cost for tier, _ in tiers)
-        raise InputError(f"{budget} operations given, and the cheapest form takes {least}", LOCATION)
+        raise InputError(f"{budget} operations given, but the cheapest form takes {least}", LOCATION)
     best, dfg = min(within, key=lambda pair: (pair[0].error, pair[0].cost))
 
     @function

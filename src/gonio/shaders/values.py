@@ -27,9 +27,10 @@ class Value:
     op      as in a recording, or "constant", "parameter", "swizzle", "texel" (up to four channels of a table)
     type    "float", "bool", "vec2", "vec3", "vec4", "bvec3", or the result of a call: a `Record`
     args    Values
-    static  the constant, the parameter's path, the callee, the component or the letters of several, (table, group of
-            channels)
-    name    name of the Python variable, if known; `source` is the line that wrote it
+    static  data of the operation: the constant, the parameter's path, the callee, the component or the letters of
+            several components, or (table, group of channels)
+    name    name of the Python variable, if known
+    source  the line that wrote the value, "file:line"
     """
 
     __slots__ = ("args", "name", "op", "order", "source", "static", "type")
@@ -138,18 +139,18 @@ def needed(value: Value) -> list[Value]:
 
 
 def stem_of(routine: Routine) -> str:
-    """A routine's name without the number that distinguishes copies."""
+    """A routine's name without the number that distinguishes copies of one function."""
     stem, _, count = routine.name.rpartition("_")
     return stem if stem and count.isdigit() else routine.name
 
 
 def shape(type_: str) -> str:
-    """A recording's type in a shader, where a spectrum has three channels."""
+    """The shader's type for a type of a recording; a spectrum has three channels."""
     return "vec3" if type_ == "spectrum" else type_
 
 
 def check_single(number: float, location: str) -> None:
-    """Raise GonioError if a constant of the source cannot be represented in float32."""
+    """Raise GonioError, which names `location`, if a constant of the source cannot be represented in float32."""
     size = abs(number)
     if math.isnan(number) or size > 3.4028234e38 or 0.0 < size < 1.17549435e-38:
         raise GonioError(f"the constant {number!r} is not a float32", location, "shader code computes in 32 bits")

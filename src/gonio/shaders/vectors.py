@@ -25,6 +25,7 @@ def vectors(
     model      anything that `go.material` takes
     count      number of pairs, at most a million
     functions  a choice of "eval", "pdf", "sample"; other names, such as "terms", are ignored
+    seed       seed of the directions and random numbers
     Returns {"model", "seed", "fields": values of the struct by path, "wo", "wi", "u": (count, 3), "eval": (count, 3),
     "pdf": (count,), "sample": {"wi", "weight", "pdf", "delta"}}. Directions and random numbers are float32 numbers, so
     that a shader receives exactly these; the results are computed from them in float64. A tenth of the pairs are within
@@ -57,7 +58,10 @@ def vectors(
 
 
 def pairs(rng: np.random.Generator, count: int, below: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Unit directions, rounded to float32; on the upper side unless light is transmitted."""
+    """`count` pairs of unit directions, rounded to float32.
+
+    below  whether directions may be below the surface, for a material that transmits light
+    """
     wo, wi = _unit(rng.normal(size=(2, count, 3)))
     grazes, mirrored = np.arange(count) % 10 == 1, np.arange(count) % 10 == 2
     wo[grazes, 2] *= 0.02

@@ -32,7 +32,7 @@ def on_small_lights(data: SceneData) -> str:
             )
         if small:
             return (
-                "small lamps with mirrors or smooth glass: path hardly finds the light that they cast, "
-                "--integrator caustics does"
+                "small lamps with mirrors or smooth glass: path rarely finds the light that they cast; "
+                "use --integrator caustics"
             )
     return ""

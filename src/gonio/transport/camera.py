@@ -23,8 +23,9 @@ class Camera:
         self.inverse_size = (dr.opaque(mi.Float, 1 / size[0]), dr.opaque(mi.Float, 1 / size[1]))
 
     def ray(self, pixel: UInt, key: UInt, index: UInt, wavelength: Float | None = None) -> tuple[Ray, Radiance]:
-        """A ray through a point in the pixel, and its weight.
+        """A ray through a random point of the pixel, and its weight.
 
+        key, index  key of the pixel and index of the sample, see `sampler`
         wavelength  a number in [0, 1) that selects the wavelengths; None: a separate one for every sample
         """
         mi = self.mi

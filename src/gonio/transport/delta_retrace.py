@@ -2,10 +2,10 @@
 
 Particles do not cover lamps that the camera sees directly through mirrors and glass, and only one path in a thousand
 hits a lamp behind two reflections within a glass ball. The path of such a sample is therefore traced again from the
-camera, with reflection and refraction equally likely, until it hits a lamp or ends. Both traces are weighted by their
-probability of taking that chain (power heuristic).
+camera, with reflection and refraction equally likely, until it hits a lamp or ends. Each of the two traces is weighted
+by its probability of sampling that chain of reflections and refractions (power heuristic).
 
-All choices of a retrace are binary digits of one random number, so the chains of several retraces are stratified too.
+The binary digits of one random number make all choices of a retrace, so the chains of several retraces are stratified.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Retrace:
         return dr.select(self.retracing, by_retrace, 1 - by_retrace)
 
     def lobe(self, u: Float) -> Float:
-        """The random number that selects a lobe: `u`, except in a retrace."""
+        """The random number that selects a lobe: `u`, or in a retrace one that follows the next digit of `number`."""
         return dr.select(self.retracing, dr.select(self.number < 0.5, END, 1 - END), u)
 
     def after(self, bs: BSDFSample, delta: Mask, two_ways: Mask, here: Mask) -> tuple[Retrace, Float, Mask]:

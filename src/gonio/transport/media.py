@@ -53,7 +53,7 @@ class Media:
         if not self.known:
             return
         if len(result) > MAX_MEDIA:
-            what = f"{len(result)} transparent materials, {MAX_MEDIA} at most if one absorbs or has a priority"
+            what = f"{len(result)} transparent materials, at most {MAX_MEDIA} expected if one absorbs or has a priority"
             raise InputError(what, "absorption, priority", "give shapes the same material")
         order = sorted(range(len(result)), key=lambda i: (float(np.max(np.asarray(plain[i][1].priority))), -i))
         self.bsdfs = [result[i] for i in order]

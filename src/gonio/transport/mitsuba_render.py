@@ -53,7 +53,7 @@ class MitsubaRender:
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * samples
         if self._sum is not None and self._sum.shape != weighted.shape:
-            what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
+            what = f"the picture has {weighted.shape[2]} channels, but the checkpoint has {self._sum.shape[2]}"
             raise InputError(what, "checkpoint", "render again without it")
         self._sum = weighted if self._sum is None else self._sum + weighted  # a new array: `state` returns the old one
         self._passes += 1

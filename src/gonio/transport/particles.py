@@ -1,4 +1,4 @@
-"""Tracing of particles from the lamps: the steps that `light` and `caustics` share.
+"""Trace particles from the lamps: the steps that `light` and `caustics` share.
 
     leave -> [ intersect -> sample_bsdf, eval_bsdf -> follow ]
 
@@ -62,7 +62,7 @@ class Particles:
     """The particles of a picture. They form one sequence: particle n = (low, high) is the same wherever it is traced.
 
     max_depth  maximum path length in segments, as kernel data
-    targets    what particles are aimed at; None: they leave in all directions
+    targets    the spheres at which particles are aimed; None: they leave in all directions
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, targets: Targets | None = None) -> None:

@@ -72,8 +72,12 @@ def run(
     At least one pass is made if samples are missing, so that there is always a picture. Interrupts and the time limit
     are checked between passes; near the time limit the passes shrink to fit.
 
-    spp    a number, or a function that is called after each pass; no pass goes beyond its latest value
-    first  samples per pixel of the first pass, if the rate is known; with 0, the first pass is short
+    spp          a number, or a function that is called after each pass; no pass goes beyond its latest value
+    pixels       number of pixels of the picture
+    timeout      time limit, in the unit of `clock` (s); None: none
+    first        samples per pixel of the first pass, if the rate is known; with 0, the first pass is short
+    report       called with the progress after each pass
+    interrupted  called after each pass; a true result ends the render
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # passes of a Mitsuba scene have a fixed size
@@ -123,7 +127,7 @@ def power_of_two(x: float) -> int:
 
 class Interrupts:
     """While entered, the first signal that would end the process sets `asked` to its number, and a later Ctrl-C ends
-    the process at once. SIGTERM and SIGHUP may arrive together, as systemd sends them: neither ends it as a second one.
+    the process at once. A later SIGTERM or SIGHUP does not, since systemd sends the two together.
 
     A Python signal handler runs only between two instructions of Python, and a pass is one long call. Therefore a
     separate thread reads the signal from the wake-up socket while the pass runs.

@@ -83,8 +83,9 @@ class Search:
     transmit light; on surfaces that face the other way, as parts of one mesh may, only those that arrived on the side
     of `back`.
 
-    back  direction toward the viewer
-    u     a random number in [0, 1), see `PhotonMap.gather`
+    place, normal  the point, and the normal of its surface
+    back           direction toward the viewer
+    u              a random number in [0, 1), see `PhotonMap.gather`
     """
 
     place: Point
@@ -93,7 +94,7 @@ class Search:
     u: Float
 
     def accepts(self, photon: Photon, radius: Float) -> Mask:
-        """Whether a particle is within the radius, close to the plane of the place, and on a matching side."""
+        """Whether a particle is within the radius, close to the tangent plane of the place, and on a matching side."""
         offset = photon.position - self.place
         distance2, height = dr.squared_norm(offset), dr.dot(offset, self.normal)
         near = (distance2 < dr.square(radius)) & (abs(height) < LEVEL * radius)

@@ -63,9 +63,9 @@ class PolarizedRender(MitsubaRender):
 
 
 def check(settings: Settings, location: str) -> None:
-    """Raise InputError for a picture that cannot be combined with a polarizer."""
+    """Raise InputError, which names `location`, for a picture that cannot be combined with a polarizer."""
     if settings.integrator not in TRACED:
-        what = f"a polarizer with the integrator '{settings.integrator}', which does not trace polarized light"
+        what = f"the scene has a polarizer, but '{settings.integrator}' does not trace polarized light"
         raise InputError(what, location, "use " + " or ".join(TRACED))
     if settings.ambient is not None and any(settings.ambient):
         raise InputError("a polarizer with ambient light, which has no polarization", location, "remove one of them")

@@ -51,7 +51,7 @@ class SceneData:
 
     sampler_name      a name of `sampler.SAMPLERS`, or "default"
     ambient_color     scene-wide ambient radiance; None or 0 for none
-    mis_compensation  whether BSDFs are sampled too, and then cover the uniform part of an environment map
+    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of an environment map
     """
 
     def __init__(

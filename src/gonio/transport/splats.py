@@ -65,7 +65,7 @@ class SplatCamera:
 
     @staticmethod
     def check(data: SceneData, location: str) -> None:
-        """Raise InputError if particles cannot make the requested picture."""
+        """Raise InputError, which names `location`, if particles cannot make the requested picture."""
         sensor = data.sensor
         if data.aovs:
             hint = "leave out --denoise, or use path"
@@ -73,10 +73,10 @@ class SplatCamera:
         if data.ambient is not None:
             raise InputError("ambient light is not emitted by a lamp", location, "leave ambient out, or use path")
         if sensor.class_name() not in CAMERAS:
-            what = f"a camera of type {sensor.class_name()}, to which particles cannot be connected"
+            what = f"particles cannot be connected to a camera of type {sensor.class_name()}"
             raise InputError(what, location, "use a perspective camera, or path")
         if any(value[0] for name, value in data.mi.traverse(sensor) if name.startswith("principal_point_offset")):
-            what = "a camera with a principal point offset, which Mitsuba does not support for particles"
+            what = "the camera has a principal point offset, which Mitsuba does not support for particles"
             raise InputError(what, location, "leave it out, or use path")
 
     def _brightest(self) -> float:

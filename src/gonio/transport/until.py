@@ -1,4 +1,4 @@
-"""Rendering until the error is small enough.
+"""Render until the error is small enough.
 
 The samples form two halves, each a picture from a separate random sequence. Their difference is noise only, however
 even the points within each half are: a quarter of their squared difference estimates the variance of their mean without
@@ -133,7 +133,9 @@ class _Wide:
 class Until:
     """A render that ends once its relMSE is estimated to be at most `error`; `passes.run` advances it to its `goal`.
 
-    most  maximum number of samples per pixel
+    error  the relMSE to reach
+    most   maximum number of samples per pixel
+    aovs   whether to average albedo and normal of the first hit too, for the denoiser
     """
 
     def __init__(self, scene: Scene, settings: Settings, error: float, most: int, aovs: bool = False) -> None:

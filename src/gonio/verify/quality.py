@@ -50,7 +50,7 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """ "sampling: 2.1 % of samples lost, variance 0.04, 31 x cosine sampling, 96 % of the ideal"."""
+        """ "sampling: 2.1 % of samples lost, variance 0.04, 31 x as efficient as cosine sampling, 96 % of the ideal"."""
         return "sampling: " + ", ".join(text for text in self.texts if text)
 
     @property
@@ -59,7 +59,7 @@ class Quality:
         return (
             f"{100.0 * self.failed:.2g} % of samples lost",
             f"variance {_short(self.variance)}",
-            "" if self.cosine is None else f"{_short(self.cosine)} x cosine sampling",
+            "" if self.cosine is None else f"{_short(self.cosine)} x as efficient as cosine sampling",
             f"{100.0 * self.ideal:.3g} % of the ideal",
         )
 

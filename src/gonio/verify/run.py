@@ -230,12 +230,12 @@ def _preliminary(all_: list[Asked], declared: bool) -> str:
     verdicts = [asked.what for asked in all_ if isinstance(asked.what, Verdict)]
     findings = [asked.what for asked in all_ if isinstance(asked.what, Finding)]
     if any(one.failed for one in verdicts) or any(one.problems or not one.figure <= one.tolerance for one in findings):
-        return "does not hold, which is declared" if declared else "does not hold"
+        return "does not hold, as declared" if declared else "does not hold"
     if not findings:
         return "does not apply" if all(one.status == NOT_APPLICABLE for one in verdicts) else "not tried"
     tests = sum(len(one.trials) for one in findings)
     places = f"{len(findings)} {'setting' if len(findings) == 1 else 'settings'}"
-    return f"{tests} tests at {places} to be decided" if tests else f"holds at {places}"
+    return f"{tests} tests at {places} still undecided" if tests else f"holds at {places}"
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:

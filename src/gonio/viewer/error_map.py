@@ -115,7 +115,7 @@ def _is_material(given: object) -> bool:
 
 def _picture(given: object, name: str, encoding: str) -> images.Picture:
     if _is_material(given):
-        raise InputError("a picture and a material", "compare", "compare two materials or two pictures")
+        raise InputError("a picture and a material given", "compare", "compare two materials or two pictures")
     if isinstance(given, str | Path):
         return images.read(given, encoding)
     try:

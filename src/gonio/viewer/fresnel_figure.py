@@ -46,7 +46,7 @@ def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> 
 
     if metal is not None:
         if eta is not None or k:
-            raise InputError("an index and a metal are given", "--metal", "keep one")
+            raise InputError("both an index and a metal are given", "--metal", "keep one")
         lines, title = _of_metal(metal)
     else:
         eta = 1.5 if eta is None else eta

@@ -77,11 +77,11 @@ class Cluster:
         wait: float = JOIN_TIMEOUT,
     ) -> None:
         if (address is None) == (workers is None):
-            raise InputError("a cluster is an address or a number of workers", "cluster", "give one of the two")
+            raise InputError("an address or a number of workers expected", "cluster", "give one of the two")
         if workers is not None and workers < 1:
             raise InputError(f"{workers} workers requested", "--workers", "give 1 or more")
         if not wait >= 0.0:
-            raise InputError(f"{wait} seconds to wait for a worker", "wait", "give 0 or more")
+            raise InputError(f"a wait of {wait} seconds for a worker", "wait", "give 0 or more")
         if address is not None:
             reachable.check(address)
         if importlib.util.find_spec("distributed") is None:
@@ -376,7 +376,7 @@ class _Job:
             raise error
         self.losses[index] = self.losses.get(index, 0) + 1
         if self.losses[index] > MAX_LOSSES:
-            raise MachineError(f"{MAX_LOSSES + 1} workers were lost over one part", "cluster", "see what they print")
+            raise MachineError(f"{MAX_LOSSES + 1} workers were lost on one part", "cluster", "see what they print")
         self._submit(index)
 
     def cancel(self) -> None:

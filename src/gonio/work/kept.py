@@ -131,10 +131,10 @@ def _read(path: Path) -> Kept:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", str(path), "check the name") from None
-    damaged = InputError("this file is damaged or was cut short", str(path), "remove it, and begin anew")
+    damaged = InputError("this file is damaged or was cut short", str(path), "remove it, and start again")
     start = len(_MAGIC) + 8
     if content[: len(_MAGIC)] != _MAGIC:
-        raise InputError("this is no checkpoint of Gonio", str(path), "give a file that --checkpoint has written")
+        raise InputError("this is not a checkpoint of Gonio", str(path), "give a file that --checkpoint has written")
     if len(content) < start + 4:
         raise damaged
     (length,) = struct.unpack("<Q", content[len(_MAGIC) : start])

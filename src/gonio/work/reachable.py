@@ -22,12 +22,12 @@ def check(address: str) -> None:
     hint = "give one such as tcp://10.0.0.7:8786; `dask scheduler` prints its own"
     protocol, separator, _ = address.partition("://")
     if separator and protocol not in PROTOCOLS:
-        raise InputError(f"'{address}' is no address of a scheduler: '{protocol}' is no protocol", "--cluster", hint)
+        raise InputError(f"'{address}' is not a scheduler address: unknown protocol '{protocol}'", "--cluster", hint)
     if separator and protocol not in CHECKED:
         return
     match = ADDRESS.fullmatch(address)
     if match is None or not 0 < int(match["port"]) < 1 << 16:
-        raise InputError(f"'{address}' is no address of a scheduler", "--cluster", hint)
+        raise InputError(f"'{address}' is not a scheduler address", "--cluster", hint)
     greets = protocol == "tcp" or not separator  # other protocols begin with a TLS or HTTP handshake
     reason = _unreachable(match["host"].strip("[]"), int(match["port"]), greets)
     if reason:
@@ -46,7 +46,7 @@ def _unreachable(host: str, port: int, greets: bool) -> str:
             with socket.create_connection((host, port), timeout=CONNECT) as connection:
                 first = connection.recv(8, socket.MSG_WAITALL) if greets else b""
             known = not greets or (len(first) == 8 and struct.unpack("Q", first)[0] < MAX_GREETING)
-            answers.put("" if known else "what answers there is no Dask scheduler")
+            answers.put("" if known else "the program that answers is not a Dask scheduler")
         except (OSError, UnicodeError) as error:
             answers.put(getattr(error, "strerror", None) or str(error))
 

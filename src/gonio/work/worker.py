@@ -68,14 +68,14 @@ def compare(own: Mapping[str, str], other: object, name: str) -> None:
     """Raise MachineError, with the worker's name, if its `about` differs from ours."""
     if not isinstance(other, dict):
         raise MachineError(
-            f"worker {name} has no Gonio that answers: {other}", "cluster", "there: pip install 'gonio[cluster]'"
+            f"Gonio does not answer on worker {name}: {other}", "cluster", "run there: pip install 'gonio[cluster]'"
         )
     for what, value in own.items():
         if other.get(what) != value:
             text = (
-                f"has another {what}" if what == "code of Gonio" else f"has {what} {other.get(what)}, this is {value}"
+                f"has different {what}" if what == "code of Gonio" else f"has {what} {other.get(what)}, this is {value}"
             )
-            raise MachineError(f"worker {name} {text}", "cluster", "its bits would differ: install the same there")
+            raise MachineError(f"worker {name} {text}", "cluster", "its results would differ: install the same there")
 
 
 class File(WorkerPlugin):

@@ -3,8 +3,8 @@
 The properties of a plugin have the names of the model's parameters. Every plugin takes two more: `two_sided` (shades
 both sides, without the nested call of Mitsuba's own `twosided`) and, if the model has presets, `preset`.
 
-In polarized variants a plugin returns Mueller matrices for light that is reflected or refracted by single facets; the
-rest leaves unpolarized.
+In polarized variants a plugin returns Mueller matrices for light that is reflected or refracted by single facets; all
+other light leaves unpolarized.
 """
 
 from __future__ import annotations

@@ -32,7 +32,10 @@ from .variant import DISPERSES, NESTS, SEPARATES, Variant
 
 
 def plugin_class(mi: ModuleType) -> OfVariant:
-    """The plugins' class for the current variant, derived from its BSDF; constructed from properties and a model."""
+    """The class of the plugins for the current variant, derived from Mitsuba's BSDF.
+
+    It is constructed from a plugin's properties and a model.
+    """
     methods = {name: value for name, value in vars(_Methods).items() if name not in ("__dict__", "__weakref__")}
     return new_class("GonioBSDF", (mi.BSDF,), exec_body=lambda names: names.update(methods, variant=Variant(mi)))
 

@@ -20,14 +20,14 @@ from ..types import Emitter, Plugin
 
 
 def light_key(emitter: Emitter) -> tuple[str, list[float]]:
-    """Sort key of lights."""
+    """A sort key for lights that does not change between runs."""
     shape = emitter.get_shape()
     box = [] if shape is None else [float(x) for x in (*shape.bbox().min, *shape.bbox().max)]
     return str(emitter), box
 
 
 def shape_key(shape: Plugin) -> tuple[str, list[float], int, bytes]:
-    """Sort key of shapes."""
+    """A sort key for shapes that does not change between runs."""
     if shape.id():  # a shape of the scene; merged ones have no names
         return shape.id(), [], 0, b""
     box = shape.bbox()

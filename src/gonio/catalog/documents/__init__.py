@@ -1,4 +1,4 @@
-"""Files that describe materials, such as glTF: the interface of a format, and the texts that name a file's material.
+"""Files that describe materials, such as glTF: the interface of a format, and the strings that name a file's material.
 
     chest.gltf                  the file's only material
     chest.gltf:Wood             one of several, by its name, or by its number if it has no unique name
@@ -68,7 +68,7 @@ class Document:
         raise NotImplementedError
 
     def image(self, path: Path, index: str) -> bytes:
-        """The bytes of an image inside a file, which textures name FILE#INDEX."""
+        """The bytes of an image inside a file; textures refer to it as FILE#INDEX."""
         raise InputError(f"no picture '{index}' in this file", str(path))
 
     def write(self, notation: Notation, name: str) -> bytes:
@@ -87,7 +87,7 @@ def types() -> list[str]:
 
 
 def parted(text: str) -> tuple[Document, Path, str] | None:
-    """Format, file and material of FILE or FILE:MATERIAL; None if the text names no such file."""
+    """Format, file and material of FILE or FILE:MATERIAL; None if the string names no such file."""
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
@@ -97,18 +97,21 @@ def parted(text: str) -> tuple[Document, Path, str] | None:
 
 
 def names_document(text: str) -> bool:
-    """Whether a text is FILE or FILE:MATERIAL of such a format."""
+    """Whether a string is FILE or FILE:MATERIAL of such a format."""
     return parted(text) is not None
 
 
 def inside(text: str) -> tuple[str, str]:
-    """File and number of FILE#NUMBER, an image inside a document; the text itself and "" for any other file."""
+    """File and number of FILE#NUMBER, an image inside a document; the string itself and "" for any other file."""
     file, mark, index = text.rpartition("#")
     return (file, index) if mark and names_document(file) else (text, "")
 
 
 def read(document: Document, path: Path, name: str = "") -> Described:
-    """A material of a file; the only one if no name is given. Raises InputError, with the closest known name."""
+    """A material of a file, or its only one if no name is given.
+
+    Raises InputError, with the closest known name, if the file has no material of that name.
+    """
     if not path.is_file():
         raise InputError(f"no file '{path}'", str(path))
     known = document.materials(path) if document.holds(path) else []
@@ -151,7 +154,7 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     """Write a document's material as JSON in Gonio's notation, or as another document. Returns the notices.
 
     source  FILE or FILE:MATERIAL
-    output  .json, or a document's suffix
+    output  the file to write: .json, or the suffix of a document's format
     """
     operand = parted(source)
     if operand is None:
@@ -162,9 +165,9 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
 
 
 def write(notation: Notation, output: Path) -> None:
-    """Write a material as JSON in Gonio's notation, or as a document: .json, or the suffix of a document's format.
+    """Write a material as JSON in Gonio's notation, or as a document, as the suffix of `output` determines.
 
-    Raises InputError for another suffix, and for a material that the format cannot hold.
+    Raises InputError for an unknown suffix, and for a material that the format cannot hold.
     """
     files.check_file(output)
     if output.suffix.lower() == ".json":
@@ -185,7 +188,7 @@ PREFIX = "gonio-"  # of types in scenes, where some names without it are the lab
 
 
 def for_scenes(notation: Mapping[str, object]) -> Notation:
-    """The notation with the types of scenes: "gonio-conductor"."""
+    """The notation with the type names of scene files, such as "gonio-conductor"."""
     return _with_types(notation, lambda name: PREFIX + name if is_model(name) else name)
 
 

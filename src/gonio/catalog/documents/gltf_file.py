@@ -30,10 +30,10 @@ _PARTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 
 
 class GltfFile:
-    """A file, validated on construction.
+    """A glTF file, validated on construction.
 
-    path  its path
-    root  its JSON
+    path  the file's path
+    root  the file's JSON object
     """
 
     def __init__(self, path: Path) -> None:
@@ -55,7 +55,7 @@ class GltfFile:
         raise InputError(what, f"{self._where}#{at}" if at else self._where, hint)
 
     def items(self, key: str) -> list[Json]:
-        """A list of objects at the top level, empty if it is missing."""
+        """The list of objects under a key at the top level, empty if it is missing."""
         if key not in self._lists:
             items = self.root.get(key, [])
             if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
@@ -70,14 +70,14 @@ class GltfFile:
         return [name if name in unique else str(index) for index, name in enumerate(given)]
 
     def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
-        """A member that is an object, empty if it is missing."""
+        """A member that is an object, empty if it is missing; `at` is the location of `of` in the file."""
         member = of.get(key, {})
         if not isinstance(member, dict):
             self.fail("an object expected", f"{at}/{key}")
         return member
 
     def number(self, of: Mapping[str, object], key: str, default: float, at: str, low: float, high: float) -> float:
-        """A member that is a number from low to high."""
+        """A member that is a number from `low` to `high`."""
         number = of.get(key, default)
         if isinstance(number, bool) or not isinstance(number, int | float):
             self.fail("a number expected", f"{at}/{key}")

@@ -17,7 +17,7 @@ _INCLUDE = "{http://www.w3.org/2001/XInclude}include"
 
 
 def read(path: Path) -> ElementTree.Element:
-    """The root of a file, with included files in place of the includes.
+    """The root element of a file, with included files in place of the includes.
 
     Included files must be in the folder of the first. Raises InputError for a file that is not well-formed, declares
     entities (which may grow without bounds), includes itself, or exceeds the limits of size, depth or number of parts.

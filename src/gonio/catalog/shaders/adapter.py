@@ -74,7 +74,8 @@ MAX_TOML = 1 << 18
 class Uniform:
     """A parameter as the adapter describes it; entries that are missing are taken from the shader.
 
-    kind  for a vector of two: "alpha", widths along x and y, or "angle", cosine and sine; "fixed" keeps the default
+    kind  for a vector of two components: "alpha", widths along x and y, or "angle", cosine and sine; "fixed" for a
+          parameter that keeps its default
     """
 
     default: Any = None
@@ -154,7 +155,7 @@ KINDS: dict[str, type] = {
 
 
 def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) -> Adapter:
-    """The adapter of the keys and values of a TOML file.
+    """The adapter given by the keys and values of a TOML file.
 
     where  the file, for errors
     over   an adapter that supplies the entries missing from the content
@@ -216,7 +217,7 @@ def _scalar(text: str) -> object:
 
 
 def as_option(value: object) -> str:
-    """The text of a value, as `with_options` reads it."""
+    """A value as a string that `with_options` accepts."""
     if isinstance(value, bool):
         return str(value).lower()
     return ",".join(map(as_option, value)) if isinstance(value, list | tuple) else str(value)
@@ -283,7 +284,7 @@ def _uniform(name: str, value: object, where: str, over: Uniform) -> Uniform:
 
 
 def check_range(name: str, uniform: Uniform, where: str) -> None:
-    """Raise InputError for a default outside the range, and for an empty range."""
+    """Raise InputError, which names `where`, for a default outside the range, and for an empty range."""
     low = -math.inf if uniform.low is None else uniform.low
     high = math.inf if uniform.high is None else uniform.high
     default = uniform.default

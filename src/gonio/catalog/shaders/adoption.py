@@ -26,7 +26,7 @@ class Adopted(NamedTuple):
 
 
 def adopt(file: str | Path) -> Adopted:
-    """The adapter for a shader's name, including the options in it. Raises InputError if the shader cannot be read."""
+    """The adapter for a shader's name, which may contain options. Raises InputError if the shader cannot be read."""
     name, query = parted(str(file))
     path = Path(os.path.expanduser(name))
     if not names_shader(str(path)):

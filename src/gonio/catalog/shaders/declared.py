@@ -30,7 +30,7 @@ class Declared(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A part of a uniform or argument that is a parameter, and its value in the text, None if it has none."""
+    """A part of a uniform or argument that is a parameter, and its value in the source, None if it has none."""
 
     name: str
     shape: str

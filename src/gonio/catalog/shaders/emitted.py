@@ -36,16 +36,15 @@ def content(file: Path, function: str = "") -> dict[str, Any]:
     try:
         several = manifest.get("materials", [manifest])
         named = {one["functions"]["eval"]: one for one in several if "eval" in one["functions"]}
-        if function:
-            chosen = named.get(function)
-            return {} if chosen is None else dict(_entries(chosen))
-        if len(named) != 1:
-            hint = f"name its function: --adapter function={next(iter(named), 'NAME')}"
-            raise InputError(f"{len(named)} materials, one expected: {', '.join(named) or 'no eval'}", str(file), hint)
-        return dict(_entries(next(iter(named.values()))))
+        chosen = named.get(function) if function else next(iter(named.values()), None)
+        entries = {} if chosen is None else dict(_entries(chosen))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         what = f"not a manifest of `gonio emit`: {type(error).__name__} {error}"
         raise InputError(what[:200], str(file), "emit the shader again, or remove the manifest") from None
+    if not function and len(named) != 1:
+        hint = f"name its function: --adapter function={next(iter(named), 'NAME')}"
+        raise InputError(f"{len(named)} materials, one expected: {', '.join(named) or 'no eval'}", str(file), hint)
+    return entries
 
 
 def _loaded(file: Path) -> dict[str, Any]:

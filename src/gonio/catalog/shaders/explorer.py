@@ -23,13 +23,18 @@ _TYPES = {"float": "float", "color": "vec3", "bool": "bool"}
 
 
 def is_explorer(text: str) -> bool:
-    """Whether a .brdf is one of the BRDF Explorer's shaders, not a table: its first word says so."""
+    """Whether the text of a .brdf is one of the BRDF Explorer's shaders, not a table, by its first word."""
     words = re.sub(r"#.*", "", text[: 1 << 16]).split(maxsplit=1)
     return bool(words) and words[0] == "analytic"
 
 
 def read(text: str, where: str) -> tuple[str, Adapter]:
-    """The GLSL, at the same lines as in the file, and the adapter. Raises InputError, with file and line."""
+    """The GLSL, at the same lines as in the file, and the adapter.
+
+    text   the content of the .brdf file
+    where  the file, for errors
+    Raises InputError, with file and line, if the file is damaged.
+    """
     section, lines, parameters = "", [], {}
     declared: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):

@@ -111,7 +111,7 @@ def _calls(function: Function) -> Iterator[int]:
 
 
 def completed(module: Module, adapter: Adapter, where: str) -> Adapter:
-    """The adapter with guesses for its missing entries."""
+    """The adapter with guesses for its missing entries; `where` is the shader, for errors."""
     guessed = not adapter.function
     name = adapter.function or next(iter(candidates(module)), "")
     adapter = replace(adapter, function=name)

@@ -1,7 +1,8 @@
-"""Texts that name shaders, and the options in them. Every material's text is tested, so the readers must not be loaded.
+"""Strings that name shaders, and the options in them. Every material's string is tested, so no reader must be loaded.
 
-A text may add entries to the shader's adapter after a question mark, as in a URL: "my.glsl?function=f&defines.N=1".
-They are part of the shader's name, so that they reach worker processes, scenes and results.
+After a question mark, such a string may add entries to the shader's adapter, as in a URL:
+"my.glsl?function=f&defines.N=1". They are part of the shader's name, so that they reach worker processes, scenes and
+results.
 """
 
 from __future__ import annotations
@@ -50,19 +51,19 @@ def option(text: str, name: str, prefix: str = "") -> tuple[str, str]:
 
 
 def head_in(text: str) -> str:
-    """The shader's name, with its options, in a material's text: "my.glsl" of "my.glsl(roughness=0.3)"; else ""."""
+    """The shader's name, with its options, in a material's string: "my.glsl" in "my.glsl(roughness=0.3)"; else ""."""
     head = text.partition("(")[0]
     return next((one.strip() for one in (text, head) if names_shader(one)), "")
 
 
 def file_in(text: str) -> Path | None:
-    """The shader that a material's text names, with or without settings and options."""
+    """The shader file that a material's string names, with or without settings and options; None if it names none."""
     head = head_in(text)
     return Path(os.path.expanduser(parted(head)[0])) if head else None
 
 
 def names_shader(text: str) -> bool:
-    """Whether a text names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
+    """Whether a string names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
     file = parted(text)[0]
     suffix = Path(file).suffix.lower()
     if suffix not in SUFFIXES or "\0" in text:

@@ -161,8 +161,8 @@ class Program:
     def run(self, formula: str, values: dict[str, Value], directions: dict[str, Value]) -> Value:
         """A formula's result, as tuples of scalars.
 
-        values      by parameter: a scalar, or a tuple of scalars
-        directions  "light", "view", "u": tuples of three scalars
+        values      value of each parameter by name: a scalar, or a tuple of scalars
+        directions  "light", "view" and "u": tuples of three scalars
         """
         if formula not in self._replayed:
             self._replayed[formula] = Replayed(functools.partial(self._run, formula))
@@ -236,7 +236,7 @@ class Program:
         return numeric(red), numeric(green), numeric(blue)
 
     def samplers(self) -> list[str]:
-        """The names of its textures."""
+        """The names of the module's textures."""
         kinds = {id: self.module.type(one.type).parts[0] for id, one in self.module.variables.items()}
         return [
             self.module.names.get(id, "")

@@ -21,8 +21,9 @@ _RAW: dict[str, np.dtype[Any]] = {".f32": np.dtype("<f4"), ".f16": np.dtype("<f2
 
 
 def texture(name: str, about: Mapping[str, Any], path: Path, stated: str = "") -> Texture:
-    """The texture of a file, with the edge rule and filter of its entry.
+    """The texture of a file, with the edge rule and filter that the adapter's entry `about` gives.
 
+    name    the texture's name in the shader
     stated  the adapter, for errors
     Raises InputError if it is not a table of finite numbers, and before more than `MAX_NUMBERS` are allocated.
     """

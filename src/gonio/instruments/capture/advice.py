@@ -22,7 +22,7 @@ WRONG = 0.05  # relative difference of model and pictures that is reported
 
 
 def on(scene: Scene, chosen: Chosen, result: Fitted | None) -> tuple[str, ...]:
-    """Warnings as texts, most severe first."""
+    """Warning messages, most severe first; `result` is None if no material was fitted."""
     return (*_on_pictures(scene, chosen), *(_on_fit(scene, result) if result is not None else ()))
 
 

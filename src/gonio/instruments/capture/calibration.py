@@ -196,7 +196,7 @@ def read(path: Path) -> Calibration:
 
 
 def made(raw: Mapping[str, Json], path: Path) -> Calibration:
-    """The calibration from the contents of a file."""
+    """The calibration from the JSON contents of the file `path`, as `read` returns it."""
     given = json.loads(json.dumps(dict(raw)))
     try:
         return Calibration.model_validate(given)

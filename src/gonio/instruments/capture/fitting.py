@@ -55,7 +55,12 @@ def fitted(
     fixed: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
 ) -> Fitted:
-    """Fit a model to the chosen pixels together with the calibration errors."""
+    """Fit a model to the chosen pixels together with the calibration errors.
+
+    stated  standard deviations of the calibration
+    fixed   path -> value of parameters that stay fixed
+    free    paths of additional parameters to fit that are fixed by default
+    """
     started = time.perf_counter()
     few = _some(chosen, FEW)
     plain, moving = tables.moving_of(model, fixed=fixed, free=free)

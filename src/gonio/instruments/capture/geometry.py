@@ -81,7 +81,11 @@ class Placed:
 
 
 def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed] = ()) -> Placed:
-    """The ball at its given position or as detected in the photographs. Raises InputError if none is visible."""
+    """The ball at its given position, or as detected in the photographs.
+
+    avoid  balls that the detection must exclude
+    Raises InputError if no ball is visible.
+    """
     if ball.center is not None:
         center = np.array(ball.center)
         return Placed(center, ball.radius, float(np.linalg.norm(center)) / camera.focal_pixels, given=True)
@@ -222,8 +226,11 @@ def grid_rays(camera: Camera) -> Floats:
 def lamp_in_mirrors(
     photograph: Photograph, mirrors: Sequence[Placed], camera: Camera, about: Floats, distance: float | None
 ) -> Floats:
-    """The position of a lamp from its highlights in mirror balls: where the reflected rays meet best, or at a distance
-    from a point. Raises InputError if a mirror shows no highlight, or if a single mirror is not enough."""
+    """The position of a lamp from its highlights in mirror balls: the point closest to the reflected rays, or for a
+    single mirror the point of its ray at `distance` from the point `about`.
+
+    Raises InputError if a mirror shows no highlight, or if there is a single mirror and no distance.
+    """
     origins, directions = [], []
     for mirror in mirrors:
         x, y = _highlight(photograph, covers(mirror, camera, margin=0.98))
@@ -277,7 +284,7 @@ class Seen(NamedTuple):
 
 
 def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
-    """Where rays hit a ball, or its limb if they miss it. The frame: z the normal, x and y as in Duff2017."""
+    """Local directions where rays hit a ball, or its limb if they miss it; z is the normal, x and y as in Duff2017."""
     along = ops.dot(ray, center)
     root = ops.sqr(along) - ops.dot(center, center) + ops.sqr(radius)
     point = ray * (along - ops.safe_sqrt(root))
@@ -291,7 +298,7 @@ def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
 
 
 def on_plane(ray: Array, base: Array, frame: tuple[Array, Array, Array], lamp: Array) -> Seen:
-    """Where rays hit a plane through a point, in the frame of its axes, z the normal."""
+    """Local directions where rays hit the plane through the point `base`, in the frame of its axes, z the normal."""
     x, y, normal = frame
     point = ray * (ops.dot(base, normal) / ops.dot(ray, normal))
     return _local(ray, point, x, y, normal, lamp)

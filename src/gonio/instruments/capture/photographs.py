@@ -76,6 +76,7 @@ def read_all(
 def read(shot: Shot, calibration: Calibration, folder: Path, shutter: Shutter | None = None) -> Photograph:
     """Read a photograph and merge its exposures. Raises InputError, with the name of the file, if it is unusable.
 
+    folder   the folder that contains the files
     shutter  errors of the exposure times; None: estimated from this series
     """
     exposures = [_exposed(one, calibration, folder) for one in shot.pictures]

@@ -37,8 +37,8 @@ FATES = ("used", "saturated", "shadowed", "grazing")  # categories of the sample
 class Scene:
     """Camera, sample and lamps of the photographs.
 
-    lamps        positions of the lamps, (L, 3)
-    intensities  (L, 3)
+    lamps        (L, 3), positions of the lamps
+    intensities  (L, 3), radiant intensities of the lamps
     names        names of the lamps
     """
 
@@ -164,8 +164,8 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
 
 @dataclass(frozen=True)
 class Chosen:
-    """The usable pixels of all photographs, the number of sample pixels per category of `FATES`, and a map per
-    photograph: 0 outside the sample, otherwise 1 + the index in `FATES`."""
+    """The usable pixels of all photographs, the number of sample pixels per category of `FATES`, and for each
+    photograph a map of these categories: 0 outside the sample, otherwise 1 + the index in `FATES`."""
 
     parts: tuple[Pixels, ...]
     counts: Mapping[str, int]
@@ -180,8 +180,8 @@ def choose(
 ) -> Chosen:
     """Select the pixels of samples that are not saturated, shadowed, or viewed or lit beyond `grazing` degrees.
 
-    slack  possible error of the ball's outline, relative to its radius, and of a lamp's direction, radians; pixels that
-           it could move beyond that angle are excluded too
+    slack  possible errors of the ball's outline, relative to its radius, and of a lamp's direction, radians; pixels
+           that these could move beyond the angle `grazing` are excluded too
     Raises InputError, with the name of the file, if a photograph does not show the sample at its position.
     """
     counts, maps = dict.fromkeys(FATES, 0), {}

@@ -1,10 +1,11 @@
 """Choose the next photograph: the most informative lamp position (A-optimal design, Chaloner1995).
 
-A photograph adds J^T J to the information on the material, where J holds the derivatives of its pixels from Dr.Jit,
-minus the information needed for the errors of its own lamp. The chosen position minimizes the sum of the squared
-relative errors of the material's parameters. The determinant (D-optimal design) would minimize the volume of the
-confidence region, and may improve parameters that are already well known. According to this information, four planned
-positions leave 0.77 times the error of eight random ones (median of 15 materials). Positions are chosen greedily.
+A photograph adds J^T J to the information on the material, where J holds the derivatives of its pixels from Dr.Jit; the
+information that the errors of its own lamp absorb is subtracted from J^T J. The chosen position minimizes the sum of
+the squared relative errors of the material's parameters. Maximizing the determinant (D-optimal design) would minimize
+the volume of the confidence region, and may improve parameters that are already well known. By this measure, four
+planned positions leave 0.77 times the error of eight random ones (median of 15 materials). Positions are chosen
+greedily.
 """
 
 from __future__ import annotations
@@ -66,8 +67,9 @@ class Setting:
     moving     its free parameters
     faults     uncertainties of lamps and ball
     intensity  (3,), intensity of the lamp
-    noise      relative noise of a pixel; alike: number of pixels that count as one; step: standard deviation of
-               quantization
+    noise      relative noise of a pixel
+    alike      number of neighboring pixels that count as one
+    step       standard deviation of quantization
     """
 
     scene: Scene
@@ -82,7 +84,8 @@ class Setting:
 
 
 def places(scene: Scene, kind: Kind, distance: float, count: int = PLACES) -> Floats:
-    """Candidate lamp positions, (N, 3): evenly distributed about the sample at a distance, on its visible side."""
+    """About `count` candidate lamp positions, (N, 3): evenly distributed about the sample at a distance from it, on its
+    visible side."""
     middle = middle_of(scene)
     many = 4 * count
     turn = np.arange(many) * np.pi * (3.0 - np.sqrt(5.0))  # a spiral that covers the sphere evenly

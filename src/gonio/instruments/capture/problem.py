@@ -38,12 +38,12 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Faults:
-    """Uncertainties of the calibration; the corresponding parameters are in units of these standard deviations.
+    """Standard deviations of the calibration's errors; the corresponding parameters are in units of these.
 
-    ball       pixels to the right and down, and relative radius
-    scale      relative, of all intensities together
-    direction  radians, of each lamp, to the right and down as seen from the sample
-    intensity  relative, of each lamp
+    ball       of the ball's position to the right and down, pixels, and of its radius, relative
+    scale      of the scale of all intensities together, relative
+    direction  of each lamp's direction to the right and down as seen from the sample, radians
+    intensity  of each lamp's intensity, relative
     """
 
     ball: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -264,7 +264,7 @@ class Problem:
         return sum(float(self._spread(part, values).sum()) for part, values in predicted) / max(total, 1e-300)
 
     def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
-        """Per part: (pixels, predicted - measured, predicted)."""
+        """For each group of pixels: (pixels, predicted - measured, predicted)."""
         differences = []
         for part in self.parts:
             predicted, _ = self.predicted(part, numbers, False)

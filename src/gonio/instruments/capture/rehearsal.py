@@ -42,13 +42,14 @@ def take(
 ) -> Path:
     """Render the photographs of a calibration into a folder, write a calibration file, and return the folder.
 
-    calibration  contents of a calibration file; ball and lamps with their positions, no lens distortion
+    calibration  contents of a calibration file, with the positions of ball and lamps, and without lens distortion
     material     material of the sample
     noise        relative standard deviation of each value; or a camera's read noise, photons and relative noise
-    bits         8 or 16 to write integer .png files by the calibration's response (linear or srgb; for 16 bits linear),
-                 which must name them so; None to keep radiance, in .exr, .hdr or .npz
+    bits         8 or 16 for integer .png files, encoded by the calibration's response (linear or srgb; for 16 bits
+                 linear); None for radiance, in .exr, .hdr or .npz. The calibration must name files of that kind
     spp          samples per pixel
-    stated       the calibration to write if it differs, to simulate calibration errors
+    seed         seed of the renders and of the noise
+    stated       the calibration to write if it differs from `calibration`, to simulate calibration errors
     """
     told = made(calibration, Path("calibration"))
     target = files.check_folder(folder)

@@ -170,7 +170,7 @@ def capture(
     photographs  a folder with a calibration.json, or files that the calibration lists
     model        model to fit, as in `go.fit`; several are ranked by their criterion; None: samples only
     calibration  the calibration file; None: calibration.json in the folder of the photographs
-    grazing      degrees; pixels viewed or lit beyond this angle are excluded
+    grazing      angle from the normal, degrees; pixels viewed or lit beyond it are excluded
     param        path -> value of parameters that stay fixed
     free         paths of additional parameters to fit that are fixed by default
     progress     called before each step, with its name
@@ -219,7 +219,10 @@ def plan(
     calibration  a calibration file with a ball and its position, or a flat sample, and a lamp with its position and
                  intensity
     model        the model to fit, with values close to those of the material
+    count        number of photographs
     places       possible positions of the lamp; None: anywhere at the distance of the calibration's lamp
+    fixed        path -> value of parameters that stay fixed
+    free         paths of additional parameters to fit that are fixed by default
     """
     path = Path(os.path.expanduser(calibration))
     stated = calibrations.read(path)
@@ -249,7 +252,7 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
 
 
 def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
-    """The calibration file of photographs or of their folder, or the named calibration file itself."""
+    """The calibration file: `calibration` if given, else that of the named photographs or folder, or the named file."""
     if calibration is not None:
         return Path(os.path.expanduser(calibration))
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]

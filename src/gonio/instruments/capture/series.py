@@ -12,8 +12,8 @@ quantization error of the file). The unbiased mean of x_i = y_i / t_i with the s
 v_i depends on L. Evaluated at the exposure's own value, it gives more weight to values that are low by chance, which
 biases the mean by about -gain / t. Evaluated at the merged value, it does not: with these weights, the merged value is
 uncorrelated with every difference x_i - x_j (independent of it for Gaussian noise), so weights that depend on it are
-unbiased to first order. So v_i is iterated on the merged value, starting with weights proportional to the seconds,
-which are those of photon noise. For the same reason, the tests for saturation and clipping at 0 use merged values: an
+unbiased to first order. So v_i is iterated on the merged value, starting with weights proportional to the seconds, the
+best ones for pure photon noise. For the same reason, the tests for saturation and clipping at 0 use merged values: an
 exposure counts if its mean with the shorter ones is three standard deviations below saturation, and if it is three
 above 0 or the longest that counts. A test of the shorter ones alone would include the long exposure where they are low
 by chance, and exclude it where they are high: an error of 0.5 % of the light for a sensor of 1,000 electrons, and of
@@ -56,7 +56,7 @@ class Exposed(NamedTuple):
 
     file     name of the file
     signal   (H, W, 3), linear; nan where saturated
-    step     (H, W, 3), standard deviation of its quantization; 0 everywhere for floating-point files, never clipped
+    step     (H, W, 3), standard deviation of its quantization; 0 for floating-point files, which are never clipped
     seconds  stated exposure time
     ceiling  signal at saturation
     """
@@ -73,7 +73,8 @@ class Exposed(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Noise of a camera, (3,) each: read variance, photon variance per signal, relative variance of the rest.
+    """Noise of a camera, (3,) each: variance of the read noise, photon variance per signal, and variance of the noise
+    proportional to the signal, relative to its square.
 
     known  whether there were pixels to estimate it from
     """
@@ -122,7 +123,7 @@ def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | Non
     """Merge exposures of one view. Raises InputError if stated times contradict the pixels by more than a tenth.
 
     off      standard deviation of relative errors of exposure times; 0 if it is not known
-    shutter  the errors themselves, from all series of a camera; None: from this series
+    shutter  the errors themselves, estimated from all series of a camera; None: estimated from this series
     """
     ordered = sorted(exposures, key=lambda one: one.seconds)
     seconds = [one.seconds for one in ordered]

@@ -91,7 +91,12 @@ def axis_of(text: str | None, name: str) -> list[float] | None:
 
 
 def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: float) -> Floats:
-    """Convert angles in degrees to a sorted axis in radians. Raises InputError if empty or out of range."""
+    """Convert angles in degrees to a sorted axis in radians; None selects `default`, which is in radians.
+
+    name  name of the axis, for errors
+    most  largest valid angle, degrees
+    Raises InputError for no angles, and for one out of range.
+    """
     if values is None:
         return default
     degrees = np.unique(np.asarray(values, np.float64))

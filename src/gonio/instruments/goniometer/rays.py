@@ -100,6 +100,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     cosines  cosines of the angles of incidence; azimuths and positions are uniformly distributed
     each     rays per angle; all rays are numbered angle by angle
     first    index of the first of `count` rays
+    seed     seed of the random numbers
     """
     mi = engine.load()
     number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)

@@ -39,7 +39,7 @@ SAME = 1e-6  # relative change by swapping the two directions that rounding erro
 class Detector:
     """Properties of a detector, from the arguments of `measure`.
 
-    solid_angle  its opening, sr; None for the default of the specimen
+    solid_angle  solid angle of its opening, sr; None for the default of the specimen
     noise        relative standard deviation of a reading
     blocked      degrees about the lamp where it cannot be placed
     bounces      the light that it collects, a key of `BOUNCES`
@@ -187,9 +187,10 @@ def measure(
     material     the material to evaluate, as `go.material` takes it; None to measure a surface
     output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None for no file
     surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
-    facet        material of the facets, as text or object: "mirror", "lambert:albedo=0.8", "conductor:Au"; if given as
-                 text, facets are smooth (alpha = 0) unless it sets alpha
-    table        in .gonio files: angles, half-difference, adaptive, specular, samples
+    facet        material of the facets, as a string or an object: "mirror", "lambert:albedo=0.8", "conductor:Au"; a
+                 string that does not set alpha gives smooth facets (alpha = 0)
+    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular, samples; "": the
+                 default kind
     theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
     solid_angle  solid angle of the detector, sr, over which f is averaged; None: 0.006 for surfaces, 0 for materials
     noise        relative standard deviation of a reading
@@ -198,7 +199,7 @@ def measure(
     bounces      for a surface: "all" light, that of the "first" bounce, or that of "later" bounces
     samples      rays per angle of incidence
     patches      measured patches of a random surface, rounded up to a multiple of 8; errors include their spread
-    seed         0 if None; the same seed gives the same values
+    seed         seed of the random numbers, 0 if None; the same seed gives the same values
     device       "cpu", "cuda" or "auto", for surfaces
     progress     called with the number of rays traced and their total
 
@@ -335,8 +336,12 @@ def _filled(plan: Plan, specimen: Specimen, detector: Detector, seed: int) -> tu
 
 
 def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> Surface:
-    """A surface from text: "gaussian", "gaussian:alpha=0.3,length=4", "gaussian(alpha=0.3)", a file of heights, or
-    FILE.py:CLASS. `assignments` holds further parameters as "name=value"."""
+    """A surface from a string: "gaussian", "gaussian:alpha=0.3,length=4", "gaussian(alpha=0.3)", a file of heights, or
+    FILE.py:CLASS.
+
+    assignments  further parameters, "name=value" each
+    preset       name of a preset; surfaces have none, so any other than "" is an error
+    """
     if preset:
         raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
     if outside.names_code(text):

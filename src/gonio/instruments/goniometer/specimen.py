@@ -23,7 +23,7 @@ class Specimen:
 
     title  title for the file
     about  settings of the measurement, for the file
-    exact  whether readings have no statistical error and no separate bounces
+    exact  whether readings have no statistical error, and bounces are not separated
     """
 
     title: str

@@ -45,7 +45,7 @@ class Patch:
 class Surface:
     """A kind of rough surface: a frozen dataclass of its parameters (`parameter`), with `patch`.
 
-    name    name in texts
+    name    name on the command line, as in "gaussian:alpha=0.3"
     random  whether `patch` depends on its random numbers; if so, several patches are measured, and their spread is part
             of the standard error
     """
@@ -61,7 +61,7 @@ class Surface:
                 object.__setattr__(self, field.name, _in_range(getattr(self, field.name), field.metadata, where))
 
     def patch(self, rng: np.random.Generator) -> Patch:
-        """One period of the surface."""
+        """One period of the surface; a random surface takes all its random numbers from `rng`."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -71,7 +71,7 @@ class Surface:
 
     @classmethod
     def reads(cls, text: str) -> bool:
-        """Whether a text names a file with such a surface; its path is then the parameter `file`."""
+        """Whether a string names a file with such a surface; its path is then the parameter `file`."""
         return False
 
 
@@ -81,7 +81,10 @@ Surface.family = Family(
 
 
 def parameter(default: T, doc: str, low: float, high: float, unit: str = "") -> T:
-    """Declare a numeric parameter of a surface, an integer if the default is one; a value of None is preserved."""
+    """Declare a numeric parameter of a surface: an integer if the default is one. A value of None is preserved.
+
+    low, high  bounds of its range
+    """
     about = {"doc": doc, "low": low, "high": high, "unit": unit, "whole": isinstance(default, int)}
     declared: T = dataclasses.field(default=default, metadata=about)
     return declared
@@ -103,7 +106,7 @@ def _in_range(value: object, about: Mapping[str, Any], where: str) -> object:
 
 
 def named(text: str, settings: dict[str, str]) -> Surface:
-    """A surface from its name or file and the texts of its parameters.
+    """A surface from its name or file, and its parameters as strings.
 
     Raises InputError, with the nearest known spelling, for unknown names and values out of range.
     """

@@ -39,7 +39,8 @@ class Mix(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects a material and is rescaled; unless the sample is from a delta lobe, its pdf is the mixture's."""
+        """u.x selects a material and is rescaled for it. Unless the sample is from a delta lobe, its pdf is that of the
+        mixture."""
         w = self.weight
         pick_b = u.x < w
         u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
@@ -56,7 +57,7 @@ class Mix(BSDF):
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The polarized parts of the two materials, each times its weight."""
+        """The polarized parts of the two materials, multiplied by their weights."""
         a, b = self.a.polarized(wo, wi, delta, mode), self.b.polarized(wo, wi, delta, mode)
         return (*(part.times(1.0 - self.weight) for part in a), *(part.times(self.weight) for part in b))
 

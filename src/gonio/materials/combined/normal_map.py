@@ -19,7 +19,7 @@ MIN_COSINE = 0.01  # minimum cosine of a view to the bent normal, unless that to
 
 
 class _Frame(NamedTuple):
-    """The tilted normal and its tangents: x' as close to x as possible."""
+    """The tilted normal n and its tangents x and y; x is as close to the surface's tangent as possible."""
 
     x: Direction
     y: Direction
@@ -37,17 +37,18 @@ class _Frame(NamedTuple):
 class NormalMap(BSDF):
     """A base with a tilted normal, n' = (lean_x, lean_y, 1), normalized; in scenes an image of normals, `"normalmap"`.
 
-    f cos theta_i = b(o, i) + b(o, i*), with b the base's value in the tilted frame, i* the mirror image of i below
+    f cos theta_i = b(o, i) + b(o, i*), where b is `eval` of the base in the frame of n', and i* = (i_x, i_y, -i_z)
 
-    Surfaces with tilted normals usually turn black at grazing angles, for two reasons, and both are corrected here.
-    First, a view may lie behind the base: n' is then bent toward the view, as little as necessary (Keller2017 does this
-    for the mirrored view). Second, the base scatters light below the surface, (1 - n'.n) / 2 of it if it is white and
-    diffuse: this light is reflected upward again, as by neighboring facets. A white base thus remains white at any
-    tilt, and no light is created. If the base transmits, n' is bent, but light that leaves on the wrong side is lost.
-    Not reciprocal, because n' depends on the view. Scattered light is unpolarized.
+    Surfaces with tilted normals usually turn black at grazing angles, for two reasons, both of which are corrected
+    here. First, the view may lie behind the base; n' is then bent toward the view, as little as necessary (Keller2017
+    does this for the mirrored view). Second, the base scatters light below the surface: (1 - n'.n) / 2 of it for a
+    white diffuse base, with n the normal of the surface. This light is reflected upward again, as by neighboring
+    facets. A white base thus remains white at any tilt, and no light is created. If the base transmits, n' is bent,
+    but light that leaves on the wrong side is lost. Not reciprocal, because n' depends on the view. Scattered light is
+    unpolarized.
 
     A surface of two facets (Schuessler2017) conserves energy as well. If the second facet is a mirror, however, diffuse
-    bumps become invisible: viewed from above, their brightness is n'.n cos theta_i for every direction of the tilt.
+    bumps become invisible: viewed from above, their brightness is n'.n cos theta_i in whichever direction they tilt.
     """
 
     base: BSDF = bsdf("the material whose normal is tilted")
@@ -75,7 +76,7 @@ class NormalMap(BSDF):
         return vec3(n_x, n_y, over)
 
     def _frame(self, n: Direction) -> _Frame:
-        """The frame of n, with x' as close to x as possible; from its slopes, as 1 - n.x^2 would cancel if steep."""
+        """The frame of n, computed from the slopes of n, since 1 - n.x^2 would cancel for a steep n."""
         a, b = n.x / n.z, n.y / n.z
         x = vec3(1.0 + sqr(b), -(a * b), -a)
         x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
@@ -96,7 +97,7 @@ class NormalMap(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density, plus that of reflected samples, as in `eval`."""
+        """The density of the base, plus that of samples reflected upward, as in `eval`."""
         frame, valid = self._bent(wo)
         o, i = frame.local(wo), frame.local(wi)
         density = self.base.pdf(o, i)
@@ -123,7 +124,7 @@ class NormalMap(BSDF):
         return Sample(wi, weight, where(drawn, where(s.delta, s.pdf, density), 0.0), s.delta & drawn, s.eta)
 
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
-        """(the tilted frame, bent until wo lies on its upper side; whether wo then lies there)."""
+        """The tilted frame, bent until wo lies on its upper side, and whether wo then lies there."""
         n = self._normal()
         side = where(wo.z < 0.0, -1.0, ops.ones_like(wo.z))
         lacking = maximum(minimum(wo.z * side, MIN_COSINE) - dot(wo, n) * side, 0.0)
@@ -140,7 +141,8 @@ class NormalMap(BSDF):
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal may differ from the surface's: False only if the tilts are the plain number 0."""
+        """Whether its normal, or that of the base, may differ from the surface's. Tilts that are the plain number 0
+        leave the normal unchanged."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
         return self.base.perturbs_normal or not all(isinstance(value, int | float) and value == 0 for value in values)
 
@@ -169,16 +171,17 @@ class NormalMap(BSDF):
 
 
 def _flipped(w: Direction) -> Direction:
-    """w mirrored at the surface."""
+    """The mirror image of w on the other side of the surface."""
     return vec3(w.x, w.y, -w.z)
 
 
 class Bump(NormalMap):
     """A base with the normal of a height field (Blinn1978); in scenes an image of heights, `"bump"`.
 
-    The height h(u, v) is in units of the scene. With dp/du = (l, 0) and dp/dv = (s, m) in the tangent plane, its
-    gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside scenes, where dp/du and
-    dp/dv are unknown, they are x and y. In all other respects, this is `normal-map`.
+    The height h(u, v) is in units of the scene, with derivatives h_u and h_v. With dp/du = (l, 0) and dp/dv = (s, m)
+    in the tangent plane, its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside
+    scenes, where dp/du and dp/dv are unknown, they are taken to be x and y. In all other respects, this is
+    `normal-map`.
     """
 
     lean_x: Number = number(default=0.0, doc="h_u, derivative of the height with respect to u", low=-1e6, high=1e6)
@@ -197,5 +200,8 @@ class Bump(NormalMap):
 
 
 def slopes(normals: np.ndarray, scale: float = 1.0) -> np.ndarray:
-    """x / z and y / z of normals (..., 3), times `scale`: the parameters of `normal-map`, (..., 2)."""
+    """The parameters `lean_x` and `lean_y` of `normal-map`, (..., 2), for normals (..., 3).
+
+    scale  factor on the slopes
+    """
     return np.clip(scale * normals[..., :2] / np.maximum(normals[..., 2:], 1.0 / STEEPEST), -STEEPEST, STEEPEST)

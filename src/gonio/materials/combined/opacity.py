@@ -19,7 +19,7 @@ class Opacity(BSDF):
     """The base on a fraction `opacity` of the surface, and holes elsewhere: the rest of the light passes straight
     through, unchanged, as a delta lobe, from either side. A texture of zeros and ones represents cutouts such as leaves
     and fences; values in between represent fabrics with unresolved holes. A base that only reflects is black from
-    below: wrap it in `two-sided`.
+    below unless it is wrapped in `two-sided`.
     """
 
     base: BSDF = bsdf("the material between the holes")
@@ -39,7 +39,7 @@ class Opacity(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the base with probability `opacity`, which cancels in the weight, and is rescaled for it."""
+        """u.x selects the base with probability `opacity`, which cancels in the weight, and is rescaled for it."""
         covered = u.x < self.opacity
         s = self.base.sample(wo, vec3(minimum(safe_div(u.x, self.opacity), ALMOST_ONE), u.y, u.z), mode)
         through = 1.0 - self.opacity
@@ -49,7 +49,7 @@ class Opacity(BSDF):
         return Sample(where(covered, s.wi, -wo), weight, pdf, s.delta | ~covered, eta)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The average of the base's tint and white for the holes, by opacity."""
+        """The base's tint times opacity, plus 1 - opacity for the holes."""
         return self.base.tint(wo) * self.opacity + (1.0 - self.opacity)
 
     @property

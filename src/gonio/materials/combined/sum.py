@@ -16,8 +16,8 @@ from ...ops import Direction, Mask, Mode, Spectrum
 class Sum(BSDF):
     """a + b: the sum of two materials, as in fits to measurements, such as "lambert+conductor" (Ngan2005).
 
-    Energy may not be conserved: together, the two can reflect more light than they receive. Sampled by a guide. A
-    material that is a delta lobe has no value to add and is rejected.
+    Together, the two can reflect more light than they receive. Sampled by a guide. A material that consists of a delta
+    lobe is rejected, since its `eval` is 0.
     """
 
     a: BSDF = bsdf("the first material")

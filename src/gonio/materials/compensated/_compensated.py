@@ -1,4 +1,4 @@
-"""Base classes of the compensated materials: a base material plus a broad lobe that returns the energy it loses."""
+"""Base classes of the compensated materials: a base material plus a broad lobe that returns the energy lost by it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class AllParts(NamedTuple):
 
 
 class _OnBase(BSDF):
-    """A material that compensates for the loss of another and otherwise shares its properties."""
+    """A material that compensates for the energy lost by its base and otherwise has the base's properties."""
 
     base: BSDF = bsdf("the material to be compensated")
     _takes_glass: ClassVar[bool] = True  # whether the base may transmit
@@ -57,7 +57,7 @@ class _OnBase(BSDF):
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the base has two widths."""
+        """Whether the base has two different widths."""
         return reflecting.has_two_widths(self.plain.base)
 
     @property
@@ -78,15 +78,16 @@ class _OnBase(BSDF):
 
 
 class _Compensated(_OnBase):
-    """A base plus its lost energy, sampled by a mixture of the base and a lobe proportional to that energy.
+    """A base plus the energy lost by it, sampled by a mixture of the base and a lobe proportional to that energy.
 
-    A subclass defines `compensation`, an `eval` that adds it, and `derive`, whose fields include `missing` and `ratio`.
+    A subclass defines `compensation`, an `eval` that adds it to the base, and `derive`, whose result has the fields
+    `missing` and `ratio`.
     """
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's albedo plus that of the lobes, which are rotationally symmetric."""
+        """The albedo of the base plus that of the compensation, which is rotationally symmetric."""
         of_base = None if nodes is None or self.stochastic or self.anisotropic else inner(self.base, mu, phi)
         if nodes is None or of_base is None:
             return None
@@ -114,18 +115,18 @@ class _Compensated(_OnBase):
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
-        """`Parts`, with D, G and F if the base has them."""
+        """`AllParts` if the base has D, G and F, else `Parts`."""
         return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.compensation(wo, wi, "radiance"))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The densities of the base and of a lobe proportional to (1 - E(mu_i)) mu_i, mixed by their energies."""
+        """The mixture of the base's density and one proportional to (1 - E(mu_i)) mu_i, weighted by their energies."""
         share = self._share(wo)
         return self.base.pdf(wo, wi) * (1.0 - share) + self._lobe_pdf(wo, wi) * share
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the base or the lobe, and is rescaled."""
+        """u.x selects the base or the broad lobe, and is rescaled."""
         share = self._share(wo)
         broad = u.x < share
         u_remapped = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
@@ -151,7 +152,8 @@ class _Compensated(_OnBase):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with the density `_lobe_pdf`: mu^2 from the table of its inverse, a uniform azimuth."""
+        """A direction with the density `_lobe_pdf`: mu^2 from a table of its inverse distribution, and a uniform
+        azimuth."""
         return self.derived.missing.sample(wo, u)
 
     @function
@@ -163,7 +165,7 @@ class _Compensated(_OnBase):
 
 
 def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi: Spectrum) -> Parts | AllParts:
-    """The two terms, with D, G and F if the base has them."""
+    """`AllParts` with D, G and F of the base if it has them, else `Parts`."""
     if not base.has_terms:
         return Parts(single, multi)
     d, g, f = base.terms(wo, wi)
@@ -172,7 +174,7 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
 
 @function
 def lobe_ratio(f_add: Spectrum, lost: MissingEnergy) -> Scalar:
-    """Mean color of the compensation, divided by that of single scattering."""
+    """The mean over the channels of the compensation's color, divided by that of single scattering."""
     return safe_div(mean(f_add), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 

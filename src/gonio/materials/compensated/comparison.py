@@ -26,7 +26,8 @@ Base = Callable[[float], BSDF]  # width alpha -> the base
 
 
 def _for_metals(compensate: Callable[[BSDF], BSDF]) -> Method:
-    """The method for bases that only reflect: it does not support glass, or is redundant, as glass has albedo 1."""
+    """A method restricted to bases that only reflect: it does not support glass, or would give the same result as
+    another, since the albedo of glass is 1."""
     return lambda base: None if base.transmits else compensate(base)
 
 
@@ -47,7 +48,7 @@ BASES: dict[str, Base] = {
 
 
 def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
-    """The methods and bases, with the user's own: a material with a base is a method, any other is a base."""
+    """The methods and bases, including the user's: a material with a base is a method, any other is a base."""
     methods, bases = dict(METHODS), dict(BASES)
     for material in own:
         if "base" in tree.children(material):
@@ -63,7 +64,7 @@ def _under(method: BSDF, base: BSDF) -> BSDF | None:
 
 
 def _of_width(material: BSDF, alpha: float) -> BSDF:
-    """The material at a width; unchanged if it has none."""
+    """The material with a given width; unchanged if it has no parameter `alpha`."""
     return tree.replace(material, {"alpha": alpha}) if "alpha" in material.parameters() else material
 
 
@@ -83,18 +84,25 @@ def compare(
     seed: int = 0,
     own: Sequence[BSDF] = (),
 ) -> dict[str, Any]:
-    """Albedos of every base with every method on a grid of roughness and mu, and measures derived from them.
+    """Compare all methods of compensation on all bases: albedos on a grid of roughness and mu, errors and cost.
 
-    roughness, mu  the axes; alpha = roughness^2
-    walks          random walks per albedo, 1000 or more
-    pairs          pairs of directions that are evaluated for `cost`, 1024 or more
-    own            user materials: one with a base is compared as a method, any other as a base; a base without
-                   microfacets has no random walk as a reference
+    roughness, mu  axes of the grid: roughness (alpha = roughness^2), and mu = cos theta_o
+    walks          number of random walks per albedo, 1000 or more
+    pairs          number of pairs of directions that are evaluated for `cost`, 1024 or more
+    seed           seed of the random walks and of the directions for `reciprocity`
+    own            user materials: one with a base is compared as a method, any other as a base. For a base without
+                   microfacets, there is no random walk as a reference
 
-    Returns a dict that can be stored as JSON: the axes; `albedo` [material][method] (roughness, mu, 3); `rms`, the RMS
-    difference from the random walk; `furnace`, the largest |1 - albedo| where 1 is exact; `reciprocity`, the largest
-    relative violation for gold; `cost`, the time of one evaluation divided by that of the uncompensated metal. Raises
-    InputError for fewer walks or pairs.
+    Returns a dict that can be stored as JSON:
+
+    roughness, mu, walks  the arguments
+    albedo       [base][method], (roughness, mu, 3)
+    rms          [base][method], RMS difference of the albedos from those of the random walk
+    furnace      [base][method], largest |1 - albedo|, for the lossless bases
+    reciprocity  [method], largest relative violation for gold
+    cost         [method], time of one evaluation divided by that of the uncompensated metal
+
+    Raises InputError if `walks` or `pairs` is too small.
     """
     if walks < 1000 or pairs < 1024:
         raise InputError(f"{walks} walks, {pairs} pairs", "compensation", "give 1000 walks and 1024 pairs or more")
@@ -136,7 +144,10 @@ def compare(
 
 
 def breach(method: Method, seed: int) -> float:
-    """Largest |f(o, i) - f(i, o)|, relative to the larger of the two, of 2000 pairs for gold of roughness 0.7."""
+    """The largest |f(o, i) - f(i, o)|, relative to the larger of the two, for gold of roughness 0.7.
+
+    seed  seed of the 2000 pairs of directions
+    """
     model = _on_gold(method, 0.49)
     rng = np.random.default_rng(seed)
     o, i = (direction(rng.uniform(0.02, 1.0, 2000), rng.uniform(0, 2 * np.pi, 2000)) for _ in range(2))
@@ -152,8 +163,8 @@ def _on_gold(method: Method, alpha: float) -> BSDF:
 
 
 def _costs(methods: Mapping[str, Method], pairs: int) -> dict[str, float]:
-    """Time of `eval` divided by that of the uncompensated metal: gold with alpha = 0.36, pairs above the surface, the
-    best of 24 runs."""
+    """The time of `eval` divided by that of the uncompensated metal, per method, for gold with alpha = 0.36 and pairs
+    of directions above the surface. Times are the best of 24 runs."""
     dr = backend.drjit()
     kind = backend.types("float32")
     rng = np.random.default_rng(1)

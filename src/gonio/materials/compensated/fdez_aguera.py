@@ -21,8 +21,8 @@ from .kulla_conty import f_add
 class Derived(NamedTuple):
     """Values that do not depend on directions.
 
-    missing  1 - Ess
-    f0       reflectance at normal incidence
+    missing  E_ms = 1 - Ess, and its mean
+    f0       F0, the reflectance at normal incidence
     f_avg    F_avg of Schlick's curve
     ratio    mean color of the compensation divided by that of single scattering, for sampling
     """
@@ -36,7 +36,8 @@ class Derived(NamedTuple):
 class FdezAguera(_Compensated):
     """f_base + F_ms E_ms / pi: multiple scattering as light from a diffuse surface (FdezAguera2019).
 
-    With the split sum FssEss = F0 A(mu_o) + B(mu_o), Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
+    A and B are the coefficients of the split sum, functions of mu_o = cos theta_o and alpha; F0 is the reflectance at
+    normal incidence. With FssEss = F0 A + B, Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
     F_ms = FssEss F_avg / (1 - E_ms F_avg). Designed for prefiltered lighting, FssEss * radiance + F_ms E_ms *
     irradiance. As a BSDF, the second term is a diffuse lobe that depends on wo only, so it is not reciprocal. The
     method assumes Schlick's approximation of F.
@@ -65,7 +66,7 @@ class FdezAguera(_Compensated):
         return F_ms * where(lobe.above(wo, wi) & ~smooth, E_ms * abs(wi.z) * ops.inv_pi, 0.0)
 
     def derive(self) -> Derived:
-        """E_ms by its polynomial, F0 and F_avg = F0 + (1 - F0) / 21."""
+        """E_ms from its polynomial, F0 and F_avg = F0 + (1 - F0) / 21."""
         lost = missing_energy(self.base)
         f0 = self.base.normal_reflectance()
         assert isinstance(lost, Reflecting) and f0 is not None, "checked on construction"

@@ -25,7 +25,7 @@ class Derived(NamedTuple):
 
     missing  1 - E and 1 - E_avg of the base at F = 1
     f_add    color of the compensation
-    ratio    its mean divided by that of single scattering, for sampling
+    ratio    mean of this color divided by that of single scattering, for sampling
     """
 
     missing: MissingEnergy
@@ -35,7 +35,11 @@ class Derived(NamedTuple):
 
 @function
 def f_add(lost: MissingEnergy, color: str) -> Spectrum:
-    """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times this, by `color`."""
+    """The color f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times this.
+
+    lost   the energy lost by the base, with F_avg
+    color  "sheet" for the formula above, "bounce" for F_avg times its value
+    """
     F_avg, E_avg = lost.F_avg, 1.0 - lost.average
     sheet = F_avg * E_avg / (1.0 - F_avg * (1.0 - E_avg))
     return (sheet * F_avg if color == "bounce" else sheet) * lost.factor
@@ -44,7 +48,7 @@ def f_add(lost: MissingEnergy, color: str) -> Spectrum:
 class KullaConty(_Compensated):
     """f_base + f_add f_ms: the light lost by single scattering, returned as a broad lobe (Kulla2017).
 
-    With E(mu) the albedo of the base at F = 1, E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu:
+    E(mu) is the albedo of the base at F = 1 for mu = cos theta, E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu.
     f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o); f_add depends on `color`. At
     F = 1, no light is lost. Reciprocal. As alpha -> 0, the term vanishes: (1 - E)^2 tends to 0 faster than 1 - E_avg.
 
@@ -53,11 +57,12 @@ class KullaConty(_Compensated):
     side, whose albedos sum to 1 - E, where E includes the reflected and the transmitted power; the ratio of the two
     lobes follows from reciprocity (Kulla2017, p. 30).
 
-    Any other base that only reflects, by a finite isotropic lobe, is measured once (`compensation.measured`): E is its
-    albedo with F = 1 and with every color that is a fraction of the light set to 1; F_avg is the ratio of its actual
-    albedo to E. Lambert loses nothing; Oren-Nayar loses the interreflections; a material without such colors, such as
-    Phong, loses all light that its brightest channel does not reflect. A gain of energy by the base is not corrected.
-    The parameters of such a base must not vary over the surface, and there is no shader code.
+    The albedo of any other base that only reflects, by a finite isotropic lobe, is computed once
+    (`compensation.measured`): E is the albedo with F = 1 and with every color that is a fraction of the light set to
+    1; F_avg is the ratio of the actual albedo to E. Lambert loses nothing; Oren-Nayar loses the interreflections; a
+    material without such colors, such as Phong, loses all light that its brightest channel does not reflect. A gain of
+    energy by the base is not corrected. The parameters of such a base must not vary over the surface, and there is no
+    shader code.
 
     With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05), so the
     compensation adds a spurious bright rim to smooth surfaces.
@@ -75,8 +80,8 @@ class KullaConty(_Compensated):
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017).
 
-        M is 1 - E, computed without this difference, and `over_average` is 1 / (pi (1 - E_avg)). For glass, `share`
-        splits the lobe between the two sides (p. 30).
+        M is 1 - E, computed without taking this difference, and `over_average` is 1 / (pi (1 - E_avg)). For glass,
+        `share` divides the lobe between the two sides (p. 30).
         """
         lost = self.derived.missing
         f_ms = self.M(wo) * self.M(wi) * lost.over_average(wi) * lost.share(wo, wi)
@@ -115,7 +120,7 @@ class KullaConty(_Compensated):
 
     @property
     def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """The allowed loss in a white furnace: the error of the polynomials or the measurement, see docs/energy.md."""
+        """The allowed loss in a white furnace: the error of the polynomials or of the computed albedo; docs/energy.md."""
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:
@@ -125,8 +130,8 @@ class KullaConty(_Compensated):
 
 def _furnace_error(model: KullaConty) -> float:
     """The largest error in a white furnace, measured for 21 indices from 0.2 to 5, eight widths and 18 views. If the
-    indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table. Anisotropic
-    glass is approximated by isotropic tables (`curves.widths_along`)."""
+    indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table, which increases
+    the error. Anisotropic glass is approximated by isotropic tables (`curves.widths_along`)."""
     if not model.base.transmits:
         return 0.008 if model.anisotropic else 0.0
     if model.anisotropic:

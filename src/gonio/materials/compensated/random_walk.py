@@ -27,7 +27,7 @@ class RandomWalk(_Compensated):
     """
 
     stochastic: ClassVar[bool] = True
-    seed: Number = number(default=0.0, doc="selects other random numbers")
+    seed: Number = number(default=0.0, doc="seed of the random numbers")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -42,7 +42,7 @@ class RandomWalk(_Compensated):
         return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """One walk's light of two or more bounces along wi, times |cos theta_i|."""
+        """The light of two or more bounces that one walk scatters along wi, times |cos theta_i|."""
         surface = self.base.microsurface
         assert surface is not None, "checked on construction"
         alpha, smooth = widths(surface.alpha)

@@ -53,7 +53,7 @@ class Turquin(_OnBase):
         return of_base * backend.to_numpy(self.bind(types)._factor(wo), len(mu))
 
     def derive(self) -> Derived:
-        """E by its polynomial, and F0."""
+        """E from its polynomial, and F0."""
         f0 = self.base.normal_reflectance()
         assert f0 is not None, "checked on construction"
         return Derived(missing_energy(self.base), f0)
@@ -71,17 +71,17 @@ class Turquin(_OnBase):
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
-        """The base and the increase by the factor, with D, G and F if the base has them."""
+        """The base and the increase by the factor: `AllParts` if the base has D, G and F, else `Parts`."""
         single = self.base.eval(wo, wi)
         return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density: the factor preserves the shape of the lobe."""
+        """The density of the base, since the factor preserves the shape of the lobe."""
         return self.base.pdf(wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """The base's sample, with the weight times the factor."""
+        """The base's sample, with its weight multiplied by the factor."""
         s = self.base.sample(wo, u, mode)
         return Sample(s.wi, s.weight * self._factor(wo), s.pdf, s.delta, s.eta)

@@ -33,14 +33,15 @@ FORMS = {
 class Eon(BSDF):
     """Energy-preserving Oren-Nayar: Fujii's single scattering plus compensation of its loss (Portsmouth2025).
 
-    f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg)
+    f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg),  mu = cos theta
     s = wo.wi - mu_o mu_i,  t = max(mu_o, mu_i) where s > 0, else 1,  A = 1 / (1 + (1/2 - 2 / (3 pi)) r)
-    E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1, in closed form; E_avg is its cosine-weighted mean
+    E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1; E_avg is its cosine-weighted mean
+    G = sin theta (theta - sin theta cos theta) + 2/3 (tan theta (1 - sin^3 theta) - sin theta)
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
     Unlike `oren-nayar`, it conserves all light at rho = 1 for any roughness and angle, has no dark ring at grazing
     angles, and becomes more saturated as roughness increases. Reciprocal. Sampled by a clipped linearly transformed
-    cosine, with a fraction of uniform directions (sec. 4 of the paper).
+    cosine, mixed with uniform directions (sec. 4 of the paper).
     """
 
     albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light reflected per bounce", low=0.0, high=1.0)
@@ -99,7 +100,7 @@ class Eon(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the uniform hemisphere or the clipped lobe."""
+        """u.x selects the uniform hemisphere or the clipped lobe."""
         r = self.roughness
         lobe = rotate_back(_Clipped(*_coefficients(wo, r)).draw(u.y, u.z), frame.azimuth(wo))
         phi = (2.0 * ops.pi) * u.z
@@ -136,13 +137,13 @@ class Eon(BSDF):
 
 @function
 def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
-    """Probability of a uniform direction, by the fit in eq. 39."""
+    """The probability of a uniform direction, by the fit in eq. 39."""
     return ops.pow(r, 0.1) * (0.162925 + mu * (-0.372058 + (0.538233 - 0.290822 * mu) * mu))
 
 
 @function
 def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that maps a cosine to the lobe, fitted.
+    """Fitted values a, b, c, d of the matrix M = ((a, 0, b), (0, c, 0), (d, 0, 1)), which maps a cosine to the lobe.
 
     The published fit is in powers of mu. Near the normal, b and d are then differences of nearly equal numbers, so here
     they are in powers of 1 - mu.
@@ -158,7 +159,7 @@ def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Sca
 
 
 class _Clipped:
-    """The cosine lobe transformed by that matrix, restricted to directions that are then above the surface.
+    """The cosine lobe transformed by the matrix M of `_coefficients`, restricted to directions above the surface.
 
     A direction h of the cosine lobe is mapped above the surface if d h_x + h_z > 0. This condition cuts half an ellipse
     from the disk of (h_x, h_y) and leaves the fraction (1 + v) / 2, with v = 1 / sqrt(1 + d^2). x is compressed

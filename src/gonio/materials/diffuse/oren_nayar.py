@@ -18,7 +18,7 @@ from .lambert import Lambert
 class OrenNayar(BSDF):
     """Diffuse reflection of a surface of Lambertian V-grooves, in the qualitative form (OrenNayar1994, sec. 4.4).
 
-    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a, b = max, min of theta_o, theta_i
+    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a = max(theta_o, theta_i), b = min(the same)
     A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
 
     No trigonometric function is evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and
@@ -60,7 +60,7 @@ class OrenNayar(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """cos theta_i / pi above the surface; the term of B is small and equally smooth."""
+        """cos theta_i / pi above the surface, since the term with B is small and equally smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method

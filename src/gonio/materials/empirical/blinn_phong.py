@@ -29,12 +29,12 @@ class BlinnPhong(_Empirical):
     }
 
     def _highlight_power(self) -> np.ndarray:
-        """An upper bound: int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and at most the 2 pi of the hemisphere."""
+        """An upper bound: the smaller of int cos^p 4 (v.h) dh <= 8 pi / (p + 1) and 2 pi, that of the hemisphere."""
         return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
 
     @function
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """n.h: cosine of the angle between the normal and the half vector."""
+        """n.h, the cosine of the angle between the normal and the half vector."""
         return half_vector(wo, wi).z
 
     @function
@@ -45,7 +45,7 @@ class BlinnPhong(_Empirical):
 
     @function
     def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of wi, 1/sr: that of h, (p + 1) / (2 pi) (n.h)^p, divided by 4 (v.h) (Walter2007, eq. 14)."""
+        """Density of wi, 1/sr: the density of h, (p + 1) / (2 pi) (n.h)^p, divided by 4 (v.h) (Walter2007, eq. 14)."""
         lobe = (self._exponent + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
         return safe_div(lobe, 4.0 * dot(wo, half_vector(wo, wi)))
 

@@ -21,10 +21,10 @@ from ..diffuse.lambert import Lambert
 class ModifiedPhong(BSDF):
     """Phong's lobe as a reciprocal, energy-conserving BRDF: f = kd / pi + ks (p + 2) / (2 pi) (v.r)^p.
 
-    r is the light direction mirrored about the normal; the base of the power is clamped to 0 (Lafortune1994). With the
-    normalization factor, ks is the albedo of the lobe at normal incidence; toward grazing angles, part of the lobe lies
-    below the surface and is lost. Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, and
-    `lafortune` generalizes this one.
+    v is wo, and r is wi mirrored about the normal; v.r is clamped to 0 (Lafortune1994). Because of the normalization
+    factor, ks is the albedo of the lobe at normal incidence; toward grazing angles, part of the lobe lies below the
+    surface and is lost. Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, and `lafortune`
+    generalizes this one.
     """
 
     kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse component", low=0.0, high=1.0, soft_high=True)
@@ -42,8 +42,8 @@ class ModifiedPhong(BSDF):
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of sampling the lobe: ks relative to ks + kd, where ks is reduced if the lobe is wide or partly
-        below the horizon.
+        """Probability of sampling the lobe: ks / (ks + kd), where ks is reduced if the lobe is wide or partly below
+        the horizon.
 
         With r = (p + 1) / 2 the peak density of the lobe divided by that of the cosine, a wide lobe is reduced by the
         factor ((r - 1/2) / (r + 1/2))^2.
@@ -68,7 +68,7 @@ class ModifiedPhong(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects a lobe; a direction below the surface is a failed sample."""
+        """u.x selects a lobe; a direction below the surface is a failed sample."""
         lobe = to_frame(mirror(wo), square_to_power_lobe(u.y, u.z, self.p))
         wi = where(u.x < self._share(wo), lobe, square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
@@ -76,7 +76,7 @@ class ModifiedPhong(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: no kd and ks with kd + ks = 1 return all light."""
+        """The material itself, since no kd and ks with kd + ks = 1 reflect all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:

@@ -60,11 +60,11 @@ class _Empirical(BSDF):
         return self.p
 
     def _highlight_power(self) -> np.ndarray:
-        """The maximum of int (highlight)^p dwi over all wo."""
+        """The maximum over all wo of int (highlight)^p dwi."""
         raise NotImplementedError
 
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """Base of the power: a cosine that is largest at the center of the highlight."""
+        """The base of the power: a cosine that is largest at the center of the highlight."""
         raise NotImplementedError
 
     def _peak(self, wo: Direction, wi: Direction) -> Scalar:
@@ -79,7 +79,7 @@ class _Empirical(BSDF):
 
     @function
     def _specular_share(self, wo: Direction) -> Scalar:
-        """Probability of the specular lobe: its fraction of the total power, with ks 2 pi / (p + 1) and kd pi."""
+        """Probability of the specular lobe: its fraction of the total power, ks 2 pi / (p + 1) + kd pi."""
         specular = mean(self.ks) * 2.0 / (self.p + 1.0)
         both = specular + mean(self.kd)
         return ops.safe_div(specular, both)
@@ -99,7 +99,7 @@ class _Empirical(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects a lobe; a direction below the surface is a failed sample."""
+        """u.x selects a lobe; a direction below the surface is a failed sample."""
         diffuse = square_to_cosine_hemisphere(u.y, u.z)
         specular = self._highlight_sample(wo, u.y, u.z)
         wi = where(u.x < self._specular_share(wo), specular, diffuse)
@@ -120,9 +120,10 @@ class _Empirical(BSDF):
 class Phong(_Empirical):
     """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
 
-    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. The
-    base of the power is clamped to 0, because an even p would otherwise cause a second highlight on the opposite side.
-    Light from below the surface contributes nothing. Neither reciprocal nor energy-conserving.
+    Ia and I are the ambient and the direct light, n is the normal, l = wi and v = wo. eval(wo, wi) =
+    kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. v.r is clamped to
+    0, because an even p would otherwise cause a second highlight on the opposite side. Light from below the surface
+    contributes nothing. Neither reciprocal nor energy-conserving.
     """
 
     def _highlight_power(self) -> np.ndarray:
@@ -131,15 +132,15 @@ class Phong(_Empirical):
 
     @function
     def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
-        """v.r: cosine of the angle between the viewer and the mirrored light."""
+        """v.r, the cosine of the angle between the direction to the viewer and the mirrored direction to the light."""
         return dot(wo, mirror(wi))
 
     @function
     def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of a cos^p lobe about the mirrored viewer, 1/sr."""
+        """Density of a cos^p lobe about the mirrored wo, 1/sr."""
         return square_to_power_lobe_pdf(dot(mirror(wo), wi), self._exponent)
 
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """A direction of a cos^p lobe about the mirrored viewer."""
+        """A direction sampled from a cos^p lobe about the mirrored wo."""
         return to_frame(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))

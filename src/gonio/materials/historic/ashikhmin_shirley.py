@@ -22,9 +22,9 @@ class AshikhminShirley(_Glossy):
     """Anisotropic Phong: f = diffuse term + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
     p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
-    n_x and n_y are `exponent`. F is Schlick's approximation, as in the paper, with F0 = ((eta - 1) / (eta + 1))^2. The
-    diffuse term is Lambertian or, if `coupled`, that of the paper: it excludes the light that F0 reflects, and fades
-    toward grazing angles. Reciprocal.
+    The exponents n_x and n_y are given by `exponent`. F is Schlick's approximation, as in the paper, with
+    F0 = ((eta - 1) / (eta + 1))^2. The diffuse term is Lambertian or, if `coupled`, that of the paper, which excludes
+    the light that F0 reflects and decreases toward grazing angles. Reciprocal.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -40,11 +40,11 @@ class AshikhminShirley(_Glossy):
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:
-        """`specular`: the weight of a sample is specular F (n.i) / max((n.o), (n.i))."""
+        """The bound `specular`, since the weight of a sample is specular F (n.i) / max((n.o), (n.i))."""
         return np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
-        """F, by the name of its formula, at the cosine of incidence on a facet."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -57,7 +57,8 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(n / (n + 9))^2, 0 for the flat lobe n = 0; its peak density is (n + 1) / 8 times that of the cosine."""
+        """(n / (n + 9))^2, which is 0 for the flat lobe n = 0, since the peak density of the lobe is (n + 1) / 8 times
+        that of the cosine."""
         n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
         return sqr((n - 1.0) / (n + 8.0))
 

@@ -63,7 +63,7 @@ class _Glossy(BSDF):
         raise NotImplementedError
 
     def _focus(self) -> Scalar | float:
-        """How much narrower the lobe is than the cosine, 0 to 1: a wide lobe is sampled better by the cosine."""
+        """A measure, from 0 to 1, of how much narrower the lobe is than the cosine, which samples a wide lobe better."""
         return 1.0
 
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -96,7 +96,7 @@ class _Glossy(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects a lobe; a direction below the surface is a failed sample."""
+        """u.x selects a lobe; a direction below the surface is a failed sample."""
         o = where(wo.z > 0.0, wo, normal_like(wo))
         share = self._share(o)
         pick = u.x < share
@@ -107,7 +107,7 @@ class _Glossy(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """Itself: the two terms are simply added, so no values of their parameters reflect exactly all light."""
+        """The material itself: the two terms are simply added, so no parameter values reflect exactly all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -116,7 +116,10 @@ class _Glossy(BSDF):
 
 
 def sum_breach(more: str = "") -> KnownViolation:
-    """The violation of energy conservation by a sum of two terms; `more` begins its reason with that of the lobe."""
+    """The violation of energy conservation by a sum of two terms.
+
+    more  a reason due to the lobe alone, which precedes that of the sum
+    """
     return KnownViolation(
         f"{more}the two terms are added, and nothing keeps their sum below 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
@@ -126,7 +129,7 @@ def sum_breach(more: str = "") -> KnownViolation:
 
 @function
 def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
-    """(half vector h, o.h). The cosine is half the length of o + i, which rounding never makes 0 or negative."""
+    """The half vector h, and o.h, computed as half the length of o + i, which rounding never makes 0 or negative."""
     total = wo + wi
     size = sqrt(maximum(dot(total, total), TINY))
     return total * (1.0 / size), 0.5 * size

@@ -42,18 +42,19 @@ class HeTorrance(_Glossy):
     """Wave optics of a Gaussian rough surface, the directional-diffuse term: f = diffuse / pi + specular F S G D / (pi
     (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
 
-    D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), where v is the tangential
-    component of o + i and g = (2 pi s / lambda (n.o + n.i))^2. The roughness of the unshadowed part of the surface is
-    s = sigma / sqrt(1 + w), where w e^w = x^2 and x is the sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi) over the
-    two directions. G, the factor of the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair: the vectors of
-    eq. 76 are orthonormal, and the other factors cancel. S is Smith masking for Beckmann's slopes of width
-    2 sigma / tau, times (1 + erf(cot / width)) / 2 for each direction, with the exponential that is missing from the
-    printed eq. 25 (Holzschuch2017).
+    D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), where lambda is the wavelength, v
+    is the length of the tangential component of o + i, and g = (2 pi s / lambda (n.o + n.i))^2. The roughness of the
+    unshadowed part of the surface is s = sigma / sqrt(1 + w), where w e^w = x^2 and x is the sum of
+    tan theta erfc(cot theta / width) / sqrt(8 pi) over the two directions, with width = 2 sigma / tau. G, the factor of
+    the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair: the vectors of eq. 76 are orthonormal, and the other
+    factors cancel. S is Smith masking for Beckmann slopes of this width, times (1 + erf(cot theta / width)) / 2 for each
+    direction, with the exponential that is missing from the printed eq. 25 (Holzschuch2017).
 
     As in Ngan2005, F is that of a real index, for unpolarized light, and there is no coherent (mirror) term, since
     measured tables do not contain it. Above g = 18, D is the limit of the series,
-    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal. Lengths are in nm; only their ratios matter.
-    Sampled by the visible normals of GGX, with the width of the series at its peak.
+    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), with h the angle between the half vector and n. Reciprocal.
+    Lengths are in nm; only their ratios matter. Sampled by the visible normals of GGX, with the width of the lobe at
+    its peak.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -70,12 +71,12 @@ class HeTorrance(_Glossy):
     }
 
     def reflectance(self, cos_theta: Scalar) -> Scalar:
-        """F, by the name of its formula, at the cosine of incidence on a facet."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
         return fresnel.kind(self.fresnel).dielectric(cos_theta, fresnel.cos_transmitted(cos_theta, self.eta), self.eta)
 
     @function
     def _width(self) -> Scalar:
-        """Width of the slopes, as Beckmann's alpha."""
+        """The width of the distribution of slopes, as Beckmann's alpha."""
         return 2.0 * self.sigma / self.tau
 
     @function
@@ -97,8 +98,8 @@ class HeTorrance(_Glossy):
 
     @function
     def _roughness2(self, x: Scalar) -> Scalar:
-        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82): an estimate within a few percent, then
-        Newton steps for w = x^2 e^-w, accurate to rounding errors."""
+        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82). An estimate of w within a few percent is
+        refined by Newton steps for w = x^2 e^-w to rounding errors."""
         x2 = sqr(x)
         log_x = log(1.0 + x2)
         w = log_x * (1.0 - log(1.0 + log_x) / (2.0 + log_x))
@@ -135,7 +136,7 @@ class HeTorrance(_Glossy):
 
     @function
     def _peak(self, wo: Direction) -> tuple[Pair, Scalar]:
-        """(width of the lobe in half vectors about the mirror direction, g there), for the mean wavelength.
+        """The width of the lobe of half vectors at the mirror direction, and g there, for the mean wavelength.
 
         The terms near m = 1 + g dominate: exp(-(pi tau v / lambda)^2 / m), with v = 2 (n.o) tan h.
         """

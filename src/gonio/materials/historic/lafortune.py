@@ -23,10 +23,10 @@ class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
     The three factors C are cx, cy and cz, n is `exponent`, and the base of the power is clamped to 0 (Lafortune1997,
-    eq. 4). C = (-1, -1, 1) is Phong's lobe about the mirror direction, normalized (Lafortune1994), which Ngan2005 calls
-    Blinn-Phong. A smaller cz tilts the lobe toward the horizon, and positive cx and cy cause retro-reflection. The
-    largest |C| should be 1, as in the normalization of Ngan2005: a smaller one scales the lobe by its n-th power.
-    Reciprocal. Sampled by a power lobe about (C o_x, C o_y, C o_z).
+    eq. 4). C = (-1, -1, 1) gives Phong's lobe about the mirror direction, normalized (Lafortune1994), which Ngan2005
+    calls Blinn-Phong. A cz below 1 tilts the lobe toward the horizon, and positive cx and cy cause retro-reflection.
+    The largest |C| should be 1, as in the normalization of Ngan2005, since the lobe scales with its n-th power.
+    Reciprocal. Sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -41,7 +41,7 @@ class Lafortune(_Glossy):
 
     @property
     def isotropic(self) -> bool:
-        """Whether x and y have equal factors; False for a recording, whose values are unknown."""
+        """Whether cx and cy are equal; False for a recording, whose values are unknown."""
         if isinstance(self.cx, Node):
             return False
         return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
@@ -53,8 +53,8 @@ class Lafortune(_Glossy):
 
     @function
     def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
-        """(unit axis of the lobe, n-th power of its length before normalization). The power is computed from
-        1 - length^2, since for a large n a rounded length close to 1 has too few digits."""
+        """The unit axis of the lobe, and the n-th power of its length before normalization. The power is computed from
+        1 - length^2, since for a large n a rounded length close to 1 is too inaccurate."""
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)

@@ -21,8 +21,8 @@ from .glossy import _Glossy, facet, sum_breach
 class LowMicrofacet(_Glossy):
     """Microfacets with a power-law distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
-    D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of its peak. G is that of V-grooves,
-    and the factor 1 / pi is that of Cook1982. Reciprocal. Sampled by the power law of D.
+    D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of the peak of D. G is that of
+    V-grooves, and the factor 1 / pi is that of Cook1982. Reciprocal. Sampled by the power law of D.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -36,19 +36,19 @@ class LowMicrofacet(_Glossy):
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """16 specular m, with m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and
+        """The bound 16 specular m, with m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and
         G (o.h) <= 2 (n.o)."""
         b, c = np.asarray(self.b, float), np.asarray(self.c, float)
         log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
         return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F, by the name of its formula, at the cosine of incidence on a facet."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _fall(self, h: Direction) -> Scalar:
-        """(1 + b (1 - n.h))^-c, with 1 - n.h from the sine, since the difference cancels at the peak."""
+        """(1 + b (1 - n.h))^-c, with 1 - n.h computed from the sine, since the difference cancels at the peak."""
         return exp(-self.c * log(1.0 + self.b * frame.sin2(h) / (1.0 + h.z)))
 
     @function

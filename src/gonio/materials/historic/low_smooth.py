@@ -39,10 +39,10 @@ class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
     Dp, the tangential component of o + i, is the deviation of the pair from mirror reflection; the lobe follows the
-    power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |o - i|^2 / 4),
-    where o - i is the tangential component, too: for a mirrored pair, this is the cosine of incidence. Reciprocal.
+    power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |q|^2 / 4), where
+    q is the tangential component of o - i; for a mirrored pair, this is the cosine of incidence. Reciprocal.
     `specular` is the height of the peak divided by F, 1/sr, not an albedo. Sampled by the lobe's power law, truncated
-    near the rim of the disk of directions.
+    near the rim of the disk of projected directions.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -56,11 +56,11 @@ class LowSmooth(_Glossy):
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("the lobe is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """specular times the lobe's integral over a disk of radius 2, the maximum of |Dp|."""
+        """`specular` times the lobe's integral over a disk of radius 2, the maximum of |Dp|."""
         return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F, by the name of its formula, at the cosine of incidence on a facet."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -83,8 +83,8 @@ class LowSmooth(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(1 - 1 / r)^2, with r = 1 / (2 mass) the peak density of the lobe divided by the cosine's, which is uniform
-        on the disk."""
+        """(1 - 1 / r)^2, with r = 1 / (2 mass) the peak density of the lobe divided by that of the cosine, which is
+        uniform on the disk."""
         mass = self._mass(ops.ones_like(self.b))
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
@@ -99,8 +99,9 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A step of the power law from the mirrored wo on the disk of directions, in a uniform azimuth, truncated at
-        the rim or at `RIM`, whichever is farther; a step beyond the rim is a failed sample."""
+        """A direction found on the disk of projected directions by a step from the mirrored wo in a uniform azimuth. The
+        length of the step follows the power law, truncated at the rim or at `RIM`, whichever is farther; a step beyond
+        the rim is a failed sample."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c
@@ -113,7 +114,8 @@ class LowSmooth(_Glossy):
         return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F times the lobe's integral over a disk of radius 1, about its full integral at normal incidence."""
+        """specular F times the lobe's integral over a disk of radius 1, which is that over all directions at normal
+        incidence."""
         return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(ops.ones_like(wo.z)))
 
 
@@ -124,9 +126,10 @@ class Rim(NamedTuple):
 
 @function
 def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
-    """Distances from the mirrored wo to the rim of the unit disk, ahead in the azimuth (c, s) and behind.
+    """Distances from the mirrored wo to the rim of the unit disk, along the azimuth (c, s) and opposite to it.
 
-    They are the roots of |p + r d|^2 = 1. One of them would cancel; it follows from their product, -(n.o)^2.
+    They are the roots r of |p + r d|^2 = 1, with p the mirrored wo on the disk and d = (c, s). One of them would
+    cancel, so it is computed from their product, -(n.o)^2.
     """
     along = wo.x * c + wo.y * s
     root = sqrt(sqr(along) + sqr(wo.z))
@@ -142,6 +145,6 @@ def _deviation2(wo: Direction, wi: Direction) -> Scalar:
 
 
 def _area(b: np.ndarray, c: np.ndarray, radius: float) -> np.ndarray:
-    """2 pi int_0^radius (1 + b r^2)^-c r dr, of plain numbers."""
+    """2 pi int_0^radius (1 + b r^2)^-c r dr, for plain numbers."""
     log_t, q = np.log1p(b * radius**2), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
     return np.pi / b * np.expm1(q * log_t) / q

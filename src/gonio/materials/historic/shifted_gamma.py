@@ -40,15 +40,15 @@ class ShiftedGamma(_Glossy):
     """Microfacets with a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
     (Bagher2012).
 
-    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha
-    G = G1(o) G1(i) with G1 = 1 + Lambda (1 - exp(t^k)), t = (theta - theta0) / reach; G1 = 1 below theta0
-    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos
+    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha, for the angle h between half vector and n
+    G = G1(o) G1(i) with G1 = 1 + Lambda (1 - exp(t^k)), t = (theta - theta0) / reach; G1 = 1 for theta < theta0
+    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos, with cos = o.h
 
     The angle `reach` replaces the paper's c = reach^-k, which exceeds 1e100 in its fits. D integrates to 1 if
     normalization = 1 / (alpha Gamma(1 - p, alpha)). All values are fitted: F can exceed 1 and, for f1 > f0, be
-    negative; G1 and the lobe can be negative at the horizon, as published. Reciprocal. Sampled by a power law and an
-    exponential, which together approximate D within a factor of e, for the smallest and the largest width of the
-    channels.
+    negative; G1 and the lobe can be negative at the horizon, as published. Reciprocal. Sampled, for the smallest and
+    the largest alpha of the channels, by a power law and an exponential, which together approximate D within a factor
+    of e.
 
     The presets are the fits of Bagher2012 to the materials of the MERL database.
     """
@@ -103,30 +103,30 @@ class ShiftedGamma(_Glossy):
 
     @function
     def _widths(self) -> tuple[Scalar, Scalar, Scalar]:
-        """(smallest alpha, largest alpha, mean p) of the channels."""
+        """The smallest alpha, the largest alpha and the mean p of the channels."""
         return -max_component(-self.alpha), max_component(self.alpha), mean(self.p)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the densities for the two widths, divided by 4 (o.h)."""
+        """Mixture of the densities for the smallest and the largest alpha, divided by 4 (o.h)."""
         h, cos = facet(wo, wi)
         narrow, wide, p = self._widths()
         return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / cos
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """wo mirrored about a half vector for one of the two widths."""
+        """wo mirrored about a half vector sampled for the smallest or the largest alpha."""
         narrow, wide, p = self._widths()
         return frame.reflect(wo, _gamma_sample(u.y, u.z, where(u.x < 0.5, narrow, wide), p))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """4 / pi specular F G, G at the mirrored direction: the albedo of a narrow lobe."""
+        """4 / pi specular F G, with G for the mirror direction: the albedo of a narrow lobe."""
         return self.specular * self.reflectance(wo.z) * sqr(self._shadowing(wo)) * (4.0 * inv_pi)
 
 
 @function
 def _parts(alpha: Scalar, p: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """(s, log(s / alpha), int x^-p dx from alpha to s divided by alpha^(1 - p)), with s = max(1, alpha).
+    """s = max(1, alpha), log(s / alpha), and the integral of x^-p from alpha to s divided by alpha^(1 - p).
 
     The sampling density in x is x^-p up to s and s^-p e^-x beyond, where its integral is s^-p e^-s. D in x is this
     density times a factor between 1 / e and 1.

@@ -19,8 +19,8 @@ class Ward(_Glossy):
 
     e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), with the half vector h (Walter2005). Reciprocal. The
     albedo of a narrow lobe is specular cos theta_o, so it loses energy toward grazing angles; a wide lobe, which
-    extends toward the normal, gains energy without bound there. Sampled by the distribution of all half vectors, with
-    density D (n.h), where D is Beckmann's.
+    extends toward the normal, gains energy without bound there. Sampled by half vectors with density D (n.h), where D
+    is Beckmann's distribution.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -40,7 +40,7 @@ class Ward(_Glossy):
 
     @function
     def _shape(self, wo: Direction, wi: Direction) -> Scalar:
-        """f of the lobe divided by specular D: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
+        """f of the lobe divided by specular D, which is (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
         h, _ = facet(wo, wi)
         return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
 
@@ -51,7 +51,8 @@ class Ward(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2, with r = 1 / (4 alpha_x alpha_y) the peak density of the lobe divided by the cosine's."""
+        """(r / (1 + r))^2, with r = 1 / (4 alpha_x alpha_y) the peak density of the lobe divided by that of the
+        cosine."""
         return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
 
     @function

@@ -48,18 +48,20 @@ class Coat(BSDF):
 
     f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
-    T = 1 - R is the transmittance of the top, o' and i' are the refracted directions, t = exp(-absorption depth / cos)
-    is Beer's law along them, and eta^2 is the change of solid angle. Light that bounces more than once is represented
-    by the base's own lobe, with the factor g, and by a separable rest (see `interior.py`). This is exact over Lambert;
-    over a metal, the albedo is exact, per channel. Reciprocal; a white coat on a white base conserves all light.
+    f_top is the reflection at the top, with albedo R, and T = 1 - R is the top's transmittance; o' and i' are the
+    directions refracted into the coat, t = exp(-absorption depth / cos) is the transmittance of one crossing along
+    them, and 1 / eta^2, with eta = `index`, is due to the change of solid angle. Light that bounces more than once is
+    represented by the base's own lobe, multiplied by g, and by the separable lobe rest(o) rest(i) / norm (see
+    `interior.py`). This is exact over Lambert; over a metal, the albedo is exact, per channel. Reciprocal; a clear coat
+    on a white base conserves all light.
 
     With `bounces="white"`, g and rest are those of a white base: the coated material reflects R plus (1 - R) times
     the color of the base, which becomes neither darker nor more saturated.
 
     The base is embedded in the coat, so its own index is relative to the coat. A rough top reflects like rough glass,
-    with albedo R; refracted light is not blurred. g and rest are tables that are computed on first use. Colors of the
-    base may vary over the surface, as may the coat's own absorption and depth, which are axes of the tables; other
-    values may not, and derivatives omit the change of the tables.
+    with albedo R; refracted light is not blurred. g and rest are read from tables that are computed on first use.
+    Colors of the base may vary over the surface, as may the coat's own absorption and depth, which are axes of the
+    tables; other values must not vary, and derivatives with respect to them omit the change of the tables.
     """
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"index": 1.0, "absorption": 0.0}, equals=lambda one: one.base),)
@@ -124,7 +126,7 @@ class Coat(BSDF):
 
     @function
     def _through(self, w: Direction) -> Scalar:
-        """Factor on the base's lobe for each direction: T by Fresnel's equations; for a rough top from the table."""
+        """The top's factor on the base's lobe, per direction: T by Fresnel's equations, or from the table if rough."""
         _, smooth = widths(self.alpha)
         return where(smooth, self._sharp(w), self._at(w)[2])
 
@@ -136,7 +138,7 @@ class Coat(BSDF):
         return exact.transmittance(cos, cos_t, self.index)
 
     def _at(self, w: Direction) -> tuple[Scalar, ...]:
-        """The coat's table at a direction outside."""
+        """The entry of the coat's table for a direction outside."""
         table = self._tables.coat
         at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
         return ops.lookup(table, at)
@@ -164,7 +166,8 @@ class Coat(BSDF):
         return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
-        """(factor on the base's lobe, the separable lobe) for bounces between the coat and a base of color a."""
+        """The factor g on the base's lobe, and the separable lobe, for bounces between the coat and a base of color
+        a."""
         bounce_color = ops.ones_like(a) if self.bounces == "white" else a
         u = self._crossed() + ops.zeros_like(a)
         tables, ends = self._tables, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
@@ -194,8 +197,8 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of light from below the top, probability of the cosine within it). The cosine samples the
-        separable lobe, and replaces samples of the base that would fail because of total reflection."""
+        """The probability of light from below the top, and, given such light, that of sampling the cosine. The cosine
+        samples the separable lobe, and replaces samples of the base that would fail because of total reflection."""
         reflected, even, _, beyond = self._at(wo)
         _, smooth = widths(self.alpha)
         cos = ops.abs(wo.z)
@@ -224,7 +227,7 @@ class Coat(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the top, the cosine or the base; a base sample that is totally reflected is a failed sample."""
+        """u.x selects the top, the cosine or the base; a base sample that is totally reflected is a failed sample."""
         shares = self._shares(wo)
         over, by_base = 1.0 - shares.x, 1.0 - shares.y
         on_top = u.x >= shares.x
@@ -258,26 +261,26 @@ class Coat(BSDF):
 
     @function
     def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:
-        """T^2 t^2 / (1 - a k) for a mirror, k = (1 - T) t^2."""
+        """T^2 t^2 / (1 - a k) for a mirror of color a, with k = (1 - T) t^2."""
         through, left2 = self._through(wo), sqr(self._left(inner))
         k = (1.0 - through) * left2
         tint = self.base.tint(inner)
         return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
 
     def lossless(self) -> Self:
-        """The coat over the lossless base, without absorption."""
+        """The coat over the lossless variant of the base, without absorption."""
         white = self.base.lossless()
         values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
         return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
 
     @property
     def fixed(self) -> frozenset[str]:
-        """All parameters except colors of the base and the coat's own absorption and depth: tables depend on them."""
+        """The parameters on which the tables depend: all except the base's colors and the coat's absorption and depth."""
         numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
         return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
 
     def tint(self, wo: Direction) -> Spectrum:
-        """R, plus the attenuated tint of the base."""
+        """R plus the tint of the base, attenuated by the coat."""
         through = self._through(wo)
         return (1.0 - through) + through * sqr(self._left(self._inside(wo))) * self.base.tint(self._inside(wo))
 

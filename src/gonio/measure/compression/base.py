@@ -17,7 +17,7 @@ ONE_WAY = 0.01  # relative change of f by swapping wo and wi above which a full 
 
 
 class Method:
-    """A method to represent a table in fewer bytes.
+    """A method of representing a table in fewer bytes.
 
     name    its name on the command line
     shared  whether several materials are represented together, in one file, with shared data
@@ -28,8 +28,11 @@ class Method:
     shared: ClassVar[bool] = False
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        """Tables of kinds that `.gonio` files hold, in about `size` bytes per material, or in the fixed size of the
-        kind. Raises InputError for tables to which the method does not apply."""
+        """The compressed tables, of kinds that `.gonio` files can hold.
+
+        size  bytes per material, approximately; ignored by a kind of fixed size
+        Raises InputError for tables to which the method does not apply.
+        """
         raise NotImplementedError
 
 

@@ -82,7 +82,10 @@ class Logs:
 
 
 def coded(cls: type[T], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> T:
-    """A half-vector table from numbers by frequency; `shared` bytes of `more` are not counted."""
+    """A half-difference table from its coefficients, in a file of about `size` bytes.
+
+    more    further arrays of the table; `shared` of their bytes are not counted
+    """
     return rounded(cls, logs.table, numbers, {**logs.stored, **more}, (logs.table.turn, logs.offset), size, shared)
 
 
@@ -90,10 +93,11 @@ def rounded(
     cls: type[C], source: Measurement, numbers: Floats, stored: Stored, scale: tuple[float, float], size: int,
     shared: int = 0,
 ) -> C:  # fmt: skip
-    """A table whose numbers are rounded as finely as a file of `size` bytes allows.
+    """A table whose coefficients are rounded as finely as a file of `size` bytes allows.
 
-    stored  the table's other arrays; `shared` of their bytes are not counted
-    scale   turn and offset, between which the step is inserted
+    numbers  the coefficients
+    stored   the table's other arrays; `shared` of their bytes are not counted
+    scale    turn and offset, between which the step is inserted
     """
     own = Own()
     about = {"title": source.title, "source": source.source}
@@ -114,7 +118,8 @@ def rounded(
 
 
 def least(fits: Callable[[float], bool], low: float, high: float) -> float | None:
-    """Approximately the smallest number that fits, if larger ones do; None if none does."""
+    """Approximately the smallest number in [low, high] for which `fits` holds, provided that it then holds for all
+    larger numbers; None if it holds for none."""
     if not fits(high):
         return None
     low, high = np.log(low), np.log(high)

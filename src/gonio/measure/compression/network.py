@@ -37,7 +37,10 @@ class NetworkMethod(Method):
 def trained(table: Measurement, seed: int = 1) -> Network:
     """The network of a table, trained in about half a minute: by Adam in Dr.Jit, then by Levenberg-Marquardt.
 
-    The loss is |log(f + c) - log(f' + c)| over the cells of a half-difference table; c is a fraction of the median.
+    The loss is |log(f + c) - log(f' + c)|, where f' is the network's value, averaged over the cells of a
+    half-difference table; c is a fraction of the median.
+
+    seed  seed of the initial weights and of the batches
     """
     data = Data.of(over_half_vectors(table))
     rng = np.random.default_rng([seed, 97])
@@ -51,7 +54,11 @@ def trained(table: Measurement, seed: int = 1) -> Network:
 
 @dataclass(frozen=True)
 class Data:
-    """The training data: (hx, hy, hz, dx, dy, dz) of pairs, (6, N), log(f + offset), (3, N), and the offset."""
+    """The training data.
+
+    inputs  (6, N), half and difference vectors of pairs: hx, hy, hz, dx, dy, dz
+    logs    (3, N), log(f + offset)
+    """
 
     inputs: Floats32
     logs: Floats32

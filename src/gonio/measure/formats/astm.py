@@ -79,7 +79,7 @@ class Astm(Format):
         return (head + written(np.concatenate([directions, values], axis=1), ",")).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples and grids unchanged; other tables as values at the directions of a goniometer's plan."""
+        """Samples and grids are unchanged; other tables are evaluated at the directions of a goniometer's plan."""
         if isinstance(source, Samples | Angles):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)

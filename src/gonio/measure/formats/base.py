@@ -31,13 +31,14 @@ class Format:
     several: ClassVar[bool] = False  # whether a file holds several materials
 
     def fits(self, data: bytes) -> bool:
-        """Whether a file with its suffix is of this format, if formats share the suffix."""
+        """Whether a file with a suffix of this format is of this format, for formats that share a suffix."""
         return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
         """The table in a file's bytes. Raises InputError if they are of another format.
 
-        item  the material, in files that hold several
+        where  name of the file, for errors
+        item   the material, in files that hold several
         """
         raise NotImplementedError
 
@@ -50,7 +51,8 @@ class Format:
         raise NotImplementedError
 
     def items(self, data: bytes, where: str) -> list[str]:
-        """The names of the materials in a file that holds several; empty for others."""
+        """The names of the materials in a file that holds several; empty for other files. `where` names the file in
+        errors."""
         return []
 
 
@@ -58,14 +60,17 @@ Format.family = Family("format", "gonio.formats", ["gonio.measure.formats"], ins
 
 
 def by_suffix(path: str | Path) -> list[Format]:
-    """The formats of a file's suffix, the one with the suffix listed first before others."""
+    """The formats with a file's suffix; those whose first suffix it is come first."""
     suffix = Path(path).suffix.lower()
     formats = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
     return sorted(formats, key=lambda one: one.suffixes.index(suffix))
 
 
 def contents(path: Path, where: str = "") -> bytes:
-    """A file's bytes. Raises InputError if it cannot be read, or is larger than any table."""
+    """A file's bytes. Raises InputError if it cannot be read, or is larger than any table can be.
+
+    where  name of the file in errors; "": its path
+    """
     try:
         size = path.stat().st_size
         if not path.is_file():

@@ -73,7 +73,7 @@ class Cornell(Format):
         return (head + written(np.concatenate([table.directions, values], axis=1))).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples unchanged; other tables as values at the directions of a goniometer's plan."""
+        """Samples are unchanged; other tables are evaluated at the directions of a goniometer's plan."""
         if isinstance(source, Samples):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)

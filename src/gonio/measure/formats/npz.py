@@ -19,8 +19,11 @@ LARGEST = 1 << 28  # bytes of all arrays together if they are compressed: deflat
 
 
 def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The arrays in a file, by name. Raises InputError if the file is not a zip file, is damaged, or holds objects
-    (pickles)."""
+    """The arrays in a file, by name.
+
+    where  name of the file, for errors
+    Raises InputError if the file is not a zip file, is damaged, or holds objects (pickles).
+    """
     if data[-22:-18] != b"PK\5\6":  # the end of an archive without a comment
         raise InputError("it does not end like a .npz file", where, "the file is truncated, longer, or not a .npz")
     try:

@@ -85,7 +85,10 @@ class Rgl(Format):
 
 
 def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The fields of a tensor file, as views into its bytes: nothing is allocated beyond the file's size."""
+    """The fields of a tensor file, as views into its bytes: nothing is allocated beyond the file's size.
+
+    where  name of the file, for errors
+    """
     place = len(MAGIC)
 
     def take(form: str) -> tuple[int, ...]:
@@ -131,7 +134,7 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
 
 
 def written(fields: Mapping[str, NDArray[np.generic]]) -> bytes:
-    """A tensor file."""
+    """The bytes of a tensor file with these fields."""
     numbers = {np.dtype(text): number for number, text in TYPES.items()}
     arrays = {name: np.ascontiguousarray(array) for name, array in fields.items()}
     start = len(MAGIC) + 6 + sum(13 + len(name.encode()) + 8 * array.ndim for name, array in arrays.items())

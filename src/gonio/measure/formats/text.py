@@ -13,7 +13,7 @@ LONGEST = 1 << 20  # characters of a line
 
 
 def lines(data: bytes, where: str) -> list[str]:
-    """The lines of a text file, without line ends; raises InputError if it is not text."""
+    """The lines of a text file, without line ends. Raises InputError, which names `where`, if it is not text."""
     if b"\0" in data:
         raise InputError("not a text file: it contains zero bytes", where)
     try:
@@ -27,7 +27,7 @@ def lines(data: bytes, where: str) -> list[str]:
 
 
 def numbers(words: list[str], where: str, line: int) -> list[float]:
-    """Words as finite numbers."""
+    """Convert words to finite numbers. Raises InputError, which names file and line, if one is not."""
     values = []
     for word in words:
         try:
@@ -41,7 +41,11 @@ def numbers(words: list[str], where: str, line: int) -> list[float]:
 
 
 def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[np.float64]:
-    """Rows of `width` numbers each, (N, width); rows are given with their line numbers."""
+    """Convert rows of words to numbers, (N, width).
+
+    rows   line number and words of each row
+    where  name of the file, for errors
+    """
     for line, row in rows:
         if len(row) != width:
             raise InputError(f"{len(row)} numbers in a row, {width} expected", f"{where}:{line}")
@@ -56,5 +60,5 @@ def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[
 
 
 def written(values: NDArray[np.float64], separator: str = " ") -> str:
-    """Rows of numbers with all digits of float64."""
+    """Rows of numbers as text, with all digits of float64."""
     return "\n".join(separator.join(f"{x:.17g}" for x in row) for row in values) + "\n"

@@ -26,12 +26,14 @@ class Adaptive(Measurement):
     """A table over warped half vectors, for each direction of view (Dupuy2018, sec. 4).
 
     A half vector m is a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). For each direction of
-    view the visible normals have a density `vndf` there; the numbers s that would sample m from it are the coordinates
-    of the values: f cos theta_i = rgb(s) ndf(u) / (4 sigma). The table is therefore dense where the lobe is.
+    view, `vndf` is the density of the visible normals over this square. The table's own coordinates are the two numbers
+    s from which sampling this density yields m: f cos theta_i = rgb(s) ndf(u) / (4 sigma). The table is therefore dense
+    where the lobe is.
 
-    arrays: phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
-    luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all bilinear between nodes on the edges.
-    Isotropic if phi_i has at most 2 entries. Beyond the last angle of view, the values at the last one are used.
+    The arrays are phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
+    luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all are bilinear between nodes, which
+    include the edges. The table is isotropic if phi_i has at most 2 entries. Beyond the last angle of view, the values
+    at the last one are used.
     """
 
     name = "adaptive"
@@ -188,7 +190,8 @@ class Adaptive(Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def nodes(self) -> tuple[Floats, Floats, Floats]:
-        """wo and wi for every value of an isotropic table, (theta_i, y, x, 3), and the factor of the value."""
+        """wo and wi for every value of an isotropic table, (theta_i, y, x, 3), and f cos theta_i divided by the
+        value."""
         types = backend.types("float64")
         shape = (len(self.theta), *self.luminance.shape[2:])
         view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))

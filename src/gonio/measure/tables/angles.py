@@ -45,7 +45,8 @@ class Angles(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, theta_r and phi; values: values per node and channel."""
+        """grid: the nodes of theta_i, theta_r and phi; values: f, one per node and channel; where: the file, for
+        errors."""
         super().__init__(title, source, wavelengths)
         theta_i, theta_r, phi = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -108,7 +109,7 @@ class Angles(Guided, Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The values; if reciprocity gives the others, as (pair, phi, channel) of theta_i <= theta_r only."""
+        """The values; only those with theta_i <= theta_r, as (pair, phi, channel), if reciprocity gives the others."""
         values = self.values
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -140,7 +141,8 @@ class Angles(Guided, Measurement):
 
 
 def nodes(thetas: int = 46, phis: int = 73) -> tuple[Floats, Floats]:
-    """Angles to tabulate, the last slightly above the horizon: f has a limit there, eval is 0."""
+    """`thetas` polar and `phis` azimuth angles to tabulate. The last polar angle is slightly above the horizon, where
+    f has a limit and eval is 0."""
     theta = np.linspace(0.0, 0.5 * np.pi, thetas)
     theta[-1] -= 1e-3
     # denser around the mirror direction, |phi| = pi

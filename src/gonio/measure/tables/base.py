@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 class Measurement:
-    """Values of a BRDF over directions, as stored, with their metadata.
+    """Values of a BRDF at pairs of directions, as stored, with their metadata.
 
     name         name of the kind: "half-difference", ...
     title        title of the measured material, from the file
@@ -61,12 +61,12 @@ class Measurement:
 
     @property
     def reciprocal(self) -> bool:
-        """Whether swapping wo and wi changes nothing, also between the stored values."""
+        """Whether swapping wo and wi changes nothing, including values interpolated between the stored ones."""
         return False
 
     @property
     def mirrored(self) -> bool:
-        """Whether it is mirror-symmetric to the last digit, also between the stored values."""
+        """Whether it is mirror-symmetric to the last digit, including values interpolated between the stored ones."""
         return False
 
     sums: ClassVar[bool] = False  # whether lookups search cumulative sums
@@ -76,7 +76,7 @@ class Measurement:
         return albedo(self, np.radians(ANGLES))
 
     def albedos(self) -> Floats:
-        """The directional albedo at `ANGLES` of view, (N, 3), from 4096 samples each, with errors of a few 0.001."""
+        """The directional albedo at the view angles `ANGLES`, (N, 3), from 4096 samples each: within a few 0.001."""
         return self._albedos
 
     @property
@@ -94,7 +94,7 @@ class Measurement:
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """Its arrays, as `.gonio` files hold them: axes in radians, values in 1/sr."""
+        """The table's arrays, as `.gonio` files hold them: axes in radians, values in 1/sr."""
         raise NotImplementedError
 
     @classmethod
@@ -134,7 +134,8 @@ POINTS = 4096  # samples per albedo
 
 
 def albedo(table: Measurement, theta: Floats) -> Floats:
-    """int f cos theta_i d omega_i at angles of view, (N, 3), by the table's own samples on a lattice."""
+    """int f cos theta_i d omega_i at view angles theta [rad], (N, 3), from the table's own samples at the points of a
+    lattice."""
     types = backend.types("float64")
     lattice = r_sequence(POINTS, 3, shift=0.5)
     albedos = []
@@ -164,7 +165,11 @@ def above(wo: Direction, wi: Direction) -> Mask:
 
 
 def in_rgb(values: Floats, wavelengths: Floats | None, where: str = "") -> Floats:
-    """Values with channels last as red, green, blue: spectra are viewed under D65, a single channel is gray."""
+    """Values with channels last as red, green, blue: spectra are viewed under D65, a single channel is gray.
+
+    wavelengths  nm, one per channel; None for values without wavelengths
+    where        the file, for errors
+    """
     channels = values.shape[-1]
     if wavelengths is not None:
         return values @ colours.to_rgb(wavelengths)
@@ -187,7 +192,8 @@ def padded(values: Floats) -> Floats:
 
 
 def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: float) -> Floats:
-    """An axis as float64: finite, increasing, within its range up to rounding. Raises InputError otherwise."""
+    """An axis as float64. Raises InputError, which names `where` and the axis, unless it is finite, increasing and
+    within [low, high] up to rounding."""
     nodes = np.asarray(values, np.float64)
     if nodes.ndim != 1 or len(nodes) < 1 or not np.all(np.isfinite(nodes)):
         raise InputError(f"the axis {name} is not a list of finite numbers", where)
@@ -199,7 +205,7 @@ def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: f
 
 
 def finite(values: NDArray[np.generic], name: str, where: str) -> Floats:
-    """Values as float64. Raises InputError if one is not finite."""
+    """Values as float64. Raises InputError, which names `where` and `name`, if one is not finite."""
     array = np.asarray(values, np.float64)
     bad = int(np.size(array) - np.count_nonzero(np.isfinite(array)))
     if bad:

@@ -33,7 +33,7 @@ class LogAdaptive(Rebuilt):
     }
 
     def __init__(self, stored: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
-        """stored  its arrays: those of `Rebuilt` without luminance and values; cells, scale (1, step, offset)"""
+        """stored  the arrays of `Rebuilt` without luminance and values, and cells, scale (1, step, offset), codes"""
         self.stored = dict(stored)
         shape, _, step, offset = head(stored, where)
         views = np.size(stored["phi_i"]), np.size(stored["theta_i"])

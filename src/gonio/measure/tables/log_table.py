@@ -52,11 +52,11 @@ class LogTable(HalfDifference):
         super().__init__(values, turn, where=where, **about)
 
     def frequencies(self, stored: Mapping[str, NDArray[np.generic]], shape: tuple[int, ...], where: str) -> Shape:
-        """The number of coefficients along each axis."""
+        """The number of coefficients along each axis; `where` is the file, for errors."""
         return shape[0], shape[1], shape[2]
 
     def synthesis(self, numbers: Floats, shape: Shape) -> Floats:
-        """The logarithms, (theta_h, theta_d, phi_d, 3), from numbers by frequency."""
+        """The logarithms, (theta_h, theta_d, phi_d, 3), from the coefficients `numbers`."""
         return from_cosines(numbers)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
@@ -71,7 +71,7 @@ Shape = tuple[int, int, int]
 
 
 def head(stored: Mapping[str, NDArray[np.generic]], where: str) -> tuple[Shape, float, float, float]:
-    """(cells along each axis, turn, step, offset); raises InputError if they are invalid."""
+    """(cells along each axis, turn, step, offset). Raises InputError, which names `where`, if they are invalid."""
     cells = [int(x) for x in np.asarray(stored["cells"]).ravel()]
     scale = np.asarray(stored["scale"], np.float64).ravel()
     if len(cells) != 3 or min(cells) < 2 or cells[0] * cells[1] * cells[2] > LARGEST:
@@ -127,7 +127,7 @@ def packed(numbers: Ints) -> NDArray[np.uint8]:
 
 
 def unpacked(codes: NDArray[np.generic], shape: Shape, where: str = "") -> Floats:
-    """The numbers of `packed`, (..., 3). Raises InputError for other bytes."""
+    """The inverse of `packed`, (..., 3). Raises InputError, which names `where`, for bytes that are not its result."""
     row = 3 * PLANES
     most = row * shape[0] * shape[1] * shape[2]
     try:

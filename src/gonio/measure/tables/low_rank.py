@@ -19,7 +19,7 @@ class LowRank(LogTable):
     """A table of log(f + offset) as core x basis x basis x basis, one basis per axis (Tucker1966).
 
     The bases are the leading singular vectors of the slices along each axis, of one material or of several, which then
-    share them in one file. The core's numbers are integers, times `step`.
+    share them in one file. The core's numbers are integers times `step`.
     """
 
     name = "low-rank"

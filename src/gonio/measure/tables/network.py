@@ -44,7 +44,7 @@ class Network(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: NDArray[np.float64] | None = None,
     ) -> None:
-        """weights  float32 by the names in `SHAPES`"""
+        """weights  float32 arrays, by the names in `SHAPES`"""
         super().__init__(title, source)
         self.weights: dict[str, NDArray[np.float32]] = {}
         for part, shape in SHAPES.items():

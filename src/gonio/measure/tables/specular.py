@@ -43,7 +43,8 @@ class Specular(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, azimuth and radial; values: values per node and channel."""
+        """grid: the nodes of theta_i, azimuth and radial; values: f, one per node and channel; where: the file, for
+        errors."""
         super().__init__(title, source, wavelengths)
         theta_i, azimuth, radial = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -135,7 +136,8 @@ def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scal
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes, or above nodes that lie too low."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes; for a node below the horizon or close to
+    it, slightly above the horizon."""
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
     radial = np.radians(

@@ -251,7 +251,7 @@ class Stretched(NDF):
 
     @function
     def D(self, m: Direction, alpha: Pair) -> Scalar:
-        """Density of normals, 1/sr, from that of the surface of width 1."""
+        """Density of normals, 1/sr, from that of the surface with alpha = 1."""
         over = 1.0 / (alpha.x * alpha.y)
         n = vec3(m.x * (alpha.y * over), m.y * (alpha.x * over), m.z)
         return where(m.z > 0.0, self.density(n) * over, 0.0)

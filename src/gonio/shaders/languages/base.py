@@ -9,7 +9,7 @@ from ...members import Family, instances_of
 
 
 class Language:
-    """A shader language. The defaults are common to most languages; a subclass overrides what differs.
+    """A shader language. The defaults are common to most languages; a subclass overrides those that differ.
 
     name, title, suffix  name for users, full name, and file suffix
     precision            sentence about precision in the head of a shader
@@ -88,7 +88,7 @@ class Language:
         return self.types.get(name, name)
 
     def word(self, name: str) -> str:
-        """A name that the language does not reserve."""
+        """The name, or a variant of it that the language does not reserve."""
         return PREFERRED.get(name, name + "_") if name in self.reserved else name
 
     def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
@@ -124,19 +124,23 @@ class Language:
         return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
 
     def finished(self, lines: Sequence[str], prefix: str) -> list[str]:
-        """All declarations, wrapped as the language requires."""
+        """The lines of all declarations, wrapped as the language requires; `prefix` begins global names."""
         return list(lines)
 
     def binding(self, name: str, dimension: int, place: int) -> list[str]:
-        """The declaration of a table's texture."""
+        """The lines that declare a table's texture.
+
+        dimension  2 or 3
+        place      number of the binding
+        """
         raise NotImplementedError(f"{type(self).__name__} has no binding")
 
     def fetch(self, table: str, places: list[str]) -> str:
-        """A texel by its index along each axis."""
+        """The expression of a texel, given its index along each axis."""
         raise NotImplementedError(f"{type(self).__name__} has no fetch")
 
     def texel(self, table: str, places: list[str], channels: int, shape: Sequence[int], prefix: str) -> str:
-        """The channels of a texel: 1, 2 or 4 of them.
+        """The expression of a texel's 1, 2 or 4 channels, given its index along each axis.
 
         shape   number of texels along each axis, in the order of `places`
         prefix  start of the names of helpers

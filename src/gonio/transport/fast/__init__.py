@@ -1,7 +1,7 @@
 """Acceleration only. Each file is a faster version of something in `transport`:
 
     inline           intersects rays with a few simple shapes in the kernel, without Embree
-    placements       computes surfaces of many spheres or rectangles from one table, without a call per shape
+    placements       computes hits on many spheres or rectangles from one table, without a call per shape
     lamp_table       samples rectangles and balls among the lamps from one table, without a call per emitter
     rectangle_light  samples a single rectangle by its solid angle; the last ray of a path is a shadow ray
     light_grid       chooses among several lights by the light that each sends to a cell of the scene

@@ -52,7 +52,7 @@ class Group:
         return _replaced(self.prototype, self.textures)
 
     def bind(self, numbers: Mapping[str, int]) -> None:
-        """Bind the textures, given the number that identifies each shape in kernels."""
+        """Bind the textures; `numbers` maps each shape's name to the number that identifies the shape in kernels."""
         size = 1 + max(numbers.values())
         row = np.zeros(size, np.intp)
         row[[numbers[name] for name in self.shapes]] = list(self.shapes.values())

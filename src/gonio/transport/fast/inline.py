@@ -55,7 +55,7 @@ class Sphere:
 
 @dataclass
 class Flat:
-    """A part of a plane: three rows of a matrix that transforms it into z = 0."""
+    """A part of a plane: the first three rows of the matrix that transforms the plane into z = 0."""
 
     shape: int
     kind: str  # of `_INSIDE`

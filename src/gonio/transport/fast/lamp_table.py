@@ -84,6 +84,7 @@ class LampTable:
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
         """A direction toward a lamp: uniform in solid angle for a ball, by area for a rectangle.
 
+        u  two random numbers in [0, 1)
         Sampling rectangles by solid angle would reduce the error with several near lamps by 6 % but take 25 % more
         time: a path that hits a lamp would have to compute the solid angle again.
         """

@@ -1,7 +1,8 @@
 """Chooses one of many lamps by position.
 
-The scene's bounding box is divided into cells. Each has a table of the lamps' probabilities: a part proportional to the
-unoccluded light that each lamp sends to the cell, which accounts for distance and orientation, plus a uniform part.
+The scene's bounding box is divided into cells. Each has a table of the lamps' probabilities: one part is proportional
+to the unoccluded light that each lamp sends to the cell, which accounts for distance and orientation; the other is
+uniform.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ __all__ = ["Integrator", "LightTransport", "Path", "Render", "Settings"]
 def __getattr__(name: str) -> object:
     if name != "Transport":
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    warnings.warn("Transport is called Path now: derive from that", DeprecationWarning, stacklevel=2)
+    warnings.warn("Transport is now Path: derive from that", DeprecationWarning, stacklevel=2)
     return _Transport
 
 

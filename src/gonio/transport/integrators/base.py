@@ -53,10 +53,10 @@ class Settings:
         check_sampler(self.sampler)
         if not 1 <= self.max_depth < 2**31:
             raise InputError(
-                f"max_depth {self.max_depth}", "max_depth", "1 shows lights only, 2 direct light, and so on"
+                f"max_depth {self.max_depth}", "max_depth", "give 1 for lights only, 2 for direct light, and so on"
             )
         if not 0 <= self.seed < 2**32:
-            raise InputError(f"seed {self.seed}", "seed", "a whole number from 0 to 4294967295")
+            raise InputError(f"seed {self.seed}", "seed", "give a whole number from 0 to 4294967295")
         _ = self.program
 
     @property
@@ -66,7 +66,7 @@ class Settings:
 
 
 def check_sampler(name: str, location: str = "sampler") -> None:
-    """Raise InputError if no sampler has that name."""
+    """Raise InputError if no sampler has that name; `location` is the place that the error names."""
     if name not in SAMPLERS:
         raise InputError(f"unknown sampler '{name}'", location, did_you_mean(name, list(SAMPLERS)))
 
@@ -114,7 +114,7 @@ class Integrator:
     # ------------------------------------------------------------------ a subclass implements one of these two
 
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
-        """The color (r, g, b) of the surface that a sample hits. Also runs on lanes without a hit; ignored there.
+        """The color (r, g, b) of the surface that a sample hits; the result is ignored on lanes without a hit.
 
         key, index  key of the pixel and index of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in
                     [0, 1), and `self.direction_pair(...)` two for a direction

@@ -195,7 +195,7 @@ class LightTransport(Integrator):
     def direct_light(
         self, vertex: Vertex, light: LightSample | None, value: Radiance, pdf: Float, active: Mask
     ) -> Radiance:
-        """The light of a light sample that the vertex reflects along the path, weighted against BSDF sampling."""
+        """The light of a light sample that the vertex reflects back along the path, weighted against BSDF sampling."""
         if light is None:
             return self.mi.Spectrum(0)
         si, reflected = vertex.si, value * light.weight
@@ -245,7 +245,7 @@ class LightTransport(Integrator):
         )
 
     def roulette(self, path: PathState, u: VertexNumbers) -> PathState:
-        """Russian roulette: survive with SURVIVAL times the throughput's largest channel, at most 0.95.
+        """Russian roulette: the survival probability is SURVIVAL times the throughput's largest channel, at most 0.95.
 
         Inside glass, radiance is scaled by eta^2, which is undone on exit; this does not make a path more important.
         """

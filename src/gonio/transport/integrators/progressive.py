@@ -47,8 +47,9 @@ class Render:
     """A progressive render: call `advance` until there are enough samples, read `image` at any time.
 
     scene     a loaded Mitsuba scene; its parameters may change between renders, not between passes
-    sensor    the camera; None is the scene's first. Its film gives the size; the pixel filter is a box
-    aovs      also average albedo and normal of the first hit, for the denoiser
+    settings  integrator, depth, sampler and seed
+    sensor    the camera; None: the scene's first one. Its film determines the size; the pixel filter is a box
+    aovs      whether to average albedo and normal of the first hit too, for the denoiser
     share     relative number of samples per lane, with a mean of SHARE over the picture; None: equal for all
     """
 
@@ -109,7 +110,7 @@ class Render:
         interrupted pass leaves the picture unchanged.
         """
         if count < 1:
-            raise InputError(f"{count} samples requested", "advance", "1 or more")
+            raise InputError(f"{count} samples requested", "advance", "give 1 or more")
         mi = self.mi
         # Dr.Jit would record each loop a second time without its invariant variables; LLVM eliminates these anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
@@ -154,7 +155,10 @@ class Render:
         return {**self._sums.arrays(), **ahead}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Resume from the sums of `done` samples, with bit-identical results. Raises ValueError for another film's."""
+        """Resume from the sums of `done` samples, with bit-identical results.
+
+        Raises ValueError for the sums of another film.
+        """
         lanes = state.get(LANES)
         if lanes is not None and (lanes.shape != (len(self._pixel),) or lanes.dtype != np.uint32):
             raise ValueError("samples of other lanes")
@@ -164,7 +168,7 @@ class Render:
             self._lanes = own(self.mi.UInt32, lanes)
 
     def select(self, lanes: slice) -> None:
-        """Restart with these lanes only: a part of the picture, which the caller assembles."""
+        """Restart with only these lanes, for a caller that assembles the picture from parts."""
         self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None

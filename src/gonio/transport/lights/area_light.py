@@ -35,11 +35,11 @@ def register(mi: ModuleType) -> None:
 
     radiance  emitted radiance, W/(m^2 sr), the same in every direction on **both** sides; rgb, spectrum or texture
 
-    tag       any text. Mitsuba's loader merges Python plugins with equal properties, and then rejects one emitter on
-              two shapes: two lamps of the same radiance need different tags, or `load_dict(..., optimize=False)`
+    tag       an arbitrary string. Mitsuba's loader merges Python plugins with equal properties, and then rejects one
+              emitter on two shapes: lamps of equal radiance need different tags, or `load_dict(..., optimize=False)`
 
-    It is sampled by solid angle on rectangles and spheres, by area on other shapes. It does not support light tracing
-    (`sample_ray` is missing).
+    The light is sampled by solid angle on rectangles and spheres, by area on other shapes. It does not support light
+    tracing (`sample_ray` is missing).
     """
     if mi.variant() not in _registered:
         _registered.add(mi.variant())

@@ -31,7 +31,7 @@ class LightSample:
 
 
 class LightHit:
-    """A light hit at `si` by a ray from `origin`; `solid_angle` is that of the `LightSample` taken there."""
+    """A light hit at `si` by a ray from `origin`; `solid_angle` is that of the `LightSample` taken at the origin."""
 
     def __init__(self, mi: ModuleType, scene: Scene, origin: Point, solid_angle: Float, si: SurfaceInteraction) -> None:
         self.mi, self.scene, self.origin, self.solid_angle, self.si = mi, scene, origin, solid_angle, si

@@ -50,7 +50,7 @@ class VaryingEnvironment(Environment):
 def environment(surfaces: Surfaces, emitter: Emitter, mis_compensation: bool) -> Environment:
     """The sampler of an environment.
 
-    mis_compensation  whether BSDFs are sampled too; these then cover the uniform part of a map (Karlik2019)
+    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of a map (Karlik2019)
     """
     if "data" in dict(surfaces.mi.traverse(emitter)):
         sky = Sky(surfaces.mi, surfaces.scene, emitter, mis_compensation)

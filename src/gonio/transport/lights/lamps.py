@@ -110,7 +110,7 @@ class Lamps(LightSampler):
     # ------------------------------------------------------------------ points on a lamp
 
     def on_area(self, emitter: Emitter, index: UInt, u: Point, active: Mask) -> PositionSample:
-        """A point of a lamp, uniformly by area."""
+        """A point of a lamp, uniform by area, from two numbers in [0, 1)."""
         mi = self.mi
         nothing: PositionSample = dr.zeros(mi.PositionSample3f)
         ps = self.of_shape(emitter, index, lambda shape, *args: shape.sample_position(0.0, *args), nothing, u, active)

@@ -40,7 +40,7 @@ class Lights:
     samplers  samplers of the environment and of the lamps: the fastest that support them (`fast/`)
     lamps     the sampler of all lights except the environment
 
-    mis_compensation  whether BSDFs are sampled too, and then cover the uniform part of an environment map
+    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of an environment map
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, mis_compensation: bool = False):
@@ -190,7 +190,7 @@ class Lights:
 
     @property
     def shortens_last_ray(self) -> bool:
-        """Whether `along` does without the nearest surface, with only a shadow ray if the ray points at the light."""
+        """Whether `along` finds no nearest surface: it traces a shadow ray, and only if the ray points at the light."""
         return isinstance(self.lamps, RectangleLight)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:

@@ -131,7 +131,7 @@ class Targets:
 
 
 class Sources:
-    """The lamps of a scene as emitters of particles, in all directions if `targets` is None.
+    """The lamps of a scene as emitters of particles: toward `targets`, or in all directions if that is None.
 
     Raises InputError for lamps that cannot emit particles.
     """
@@ -190,7 +190,7 @@ class Sources:
         )
 
     def density(self, origin: Point, si: SurfaceInteraction, direction: Vector, active: Mask) -> Float:
-        """`Particle.density` of a particle from the lamp that a ray of that direction has hit at `si`."""
+        """`Particle.density` of a particle from the lamp at `si`, which a ray from `origin` in `direction` has hit."""
         mi, lights = self.mi, self.lights
         emitter = si.emitter(self.scene)
         probability, index = mi.Float(1), mi.UInt32(0)
@@ -341,7 +341,7 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
         return POINT
     if has(kinds.Surface) and not has(kinds.DeltaDirection):
         return SURFACE
-    what = f"a lamp of the kind {emitter.class_name()}, which cannot emit particles"
+    what = f"a lamp of type {emitter.class_name()} cannot emit particles"
     raise InputError(what, "integrator", "use --integrator path, or a lamp with a surface, a point or an environment")
 
 

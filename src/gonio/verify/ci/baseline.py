@@ -90,7 +90,7 @@ def _no_worse(verdict: Verdict, before: float | None) -> bool:
 
 
 def _words(before: float | None) -> str:
-    return "no figure then" if before is None else f"{before:.3g} then"
+    return "no figure before" if before is None else f"{before:.3g} before"
 
 
 __all__ = ["apply", "read", "text"]

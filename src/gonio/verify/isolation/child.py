@@ -107,11 +107,11 @@ def trial(
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
-        raise InputError(f"{jobs} workers", "--workers", "give 1 or more")
+        raise InputError(f"{jobs} workers requested", "--workers", "give 1 or more")
     limit = watch.LIMIT if limit is None else limit
     for name, value in (("--timeout", limit), ("--memory", memory)):
         if value is not None and value <= 0.0:
-            raise InputError(f"a limit of {value:g}", name, "give more than 0")
+            raise InputError(f"a limit of {value:g} given", name, "give more than 0")
     jobs = min(jobs, sum(item.cards for item in task.items))
     most = 0.5 * _machine_memory() / max(jobs, 1) if memory is None else memory * 1e9
     started = time.perf_counter()

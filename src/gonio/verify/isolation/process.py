@@ -96,7 +96,7 @@ class Process:
         """The limit that it exceeds, as text; "" if none."""
         limit, grace = (limit, GRACE) if self.card >= 0 else (max(limit, LOAD), 0.0)
         if self.busy and time.monotonic() - self.since > limit + grace:
-            return watch.words(limit) if self.card >= 0 else f"no end after {limit:g} s"
+            return watch.words(limit) if self.card >= 0 else f"not finished after {limit:g} s"
         with contextlib.suppress(psutil.Error, OSError):
             if self.process.memory_info().rss > memory:
                 return f"more than {memory / 1e9:.3g} GB of memory"
@@ -123,7 +123,7 @@ class Process:
         if self.reason or code is None:
             return self.reason or "it closed the pipe to the process that watches it"
         if code >= 0:
-            return f"the process ended itself with exit code {code}"
+            return f"the process exited with code {code}"
         return f"the process crashed: {getattr(code, 'name', code)}"
 
     def lines(self) -> int:

@@ -20,7 +20,7 @@ calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = 
 
 def words(seconds: float) -> str:
     """The reason for the failure of a law that did not end."""
-    return f"no end after {seconds:g} s: does `sample` loop on a condition that may never hold?"
+    return f"not finished after {seconds:g} s: does `sample` loop on a condition that may never hold?"
 
 
 @contextlib.contextmanager

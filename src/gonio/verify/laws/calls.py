@@ -31,7 +31,7 @@ class Calls(Law):
 
     number = 11
     name = "calls"
-    title = "results do not depend on how a renderer calls"
+    title = "results do not depend on how a renderer calls the BSDF"
     everywhere = False  # it does not depend on the parameter values
     meaning = "Tests pass but pictures are wrong: only integrators use these calls, batches and masks."
 
@@ -308,26 +308,26 @@ def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> s
     across, sampled_across = o[:, 2] * i[:, 2] < 0.0, o[:, 2] * drawn.wi[:, 2] < 0.0
     if not subject.transmits:
         if np.any(bright & across) or np.any(lit & sampled_across):
-            return "light is transmitted, and `transmits` says that none is"
+            return "light is transmitted, but `transmits` says that none is"
         below = np.any(bright & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
         same, other = bool(getattr(model, "two_sided", True)), bool(getattr(model, "back_differs", False))
         if below and not (same or other) and subject.best == "float64":
-            return "it reflects light from below, and none of `transmits`, `two_sided` and `back_differs` says so"
+            return "it reflects light from below, but none of `transmits`, `two_sided` and `back_differs` says so"
         if same and not other and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
             over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
-                return "`two_sided` says that both sides are the same, and their values differ: `back_differs`?"
+                return "`two_sided` says that both sides are the same, but their values differ: `back_differs`?"
     fact = getattr(model, "delta", "maybe")
     if fact == "never" and np.any(lit & drawn.delta):
-        return 'it has delta samples, and `delta` says "never"'
+        return 'it has delta samples, but `delta` says "never"'
     if fact == "always" and (np.any(lit & ~drawn.delta) or bright.any()):
-        return 'it has light outside of delta lobes, and `delta` says "always"'
+        return 'it has light outside of delta lobes, but `delta` says "always"'
     if np.any(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))):
         row = int(np.argmax(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))))
-        return f"eta of a sample is {drawn.eta[row]:.4g}; expected: the index on wi's side over that on wo's"
+        return f"eta of a sample is {drawn.eta[row]:.4g}; the index on wi's side over that on wo's expected"
     wrong = lit & ~sampled_across & (np.abs(drawn.eta - 1.0) > 1e-6)
     if wrong.any():
         return f"eta of a reflected sample is {drawn.eta[int(np.argmax(wrong))]:.4g}, 1 expected"

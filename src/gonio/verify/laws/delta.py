@@ -45,7 +45,7 @@ class DeltaLobes(Law):
         if not radiance.valid.any() and not power.valid.any():
             raise DoesNotApply("it has no delta lobe")
         if subject.perturbs_normal:
-            raise DoesNotApply("it perturbs the normal, and the law is about that of the surface")
+            raise DoesNotApply("it perturbs the normal, but the law concerns that of the surface")
         exact = subject.best == "float64"
         tolerance = EXACT if exact else lobe_checks.SINGLE
         finding = Finding(

@@ -188,7 +188,7 @@ class Energy(Law):
         if off[row] > GAIN:
             theta = directions.angles(wo)[row, 0]
             finding.problems.append(
-                f"known_albedo is {stated[row].max():.5f} at {theta:.4g} degrees, and the integral of eval is "
+                f"known_albedo is {stated[row].max():.5f} at {theta:.4g} degrees, but the integral of eval is "
                 f"{value[row].max():.5f}"
             )
 
@@ -263,7 +263,7 @@ def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarr
         channel = int(np.argmax(np.abs(stated.value[row] - value[row])))
         theta = directions.angles(wo)[row, 0]
         finding.problems.append(
-            f"{STATED}, {stated.source}, is {stated.value[row, channel]:.4f} at {theta:.4g} degrees, and the integral "
+            f"{STATED}, {stated.source}, is {stated.value[row, channel]:.4f} at {theta:.4g} degrees, but the integral "
             f"of eval is {value[row, channel]:.4f}"
         )
 
@@ -273,7 +273,7 @@ def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
     for sign, side in ((1.0, "above"), (-1.0, "below")):
         mine = curves.wo[:, 2] * sign > 0.0
         if mine.any() and not curves.sampling[mine].any() and curves.quadrature[mine].max(1).min() > GAIN:
-            words = f"for wo {side} the surface no sample carries light, and eval is positive"
+            words = f"for wo {side} the surface no sample carries light, but eval is positive"
             yield Cause(f"{words}: a test of the side that one of them lacks?", f"never sampled from {side}")
 
 

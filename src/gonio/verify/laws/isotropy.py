@@ -90,7 +90,7 @@ class Isotropy(Law):
         row, size = worst_of(self._error(there, back, exact, noise))
         finding.figure, finding.tolerance = size, EXACT if exact else SINGLE
         finding.at, finding.worst = (wo[row], wi[row]), pair_in_words(wo[row], wi[row])
-        finding.notes.append(f"axes and directions turned together: differs by {size:.1e}")
+        finding.notes.append(f"axes and directions rotated together: differs by {size:.1e}")
         if size > finding.tolerance:
             finding.shown = f"changes by {size:.2g} if axes and directions turn together"
 
@@ -111,7 +111,7 @@ class Isotropy(Law):
             return subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
 
         where = ", against the other axes" if swapped is not None else ", under rotation"
-        where = ", with axes and directions turned together" if other is not None else where
+        where = ", with axes and directions rotated together" if other is not None else where
         return severity.between(subject, rotated, where)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:

@@ -37,7 +37,7 @@ class Limits(Law):
 
     number = 12
     name = "limits"
-    title = "what is switched off changes nothing"
+    title = "layers that are switched off change nothing"
     meaning = "A layer of weight 0 tints its base; a texture of weights shows a step where the layer ends."
     everywhere = False
 

@@ -37,7 +37,7 @@ class Shader(Law):
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         model = subject.model
         if not isinstance(model, BSDF):
-            raise DoesNotApply("it is no material of Gonio's, and no shader code is written from it")
+            raise DoesNotApply("it is not a Gonio material, and no shader code is written from it")
         from ...shaders.program import FUNCTIONS, check  # imported late: 0.1 s, and this law is tested on request only
 
         try:
