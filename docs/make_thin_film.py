@@ -168,35 +168,37 @@ def encoded(linear: Floats) -> Floats:
 
 PAGE = """# Thin films
 
-`film-conductor` and `film-dielectric` have a clear film on every facet, with a thickness of `thickness` nm and an index
-of `film_eta`.
+`film-conductor` and `film-dielectric` have a clear film on every facet. `thickness` is the thickness of the film in nm,
+and `film_eta` is its index.
 
     gonio render "film-conductor(preset=Cr,alpha=.15,thickness=400)" -o heat.png
     gonio plot "film-dielectric(eta=1,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
 
-![Above, titanium under its oxide, of index 2.3; below, the film of a soap bubble, of index 1.33](images/films.jpg)
+![Above, titanium with an oxide film of index 2.3; below, soap films of index 1.33](images/films.jpg)
 
-At a single wavelength, the sum of all waves that the two interfaces reflect is
-r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). It agrees with the characteristic matrix of a layer to 1e-12
-(`tests/optics/test_film.py`). Spectral variants render with this amplitude directly. Otherwise, the parameter `form`
-selects how the three color channels are derived from it:
+At a single wavelength, the sum of all waves that the two interfaces of the film reflect is
+r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). Here r12 and r23 are the amplitudes that the outer and the
+inner interface reflect, and delta is the phase that a wave gains on its way through the film and back. The sum agrees
+with the characteristic matrix of a layer to 1e-12 (`tests/optics/test_film.py`). Spectral variants evaluate this
+amplitude per wavelength. In RGB, the parameter `form` selects how the three color channels are derived from it:
 
-- `local` (default) is the locally spectral form that the authors of OpenPBR proposed (issue 246, pull request 262). It
-  evaluates the reflectance at 20 wavelengths, under D65 and for the CIE 1931 observer. The metal's index is
-  interpolated linearly between its values at 650, 550 and 450 nm.
-- `belcour-barla` (Belcour2017) approximates the observer's curves by Gaussians in wave number, for which interference
-  becomes a damped wave. It is faster, and thick films correctly fade to gray. The mean of the reflectance over
-  wavelengths is computed per RGB channel.
+- `local` (default) is the locally spectral form that the authors of OpenPBR proposed (issue 246, pull request 262 of
+  its repository). The reflectance at 20 wavelengths is converted to a color under D65 for the CIE 1931 observer. The
+  metal's index is interpolated linearly between its values at 650, 550 and 450 nm.
+- `belcour-barla` (Belcour2017) approximates the color matching functions of the observer by Gaussians in wave number,
+  which turn interference into a damped oscillation. It is faster, and thick films correctly fade to gray. The mean of
+  the reflectance over wavelengths is computed per RGB channel.
 
-At thickness 0, `local` gives the color of the bare metal's whole spectrum, which is more saturated than the
-three-channel color of a `conductor`. `belcour-barla` reproduces the `conductor` to within 2 %.
+At thickness 0, `local` gives the color of the bare metal over the whole spectrum, which is more saturated than the
+three-channel color of a `conductor`. `belcour-barla` reproduces the color of the `conductor` to within 2 %.
 
 ## Accuracy
 
-The reference is the exact reflectance of the multilayer by the package `tmm` (transfer matrices). It is computed at 81
-wavelengths with the metal's whole measured spectrum, under D65, for films of 50 to 2,000 nm with indices 1.38 and 2.0.
-Both forms use the metal's index at three wavelengths only. The unit is CIE Delta E 2000 (Sharma2005): a difference of
-1 is just noticeable side by side, one of 5 is a different shade, and one of 10 is a different color.
+The reference is the exact reflectance of film and metal, computed by the package `tmm` with transfer matrices: at 81
+wavelengths with the metal's measured index, under D65, for films of 50 to 2,000 nm with indices of 1.38 and 2.0. Both
+forms use the metal's index at three wavelengths only. The tables give color differences from the reference in CIE
+Delta E 2000 (Sharma2005): a difference of 1 is just noticeable side by side, one of 5 is a different shade, and one
+of 10 is a different color.
 
 {metals}
 
@@ -206,7 +208,7 @@ Both forms use the metal's index at three wavelengths only. The unit is CIE Delt
 
 {indices}
 
-![Colors of films on three metals by thickness: exact, Belcour-Barla and local](images/thin-film.png)
+![Colors of films on three metals as a function of thickness: exact, Belcour-Barla and local](images/thin-film.png)
 
 **Summary.** {words}
 
@@ -251,10 +253,10 @@ def words(found: dict[str, Floats]) -> str:
     near = {form: e[:, :, thin].mean() for form, e in found.items()}
     far = {form: e[:, :, ~thin].mean() for form, e in found.items()}
     return (
-        f"The error of `local` is below 2 in {100 * share['local']:.0f} % of the cases, that of `belcour-barla` in "
-        f"{100 * share['belcour-barla']:.0f} %.\nTheir mean errors are {near['local']:.1f} and "
-        f"{near['belcour-barla']:.1f} for films of up to 800 nm, and {far['local']:.1f} and "
-        f"{far['belcour-barla']:.1f} for thicker films."
+        f"The error is below 2 in {100 * share['local']:.0f} % of the cases with `local`, and in "
+        f"{100 * share['belcour-barla']:.0f} % with `belcour-barla`.\nFor films of up to 800 nm, the mean error is "
+        f"{near['local']:.1f} with `local` and {near['belcour-barla']:.1f} with `belcour-barla`; for thicker films,\n"
+        f"it is {far['local']:.1f} and {far['belcour-barla']:.1f}, respectively."
     )
 
 

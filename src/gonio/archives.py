@@ -20,7 +20,7 @@ MAX_ENTRIES = 1000
 
 
 class Unreadable(ValueError):
-    """A file that is not an .npz archive, is damaged, or unpacks to an implausible size; the message says which."""
+    """A file is not an .npz archive, is damaged, or unpacks to an implausible size; the message says which."""
 
 
 def read(path: Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Checks the arguments of public functions against their annotations.
+"""Check the arguments of public functions against their annotations.
 
     @checked
     def bake(target: str | Path, size: int = 128, aspect: float | None = None): ...
@@ -123,7 +123,7 @@ def integer(value: object) -> int:
 
 
 def number(value: object) -> object:
-    """A scalar number; NaN and text are rejected."""
+    """A scalar number; NaN and strings are rejected."""
     import numpy as np
 
     if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]

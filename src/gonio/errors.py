@@ -1,4 +1,4 @@
-"""The family of errors and warnings: each says what happened, where, and what to do about it.
+"""Errors and warnings: each says what happened, where, and what to do about it.
 
 Every error that a user can cause is a `GonioError`: the command line prints it in three lines and exits with `code`;
 Python programs catch one class.
@@ -28,9 +28,9 @@ def encodable(text: str) -> str:
 class GonioError(Exception):
     """An error that the user can correct.
 
-    what   what is wrong: the given value and what was expected
-    where  file and JSON pointer, option, or argument; may be empty
-    hint   what to do about it
+    what   the problem: the given value, and the expected one
+    where  its location: file and JSON pointer, option, or argument; may be empty
+    hint   advice to the user
     """
 
     code = 2  # exit code of the command line: 2 is bad usage or input
@@ -47,11 +47,11 @@ class GonioError(Exception):
 
 
 class InputError(GonioError, ValueError):
-    """A scene, parameter, option or file that cannot be used as given."""
+    """A scene, parameter, option or file cannot be used as given."""
 
 
 class MachineError(GonioError):
-    """A missing resource of the machine: no LLVM, no GPU, a full disk."""
+    """This machine lacks a resource: no LLVM, no GPU, a full disk."""
 
     code = 3
 

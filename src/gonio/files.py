@@ -116,11 +116,11 @@ def write_whole(
     """Write a file atomically: at any time, `path` is either the old file or the complete new one.
 
     content  the bytes, or a function that writes to the path it is given, which has the same suffix
-    rescue   if the file cannot be written, write it to a new folder beside it, in the current folder or among the
-             temporary files, so that hours of work are not lost
-    durable  flush it to the disk first, so that not even a power cut leaves a partial file
-    Raises MachineError if the file cannot be written, InputError if the path cannot name a file. The error says where
-    the content was rescued to; `path` is left unchanged.
+    rescue   whether to write a file that cannot be written to a new folder beside it, in the current folder or among
+             the temporary files, so that hours of work are not lost
+    durable  whether to flush it to the disk first, so that not even a power cut leaves a partial file
+    Raises MachineError if the file cannot be written, InputError if the path cannot name a file. The error states where
+    the content was written instead; `path` is left unchanged.
     """
 
     def fill(file: Path) -> None:
@@ -179,8 +179,8 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
 
 
 def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool = False) -> Path | None:
-    """The file or folder that `fill` wrote, with the target's name, in a new folder: beside the target, in the current
-    folder or among the temporary files; None if all of these failed.
+    """Let `fill` write a file or folder with the target's name in a new folder: beside the target, in the current
+    folder or among the temporary files. Returns its path, or None if all of these failed.
 
     elsewhere  skip the target's folder, since its disk is full
     """
@@ -203,8 +203,9 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write files to a temporary folder, then move them: a new folder appears complete, an old one keeps other files.
 
+    files  content of each file by its name
     Missing parent folders are created.
-    Raises MachineError if the folder cannot be written; the error says where its files are instead.
+    Raises MachineError if the folder cannot be written; the error states where its files are instead.
     """
 
     def fill(into: Path) -> None:

@@ -1,4 +1,4 @@
-"""Selects a libLLVM that Dr.Jit can use, before Dr.Jit searches for one.
+"""Select a libLLVM that Dr.Jit can use, before Dr.Jit searches for one.
 
 Dr.Jit does not ship LLVM. When imported, it loads the library named by DRJIT_LIBLLVM_PATH, or else the first it finds.
 With LLVM 14, 15 and 16, Mitsuba 3.9 aborts the process ("Cannot select fminimum"), and an abort cannot be caught.

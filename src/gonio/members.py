@@ -69,7 +69,10 @@ class Family(Generic[Member]):
         return dict(sorted({**self._shipped, **self._added}.items()))
 
     def get(self, name: str, where: str = "") -> Member:
-        """The member of that name. Raises InputError with the closest known name if there is none."""
+        """The member of that name. Raises InputError, with the closest known name, if there is none.
+
+        where  the location that the error names; "": the family's
+        """
         if self._shipped is None:
             self.all()
         if not isinstance(name, str):
@@ -84,8 +87,9 @@ class Family(Generic[Member]):
         return {name: (member.__doc__ or name).splitlines()[0].rstrip(".") for name, member in self.all().items()}
 
     def add(self, thing: object, where: str = "register") -> str:
-        """Add a member and return its name; a member with a method `check_formulas` is checked by it.
+        """Add a member and return its name; a member with a method `check_formulas` is checked by that method.
 
+        where  the location that errors name
         Raises InputError if it is not a member of this family, fails the check, or has the name of another member.
         """
         named = self._member(thing)
@@ -118,7 +122,7 @@ class Family(Generic[Member]):
         return type(member) if not isinstance(member, type) and getattr(type(member), "name", "") == name else member
 
     def spelled(self, name: str) -> str:
-        """The text that identifies a member to another process: FILE.py:NAME if this program added it, else its name.
+        """The string that identifies a member to another process: FILE.py:NAME if this program added it, else its name.
 
         NAME is the name of the class, or of the module-level variable that holds the instance.
         """

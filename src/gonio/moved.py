@@ -1,4 +1,4 @@
-"""Import paths of Gonio 0.1 that have moved. They work for one more release, with a warning that names the new path.
+"""Redirect import paths of Gonio 0.1 that have moved, for one more release, with a warning that names the new path.
 
 `_MOVED` maps old packages and modules to new ones; submodules follow. Delete this file after one release.
 """

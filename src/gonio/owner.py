@@ -1,4 +1,4 @@
-"""One thread at a time uses Dr.Jit and Mitsuba.
+"""Let only one thread at a time use Dr.Jit and Mitsuba.
 
 Both are imported lazily, have one variant for all threads, and order kernels only within a thread; the recorder has a
 single stack. Every public call that computes therefore holds `COMPUTING` until its values are available, so calls from
@@ -65,10 +65,11 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
 def forget_frames(error: BaseException, names_line: bool = True) -> None:
     """Release the local variables of the frames in the tracebacks of an exception and its causes.
 
-    names_line  whether its message names the line of user code, which is otherwise looked up in its causes
     A notebook stores its last exception and with it the scene. Dr.Jit's virtual calls reach every living BSDF, so that
     each later render would raise the same error. Errors that Dr.Jit wraps lose their tracebacks too, since from Python
     3.12 on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves everything for a debugger.
+
+    names_line  whether its message names the line of user code, which is otherwise looked up in its causes
     """
     if os.environ.get("GONIO_DEBUG"):
         return

@@ -36,7 +36,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def gonio_verify() -> Callable[..., Report]:
-    """Fail the test if a material breaks a law: gonio_verify(material or target, ...), as `check`."""
+    """Fail the test if a material violates a law: gonio_verify(material or target, ...), with arguments as for
+    `check`."""
     return check
 
 
@@ -50,8 +51,10 @@ def check(
     """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
 
     target  a material, or the name of a target as `gonio verify` takes it
+    quick   whether to judge fewer samples
     law     the name of one law or several; None for all
-    breaks  names of laws that may be violated, or a mapping to the largest value allowed; the test fails if one holds
+    breaks  names of laws that the material violates, or a mapping from these to the largest value allowed; the test
+            also fails if one of them holds
     more    further keywords of `gonio.verify`: deep, seed, timeout, memory, isolated
     A material that can be named, or sent to another process, is judged in that process, where it may crash.
     """
@@ -153,7 +156,7 @@ class LawItem(pytest.Item):
 
 
 class Broken(Exception):
-    """A law that does not hold."""
+    """A law does not hold."""
 
     def __init__(self, verdict: Verdict) -> None:
         self.verdict = verdict

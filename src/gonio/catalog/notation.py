@@ -333,7 +333,7 @@ def _same(a: object, b: object) -> bool:
 
 
 def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
-    """The material that a text or JSON names, with additional settings."""
+    """The material that a string or JSON names, with additional settings."""
     if isinstance(value, BSDF):
         return (
             value

@@ -127,7 +127,7 @@ def expanded(part: str) -> str:
 
 
 def _is_known(head: str) -> bool:
-    """Whether a text without settings names a material, or a lobe of a sum."""
+    """Whether a string without settings names a material, or a lobe of a sum."""
     return (
         head in LOBES
         or is_model(head)

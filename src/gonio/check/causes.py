@@ -21,7 +21,10 @@ REGION = "the region where the values differ"  # the topic if no formula explain
 
 
 def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expected: Values, accuracy: float) -> Ratio:
-    """The ratio of the given to the expected values, each (N, 3)."""
+    """The ratio of the given to the expected values, each (N, 3).
+
+    accuracy  relative difference that counts as equal
+    """
 
     def recompute(subject: Subject, wo: np.ndarray, wi: np.ndarray, mode: str) -> np.ndarray:
         return f_of(subject.model, wo, wi)
@@ -31,7 +34,7 @@ def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expecte
 
 
 def named(both: Ratio) -> Mistake | None:
-    """The mistake that explains a ratio; None if no formula does.
+    """The mistake that explains the ratio `both`; None if no formula does.
 
     In order of preference: a known wrong formula that reproduces the values; a factor that `verify.forensics` fits to
     the ratio; a wrong formula times such a factor; the region where the ratio differs from 1.
@@ -78,8 +81,8 @@ def _equal(both: Ratio, variant: Variant) -> bool:
 
 
 def close(a: Values, b: Values, accuracy: float) -> NDArray[np.bool_]:
-    """Whether each two rows of values agree within a relative accuracy, (N,). Values far below the largest one may
-    differ more."""
+    """Whether the rows of two arrays of values agree within a relative accuracy, (N,). Values far below the largest one
+    may differ more."""
     size = np.maximum(np.abs(a), np.abs(b))
     floor = 1e-5 * np.percentile(size, 99.0) if size.size else 0.0
     return np.all(np.abs(a - b) <= accuracy * size + accuracy * floor, axis=1)

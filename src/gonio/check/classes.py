@@ -19,7 +19,12 @@ _GRAZING = 0.02  # smallest cosine; beyond 89 degrees, equivalent formulas for t
 
 
 def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) -> Finding:
-    """Compare f of two materials. Raises InputError for values that are not finite."""
+    """Compare f of two materials.
+
+    name      name of the class, for the finding
+    accuracy  relative difference that counts as equal; None: the default
+    Raises InputError for values that are not finite.
+    """
     wo, wi = pairs(model, PAIRS)
     f = f_of(given, wo, wi)
     if not np.all(np.isfinite(f)):
@@ -32,8 +37,8 @@ def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) ->
 
 
 def pairs(model: BSDF, count: int, seed: int = 1) -> tuple[Values, Values]:
-    """Pairs of directions above the surface, (count, 3) each: half of the wi are uniform, half are sampled by the
-    model."""
+    """Random pairs of directions above the surface, (count, 3) each, selected by `seed`: half of the wi are uniform,
+    half are sampled by the model."""
     rng = np.random.default_rng(seed)
     wo, wi = (directions.on_side(directions.uniform(rng, count), 1) for _ in range(2))
     sampled = model.sample(wo, directions.numbers(rng, count), precision="float64")

@@ -14,8 +14,8 @@ EXIT_CODES = {RIGHT: 0, BY_HAND: 0, WRONG: 1, MISSING: 1, ERROR: 2}
 class Mistake:
     """A mistake in a solution.
 
-    words  the mistake with its formula: "k = (roughness + 1)^2 / 8 in place of alpha / 2"
-    topic  its place without the formula, for students who are to find it themselves: "the masking term G"
+    words  description with the formula: "k = (roughness + 1)^2 / 8 in place of alpha / 2"
+    topic  its location without the formula, for students who are to find it themselves: "the masking term G"
     """
 
     words: str
@@ -27,13 +27,13 @@ class Finding:
     """The judgment of one piece of work.
 
     name     the file or class
-    kind     what it was judged as: "table of E", "values of f", ...
+    kind     the kind of work that it was judged as: "table of E", "values of f", ...
     status   RIGHT, WRONG, ERROR (it could not be judged), MISSING or BY_HAND
-    facts    sentences that say what it was compared with, how far off it is, and where
+    facts    sentences that state what it was compared with, how large the difference is, and where
     mistake  the probable mistake, None if no formula fits
     figures  the numbers in `facts`
     hidden   whether formulas and values of the solution are left out
-    remark   what it was judged by, if the command does not say so completely; "" otherwise
+    remark   the material that it was judged by, if the command does not name it completely; "" otherwise
     """
 
     name: str
@@ -51,12 +51,12 @@ class Finding:
 
     @property
     def exit_code(self) -> int:
-        """0 right, 1 wrong, 2 unreadable."""
+        """0 if the work is right, 1 if it is wrong, 2 if it cannot be read."""
         return EXIT_CODES[self.status]
 
     @property
     def cause(self) -> str:
-        """The probable mistake in words, "" if unknown; only its topic if the solution is hidden."""
+        """A description of the probable mistake, "" if unknown; only its topic if the solution is hidden."""
         if self.mistake is None:
             return ""
         return f"look at {self.mistake.topic}" if self.hidden else self.mistake.words
@@ -67,7 +67,7 @@ class Finding:
         return replace(self, facts=facts, figures={}, hidden=True)
 
     def lines(self) -> list[str]:
-        """The judgment as text, one line per fact."""
+        """The judgment as lines of text, one per fact."""
         lines = [f"{self.name}: {self.status}" + (f" ({self.kind})" if self.kind else "")]
         lines += [f"  {fact}" for fact in (*self.facts, self.remark) if fact]
         if self.cause:
@@ -91,5 +91,5 @@ class Finding:
 
 
 def unreadable(name: str, why: str, hint: str = "") -> Finding:
-    """The finding for work that cannot be judged."""
+    """The finding for work that cannot be judged, with the reason `why`."""
     return Finding(name, "", ERROR, (f"{why}: {hint}" if hint else why,))

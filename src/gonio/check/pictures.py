@@ -1,7 +1,7 @@
 """Compare a student's picture of a scene with Gonio's, allowing for small shifts, gamma and exposure.
 
-Both pictures are averaged over blocks, so that noise from few samples does not matter. The ratio that most blocks have
-is taken as exposure; objects with another ratio are named.
+The pictures are averaged over blocks, so that noise from few samples does not matter. The ratio of the two that most
+blocks have is attributed to exposure; objects with another ratio are named.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CLEAN = 0.02  # relative accuracy to which a ratio is identified with a known nu
 
 
 class _Reading(NamedTuple):
-    """An interpretation of a picture: in words, the mistake that it implies (None if none), and linear values."""
+    """An interpretation of a picture: its description, the mistake that it implies, if any, and linear values."""
 
     words: str
     mistake: Mistake | None
@@ -48,7 +48,11 @@ class _Match(NamedTuple):
 
 
 def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool = False) -> Finding:
-    """Judge a picture of a scene. Raises InputError for a picture of another aspect ratio or of something else."""
+    """Judge a picture of a scene. Raises InputError for a picture of another aspect ratio or of something else.
+
+    allow_outside  allow the scene to read files outside its folder
+    allow_code     allow the scene to run materials in Python files
+    """
     picture = images.read(path)
     height, width = picture.pixels.shape[:2]
     outside = {"allow_outside": allow_outside, "allow_code": allow_code}

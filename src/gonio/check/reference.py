@@ -1,4 +1,4 @@
-"""Reference values for checking a program without handing in anything: f at 200 pairs, tables of E and E_avg.
+"""Reference values with which students can check a program themselves: f at 200 pairs, tables of E and E_avg.
 
     gonio check --reference DIR                      every model of the courses, and the homework's tables
     gonio check oren-nayar -p sigma=0.5 --reference DIR
@@ -42,9 +42,9 @@ TABLES = {"text": "schlick-direct", "figure": "schlick-ibl"}
 
 
 def write(folder: str | Path, material: str | BSDF | None = None) -> list[Path]:
-    """Write the values of one material, or the values and tables of the courses; returns the paths of the files.
+    """Write the values of one material, or the values and tables of the courses. Returns the paths of the files.
 
-    material  a material or its text; None for all models of the courses
+    material  a material, as a string or an object; None for all models of the courses
     Either all files are written or none. Raises InputError for a folder that cannot be written.
     """
     place = files.check_folder(folder)

@@ -72,7 +72,7 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        """0 if everything is right, 1 if something is wrong or missing, 2 if something could not be read."""
+        """0 if everything is right, 1 if something is wrong or missing, 2 if something cannot be read."""
         return max((finding.exit_code for finding in self.findings), default=0)
 
     def without_solution(self) -> Report:

@@ -21,7 +21,7 @@ from .report import Mark, Report, Submission, junit
 
 @dataclass(frozen=True)
 class Work:
-    """The work to be judged and what it is judged by; the fields are arguments of `check`."""
+    """The work to be judged, and the options of its judgment; the fields are arguments of `check`."""
 
     target: str | Path | BSDF
     against: str | BSDF | None = None
@@ -50,13 +50,13 @@ class Work:
 
     @property
     def text(self) -> str:
-        """The target as text; for the .toml adapter of a shader, the shader."""
+        """The target as a string; for the .toml adapter of a shader, the shader."""
         text = str(self.target)
         shader = text.removesuffix(".toml")
         return shader if shader != text and shaders.names_shader(shader) else text
 
     def model(self) -> BSDF:
-        """The material to judge another by. Raises InputError if none was given."""
+        """The material by which the work is judged. Raises InputError if none was given."""
         if isinstance(self.against, BSDF):
             return self.against
         if not self.against:
@@ -133,23 +133,26 @@ def check(
 ) -> Finding | Report:
     """Judge a student's own work and name the probable mistake.
 
-        go.check("E.png").facts                                  # which k, flip, 1 - E, and how far off
+        go.check("E.png").facts                                  # its form (k, flip, 1 - E), and the difference
         go.check("f.csv", go.OrenNayar(sigma=0.3), up="y").cause
         go.check(MyConductor(alpha=0.3), go.Conductor(alpha=0.3)).passed
         go.check("submissions", sheet="hw4").rows()
 
     target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
                shader (.glsl, .wgsl, ...); a picture, with `scene`; a folder of these or of such folders, with `sheet`
-    against    the material to judge by, also as text; for a table, the masking term that it must have
+    against    the material by which the work is judged, as a string or an object; for a table, the masking term that it
+               must have
     scene      the scene that a picture shows; with `sheet`, a folder of scenes named like the pictures
     sheet      "hw4" or "lab2": the tasks and their points
     up         the axis along the normal in rows of directions: "z", "y" or "x"
-    tolerance  relative difference of f that counts as equal; None is 2e-3 for rows, 1e-4 for a material
+    tolerance  relative difference of f that counts as equal; None: 2e-3 for rows, 1e-4 for a material
+    allow_outside, allow_code  permissions of scenes, as in `go.render`
     hide_solution  leave out formulas and values of the solution
     junit      path of a JUnit XML file for the verdicts
     function   the function of a shader to judge, in place of the one that its adapter names
     Returns a Finding, or a Report for a folder; both have `passed`, `exit_code` and `as_dict`.
-    Raises InputError for work that cannot be read; in a folder, that becomes a finding and the other files are judged.
+    Raises InputError for work that cannot be read; in a folder, the error becomes a finding, and the other files are
+    judged.
     """
     if junit is not None:
         check_file(junit)

@@ -44,10 +44,14 @@ class Rows(NamedTuple):
 
 
 def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
-    """Judge a file of values. Raises InputError for one that cannot be read.
+    """Judge a file of values. Raises InputError for a file that cannot be read.
 
     If no parameters are given, any parameters that explain the values are accepted, unless a known mistake explains
     them with the defaults.
+
+    asked     the material to judge by
+    up        the axis along the normal: "z", "y" or "x"
+    accuracy  relative difference that counts as equal; None: the default
     """
     rows = read(path, up)
     accuracy = ACCURACY if accuracy is None else accuracy
@@ -79,7 +83,11 @@ def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF 
 
 
 def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
-    """Compare values of f with a material's, row by row."""
+    """Compare values of f with a material's, row by row.
+
+    accuracy  relative difference that counts as equal
+    kind      kind of the work, for the finding
+    """
     expected = f_of(material, rows.wo, rows.wi)
     if rows.f.shape[1] == 1:
         if np.any(np.ptp(expected, axis=1) > accuracy * expected.max(axis=1)):
@@ -140,7 +148,7 @@ def _over(f: Values, cosine: Values) -> Values:
 
 
 def _left_out(fine: np.ndarray) -> str:
-    """The number of rows that do not count, in words; "" if there are none."""
+    """A statement of the number of rows that do not count; "" if there are none."""
     count = int(np.sum(~fine))
     return f"; {count} row{'s' if count > 1 else ''} at the horizon left out" if count else ""
 
@@ -165,7 +173,7 @@ def _numbers(values: Values) -> str:
 
 
 def read(path: Path, up: str = "z") -> Rows:
-    """The rows of a file, with z up. Raises InputError, with the line, if it is malformed."""
+    """The rows of a file, converted from the axis `up` to z up. Raises InputError, with the line, if it is damaged."""
     if up not in _UP:
         raise InputError(f"unknown axis '{up}'", "--up", "give the axis along the normal: z, y or x")
     try:

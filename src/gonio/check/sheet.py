@@ -1,4 +1,4 @@
-"""The sheets of the courses, as tasks with points, and the judgment of submissions.
+"""The assignment sheets of the courses, as tasks with points, and the judgment of submissions.
 
 A file belongs to the first task whose pattern its name matches. A file of values may name its parameters and its frame
 in comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the task prescribes the model and its terms. Code is not
@@ -29,7 +29,7 @@ SPLIT = "A + B"  # the table of the split sum, which is E: one channel, or A in 
 
 @dataclass(frozen=True)
 class Task:
-    """One task of a sheet.
+    """One task of an assignment sheet.
 
     files  a regular expression for file names without suffix, in lower case
     model  the material of files of values, with the task's terms; "" if the task has no such files
@@ -84,7 +84,9 @@ SHEETS = {"hw4": HW4, "lab2": LAB2}
 def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -> Report:
     """Judge a folder, or each folder of a class. Raises InputError for an unknown sheet and for a folder without files.
 
+    sheet   name of the assignment sheet, "hw4" or "lab2"
     scenes  a folder of scenes, or one scene; pictures are compared with the scene of the same name
+    up      the axis along the normal in files that do not state it: "z", "y" or "x"
     """
     if sheet not in SHEETS:
         raise InputError(f"unknown sheet '{sheet}'", "--sheet", did_you_mean(sheet, list(SHEETS)))
@@ -126,7 +128,8 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
 
 
 def task_of(tasks: tuple[Task, ...], path: Path) -> Task | None:
-    """The first task whose pattern a file's name matches; None if that is a table and the file a source or document."""
+    """The first task whose pattern a file's name matches; None if there is none, or if the task is a table and the file
+    a source file or document."""
     task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
     return None if task is not None and task.table and path.suffix.lower() in LEFT_ALONE else task
 

@@ -1,11 +1,11 @@
-"""The model that values of f are judged by: the one asked for, with the parameters that the file itself names.
+"""The model by which values of f are judged: the requested one, with the parameters that the file itself names.
 
     # model: oren-nayar(sigma=0.5)      a comment in the file
     # up: y
 
 On the command line, the user's settings take precedence over this line. In a folder, the sheet prescribes the model and
-its terms (distribution, masking, kind of Fresnel term), and the line gives only numbers: a file must not choose what it
-is judged by.
+its terms (distribution, masking, kind of Fresnel term), and the line gives only numbers: a file must not choose the
+model by which it is judged.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _EDGE = "edge"  # a parameter of `metal` that, unlike other numbers, changes the
 
 @dataclass(frozen=True)
 class Asked:
-    """The material to judge by.
+    """The material by which values are judged.
 
-    remark    where its parameters come from, in words; "" if the user named it completely
-    defaults  whether neither the user nor the file named parameters, so that the values may have others
+    remark    a statement of the source of its parameters; "" if the user named it completely
+    defaults  whether neither the user nor the file named parameters, so that the values may have other ones
     """
 
     material: BSDF
@@ -51,7 +51,7 @@ class Line(NamedTuple):
 
 
 class AnotherModelError(InputError):
-    """A file names another model, or other terms, than the sheet asks for."""
+    """A file names another model, or other terms, than the sheet prescribes."""
 
 
 def comments(path: Path) -> dict[str, str]:
@@ -63,8 +63,8 @@ def comments(path: Path) -> dict[str, str]:
 
 
 def for_command(path: Path, against: str | BSDF | None) -> Asked:
-    """The material of a command: the one that it names, with the line's settings for parameters that it does not give,
-    or else the one of the line. Raises InputError if neither names one."""
+    """The material of a command: `against`, with the settings of the file's line for parameters that the command does
+    not give, or else the material of the line. Raises InputError if neither names one."""
     if isinstance(against, BSDF):
         return Asked(against)
     text = comments(path).get("model", "")
@@ -110,8 +110,11 @@ def for_task(path: Path, models: tuple[str, ...]) -> Asked:
 
 
 def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) -> str:
-    """The reason why values of a material say nothing about its model: its parameters reduce it to a simpler one; "" if
-    they do not."""
+    """The reason why values of a material say nothing about its model, since its parameters reduce it to a simpler
+    one; "" if they do not.
+
+    accuracy  relative difference that counts as equal
+    """
     f = f_of(material, wo, wi)
     lit = f[f[:, 0] > 0.0]
     if type(material).name != "lambert" and len(lit) and np.all(np.ptp(lit, axis=0) <= accuracy * lit.max(axis=0)):

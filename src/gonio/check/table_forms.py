@@ -31,7 +31,7 @@ _INTEGRAND = "the integrand f cos / pdf"
 class Form(NamedTuple):
     """A table E[roughness, mu].
 
-    words    the form in words: "k = alpha / 2"
+    words    description of the form: "k = alpha / 2"
     mistake  None if the form is right
     masking  Gonio's name for its masking term, "" if it has none
     """
@@ -187,7 +187,8 @@ class _with_width:
 
 
 class Weighting(NamedTuple):
-    """A way to average E over mu: in words, the mistake (None if right), and the weights of E, [roughness, mu]."""
+    """A way to average E over mu: its description, the mistake (None if it is right), and the weights of E,
+    [roughness, mu]."""
 
     words: str
     mistake: Mistake | None

@@ -1,4 +1,4 @@
-"""Judge pictures of tables of E and E_avg, such as the homework's: which form fits best, and how far off it is.
+"""Judge pictures of tables of E and E_avg, such as the homework's, by the form that fits best and its distance.
 
 Distances are root mean squares in gray levels of 255. A form is identified by the rows of roughness 0.55 and above,
 where cosine sampling has converged. Below, a table computed by cosine sampling is noisy and too dark, which is not a
@@ -52,7 +52,8 @@ class Table:
 
 
 class _Layout(NamedTuple):
-    """A layout of the table in the picture: in words, the mistake (None if allowed), and the values [roughness, mu]."""
+    """A layout of the table in the picture: its description, the mistake (None if it is allowed), and the values
+    [roughness, mu]."""
 
     words: str
     mistake: Mistake | None
@@ -79,7 +80,7 @@ def _layouts(picture: Values) -> Iterator[_Layout]:
 
 
 class _Stored(NamedTuple):
-    """A way to store E: in words, the mistake (None if right), and the stored values."""
+    """A way to store E: its description, the mistake (None if it is right), and the stored values."""
 
     words: str
     mistake: Mistake | None
@@ -135,7 +136,8 @@ class _Match(NamedTuple):
 def read(path: Path, channels: int = 1) -> Table:
     """The table in a picture or in an .npz array. Raises InputError for anything else.
 
-    channels  2 for a split sum, whose table is the sum of A in red and B in green; a gray picture holds the sum itself
+    channels  1, or 2 for a split sum, whose table is the sum of A in red and B in green; a gray picture holds the sum
+              itself
     """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
         raise InputError("a 16-bit picture given", path.name, "write 8 bits per channel, E * 255, as the homework does")
@@ -168,7 +170,11 @@ def check(table: Table, expected: str = "", sampled: bool = False) -> Finding:
 
 
 def check_average(table: Table, own: Table | None, expected: str = "") -> Finding:
-    """Judge a table of E_avg by the right tables of E, or by the student's own, which may be wrong itself."""
+    """Judge a table of E_avg by the right tables of E, or by the student's own table of E, which may be wrong itself.
+
+    own       the student's own table of E; None if there is none
+    expected  the name of the required masking term; "" accepts the homework's two and Smith's
+    """
     _check(table, expected)
     return _average(table, own, expected)
 
@@ -389,7 +395,7 @@ def _average(table: Table, own: Table | None, expected: str) -> Finding:
 
 
 def _own(own: Table, size: int, at: np.ndarray) -> Iterator[tuple[str, str, Values]]:
-    """The student's E in each of the two allowed layouts, in the rows of E_avg, with its words and no masking term."""
+    """The student's E in each of the two allowed layouts, in the rows of E_avg, as a form without a masking term."""
     if own.constant or len(own.values) != size:
         return
     for layout in itertools.islice(_layouts(own.values), 2):

@@ -84,7 +84,7 @@ class Trust(Options):
 
 
 class Reading(Options):
-    """How shaders named on the command line are read."""
+    """Options for reading shaders that are named on the command line."""
 
     define: Annotated[
         list[str] | None,
@@ -96,7 +96,7 @@ class Reading(Options):
     ] = None
 
     def shaders(self, texts: Sequence[str]) -> list[str]:
-        """The materials as texts, in which the names of shaders include `define` and `adapter`. Raises InputError if
+        """The materials as strings, in which the names of shaders include `define` and `adapter`. Raises InputError if
         these are given without a shader."""
         from ..catalog import shaders
         from ..errors import InputError
@@ -126,9 +126,10 @@ class Material(Reading):
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
-        """The materials as texts, such as "conductor(preset=Au,alpha=0.3)". Each gets those parameters that it has.
+        """The materials as strings, such as "conductor(preset=Au,alpha=0.3)". A parameter is set on every material that
+        has it.
 
-        accepted  the accepted kinds of operands; only materials by default
+        accepted  the accepted kinds of operands; if empty, only materials
         Raises InputError for an operand of another kind, and for a parameter that no material has.
         """
         from ..catalog import notation, operands, texts
@@ -180,7 +181,8 @@ def _text(head: str, settings: Mapping[str, str], own: str = "") -> str:
 
 
 class Fitting(Material):
-    """Which parameters of a model are fitted: `param` and `preset` fix values, `free` releases them."""
+    """Options that determine which parameters of a model are fitted: `param` and `preset` fix values, `free` frees
+    further ones."""
 
     free: Annotated[
         list[str] | None, Option(metavar="NAME", help="Also fit this parameter, even if it is 1; repeatable.")
@@ -188,13 +190,13 @@ class Fitting(Material):
     grazing: Annotated[float, Option(metavar="DEG", help="Ignore values beyond this angle from the normal.")] = 80.0
 
     def fixed(self) -> dict[str, str]:
-        """The fixed parameters by path, as texts."""
+        """The fixed parameters by path, as strings."""
         from ..catalog import notation
 
         return dict(map(notation.assignment, self.param or ()))
 
     def models(self, names: Sequence[str]) -> list[str]:
-        """The models as texts, with the preset if one is given. Raises InputError for a preset of a sum."""
+        """The models as strings, with the preset if one is given. Raises InputError for a preset of a sum."""
         names = self.shaders(names)
         if not self.preset:
             return list(names)
@@ -210,7 +212,8 @@ class Fitting(Material):
 
 
 class Executor(Options):
-    """Where parts are computed: in this process, in several processes on this machine, or on a cluster."""
+    """Options that determine where parts are computed: in this process, in several processes on this machine, or on a
+    cluster."""
 
     workers: Annotated[int | None, Option(metavar="N", help="Compute with N processes on this machine.")] = None
     cluster: Annotated[
@@ -218,7 +221,7 @@ class Executor(Options):
     ] = None
 
     def running(self) -> AbstractContextManager[object]:
-        """A context manager that uses them inside its `with` block."""
+        """A context manager inside whose `with` block the parts are computed there."""
         if self.workers is None and self.cluster is None:
             return nullcontext()
         from ..work.cluster import Cluster
@@ -227,7 +230,7 @@ class Executor(Options):
 
 
 class Rendering(RenderOptions, Options):
-    """The options of a render as the command line takes them: size and exposure are texts until `request`."""
+    """The options of a render as the command line takes them: size and exposure are strings until `request`."""
 
     def request(
         self,

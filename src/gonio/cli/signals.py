@@ -1,4 +1,4 @@
-"""How the command ends on a signal: by Ctrl-C, from batch systems and from closing terminals.
+"""End the command on a signal: by Ctrl-C, from batch systems and from closing terminals.
 
 A render stores its picture and handles signals itself (`render.passes.Interrupts`). All other commands end with one
 line.

@@ -1,6 +1,6 @@
-"""Energy: directional albedo, the tables E and E_avg, and the compensation of energy lost by single scattering.
+"""Energy: directional albedo, tables of E and E_avg, and the compensation of energy lost by single scattering.
 
-Everything here builds on any base material and is independent of scenes.
+Everything here applies to any base material and is independent of scenes.
 """
 
 from .albedo.directional import Albedo, albedo

@@ -1,6 +1,6 @@
-"""Transforms of mu in which albedo is smooth despite masking, for polynomials of the missing energy and for axes.
+"""Transforms of mu that make albedo smooth despite masking, for polynomials of the missing energy and for axes.
 
-Masking sets in where mu is a few alpha. With a bend b of a few alpha,
+Masking is strong where mu is below a few alpha. With a bend b of a few alpha and
 
     u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
 
@@ -24,9 +24,12 @@ MIN_POWER = 1e-33  # of r, and the inverse of the maximum of z / r: the range of
 
 
 class Form(NamedTuple):
-    """A transform of mu: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
+    """A transform of mu, and the degree of the polynomials in it.
 
-    w is alpha, or 2 k for schlick-direct.
+    squarings     p = 2^squarings
+    roots         n
+    factor, hold  b = factor w / (1 + hold w), where w is the onset of masking (`Masking.onset`)
+    degree        degree of the polynomials
     """
 
     squarings: int
@@ -37,7 +40,7 @@ class Form(NamedTuple):
 
     @property
     def least(self) -> float:
-        """mu / b below which M is constant, because powers of r and z / r would leave the range of float32."""
+        """The mu / b below which M is constant, because powers of r and z / r would leave the range of float32."""
         return MIN_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
 
 
@@ -56,7 +59,10 @@ FORMS = {
 
 
 def form_of(ndf: str, masking: str, side: str = "") -> Form:
-    """The form for a table: of a metal, or of one side of glass."""
+    """The form for the table of a metal, or of one side of glass.
+
+    side  "thin" or "dense" for glass, "" for a metal
+    """
     if not term(masking).smith:
         return FORMS["schlick-glass" if side else "schlick"]
     kind = "ggx" if distribution(ndf).falls_slowly else "narrow"
@@ -64,12 +70,12 @@ def form_of(ndf: str, masking: str, side: str = "") -> Form:
 
 
 def knee(form: Form, masking: str, alpha: Scalar) -> Scalar:
-    """The bend: the cosine at which masking sets in."""
+    """The bend b of a form at a width: the cosine below which masking is strong."""
     return _bend(form, term(masking).onset(alpha))
 
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    """`knee` for an array."""
+    """`knee` for a NumPy array of widths."""
     onset: Array = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
     return _bend(form, np.asarray(onset.numpy()).reshape(np.shape(alpha)))
 
@@ -80,7 +86,7 @@ def _bend(form: Form, width: Array) -> Array:
 
 @ops.function
 def descent(form: Form, mu: Array, bend: Array) -> Array:
-    """z / r: 0 at the normal; computed without differences of nearly equal values."""
+    """z / r, computed without differences of nearly equal values; 0 at the normal."""
     mu = ops.maximum(mu, bend * form.least)
     fall = 1.0 - mu
     for _ in range(form.squarings):
@@ -93,13 +99,13 @@ def descent(form: Form, mu: Array, bend: Array) -> Array:
 
 
 def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """r, as defined by `descent`."""
+    """r as a function of mu, for NumPy arrays."""
     mu, power = np.maximum(mu, bend * form.least), 2**form.squarings
     return (mu**power * (1.0 + bend**power) / (mu**power + bend**power)) ** 0.5**form.roots
 
 
 def cosine(form: Form, rise: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """mu for a given r: the inverse of `numpy_rise`."""
+    """mu as a function of r, the inverse of `numpy_rise`."""
     power = 2**form.squarings
     bent, u = np.maximum(bend**power, 1e-300), rise**2**form.roots
     return np.clip(bent * u / ((1.0 - u) + bent), 0.0, 1.0) ** (1.0 / power)

@@ -1,8 +1,8 @@
 """A cache of computed tables in the user's cache folder, keyed by a hash of their inputs.
 
-The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of the
-request and of the formulas behind it; the file contains the hash of its content. A truncated, altered or foreign file
-is rebuilt, with a warning, and so is one that another user may change; a folder that cannot be written is ignored.
+The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. The name of a file is the hash of the
+request and of the formulas involved; the file contains the hash of its content. A truncated, altered or foreign file,
+or one that another user can change, is rebuilt with a warning. A folder that cannot be written is ignored.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ PACKAGES = ("energy", "material", "materials", "ops", "optics")  # packages whos
 
 @lru_cache
 def formulas() -> str:
-    """Hash of the code of `PACKAGES` without comments and docstrings: a changed formula leads to new tables.
+    """Hash of the code of `PACKAGES` without comments and docstrings, which makes a changed formula lead to new tables.
 
     Parsing takes a tenth of a second, so the hash is cached until a file changes.
     """
@@ -66,14 +66,14 @@ def formulas() -> str:
 
 
 def _store(path: Path, content: bytes) -> None:
-    """Write a file of the cache if possible: a read-only home costs time, not correctness."""
+    """Write a file of the cache, or nothing if the folder is read-only, which costs only time."""
     with contextlib.suppress(OSError, GonioError):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_whole(path, content, rescue=False)
 
 
 def _meaning(source: str) -> str:
-    """What a file means to the interpreter: its syntax tree without docstrings and annotations."""
+    """The syntax tree of a source without docstrings and annotations, as text."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
@@ -88,8 +88,8 @@ FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)
 
 
 def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
-    """Memoize a function of a distribution, a masking term and a Fresnel kind, given by name in this order; the result
-    is recomputed if a name refers to another member."""
+    """Memoize a function of the names of a distribution, a masking term and a Fresnel kind, in this order. The result
+    is recomputed if a name refers to another member than before."""
     made: dict[tuple[object, ...], Kept] = {}
 
     @functools.wraps(build)
@@ -103,8 +103,8 @@ def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
 
 
 def origin(*names: str) -> tuple[str, ...]:
-    """Hashes of the files of user-defined members among these, and of their local imports: part of a key on disk. A
-    class without a file has a new hash in every process."""
+    """Hashes of the files of user-defined members among the named ones, and of their local imports, for a key on disk.
+    A class without a file has a new hash in every process."""
     members = [type(family.get(name)) for family, name in zip(FAMILIES, names, strict=False)]
     return tuple(_hash_of(cls) for cls in members if not cls.__module__.startswith("gonio."))
 
@@ -121,7 +121,7 @@ _PROCESS = f"{os.getpid()} {time.time_ns()}"
 
 
 def _path(key: tuple) -> tuple[Path, str]:
-    """(file, full name) for a key; its first entry is the type of the content."""
+    """The file and the full name for a key, whose first entry is the type of the content."""
     name = hashlib.sha256((repr(key) + formulas()).encode()).hexdigest()
     return folder() / f"{key[0]}-{name[:32]}.npz", name
 
@@ -129,8 +129,10 @@ def _path(key: tuple) -> tuple[Path, str]:
 def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], read: Callable[[Path], Kept]) -> Kept:
     """The object for `key`, read from the cache, or built and stored there.
 
-    key   all inputs besides the formulas of `PACKAGES`, which are added
-    read  raises ValueError if the file was not written by `write`
+    key    all inputs except the formulas of `PACKAGES`, which are added
+    build  function that computes the object
+    write  function from the object to the bytes to store
+    read   function from a file to the object; it raises ValueError if the file was not written by `write`
     """
     path, _ = _path(key)
     if os.path.isfile(path):
@@ -146,7 +148,10 @@ def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], 
 
 
 def remember(key: tuple, build: Callable[[], np.ndarray]) -> np.ndarray:
-    """The array for `key`, cached by `keep`."""
+    """The array for `key`, cached by `keep`.
+
+    build  function that computes the array
+    """
     _, name = _path(key)
 
     def write(values: np.ndarray) -> bytes:

@@ -1,11 +1,11 @@
-"""The difference between two materials: f over pairs of directions, and the albedo.
+"""The difference between two materials: in f, over pairs of directions, and in albedo.
 
     result = difference(go.OrenNayar(sigma=0.5), go.Lambert())
     result.mean, result.largest, result.largest_at
 
 f is compared at directions sampled by each material and by the cosine, a third each, so that narrow lobes are covered;
-each pair is weighted by the inverse density of this mixture. Perfectly specular parts have no f and enter only the
-albedo.
+each pair is weighted by the inverse density of this mixture. Perfectly specular components have no f and contribute
+only to the albedo.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ METRICS = {
 class View:
     """The comparison at one angle of wo.
 
-    theta    degrees
-    mean     int |f_A - f_B| cos d wi divided by int f_B cos d wi, mean of the channels; inf if B is black
+    theta    angle between wo and the normal, degrees
+    mean     int |f_A - f_B| cos d wi divided by int f_B cos d wi, averaged over the channels; inf if B is black
     largest  largest |f_A - f_B| / max(f_A, f_B)
-    wi       (theta, phi) of the direction at which it occurs, degrees; phi relative to wo
-    f        f_A and f_B there, 1/sr, mean of the channels
-    albedo   of A and of B, (2, channels)
+    wi       (theta, phi) of the direction wi at which it occurs, degrees; phi is relative to wo
+    f        f_A and f_B at this direction, 1/sr, averaged over the channels
+    albedo   directional albedos of A and B, (2, channels)
     """
 
     theta: float
@@ -59,9 +59,9 @@ class Difference:
 
     views         the results at each angle of wo
     known         the angles at which both materials are known; only these are compared
-    has_specular  whether either has perfectly specular parts, which enter only the albedo
+    has_specular  whether either material has perfectly specular components, which contribute only to the albedo
     metric        the metric to which the tolerance applies, one of METRICS
-    tolerance     the largest value that passes; None passes all
+    tolerance     the largest value of the metric that passes; if None, any value passes
     """
 
     views: tuple[View, ...]
@@ -72,7 +72,7 @@ class Difference:
 
     @property
     def mean(self) -> float:
-        """The mean relative difference of f cos, over all light and views."""
+        """The relative difference of f cos, averaged over all wi and views."""
         return float(np.mean([view.mean for view in self.views]))
 
     @property
@@ -97,7 +97,7 @@ class Difference:
         return self.tolerance is None or self.value(self.metric) <= self.tolerance
 
     def as_dict(self) -> dict[str, object]:
-        """A dictionary for JSON; an infinite mean becomes null."""
+        """A dictionary for JSON, in which an infinite mean is null."""
         at = self.largest_at
         return {
             "mean": _finite(self.mean),
@@ -128,9 +128,11 @@ def difference(
 ) -> Difference:
     """Compare f and albedo of A with those of B, at the angles at which both are known.
 
-    metric, tolerance  the metric to which the tolerance applies, one of METRICS, and the largest value that passes
-    pairs              directions of light per view
-    Raises InputError for an unknown metric, and if no view is known for both.
+    metric     the metric to which the tolerance applies, one of METRICS
+    tolerance  the largest value of the metric that passes; if None, any value passes
+    pairs      number of directions wi per view
+    seed       seed of these directions
+    Returns a `Difference`. Raises InputError for an unknown metric, or if at no view both materials are known.
     """
     if metric not in METRICS:
         raise InputError(f"unknown metric '{metric}' for materials", "--metric", " | ".join(METRICS))
@@ -177,8 +179,8 @@ def _view(
 
 
 def _directions(a: BSDF, b: BSDF, wo: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Directions of light, a third from each material and from the cosine, and the density of the mixture; the density
-    is 0 for samples of perfectly specular parts."""
+    """Directions wi, a third from each material and from the cosine, and the density of this mixture. The density is 0
+    for samples of perfectly specular components."""
     u = rng.random((len(wo), 3))
     both = a.transmits or b.transmits
     side = np.where(both & (u[:, 0] < 0.5), -1.0, 1.0)

@@ -237,7 +237,7 @@ class BSDF(Material):
 
     @property
     def two_sided(self) -> bool:
-        """For a surface that does not transmit: whether it reflects the same from below as from above."""
+        """For a surface that does not transmit: whether it reflects from below exactly as from above."""
         return False
 
     @property
@@ -265,8 +265,8 @@ class BSDF(Material):
 
     @property
     def needs_uniform(self) -> bool:
-        """Whether its parameters, including those of inner materials, must be the same for all rays, so that they accept
-        no textures and no arrays."""
+        """Whether its parameters, including those of inner materials, must be the same for all rays, so that neither
+        textures nor arrays are accepted."""
         return any(inner.needs_uniform for inner in tree.children(self).values())
 
     @property

@@ -1,6 +1,6 @@
-"""Optics of a surface: frame, reflection and refraction, Fresnel, microfacets, warps, refractive indices.
+"""Optics of a surface: frame, reflection and refraction, Fresnel reflectance, microfacets, warps, refractive indices.
 
-Everything here is written in the vocabulary of `gonio.ops` and independent of materials.
+Everything here is written in the vocabulary of `gonio.ops` and is independent of materials.
 """
 
 from . import frame, fresnel, indices, masking, ndf, special, warp

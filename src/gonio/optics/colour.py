@@ -1,4 +1,4 @@
-"""The conversion of spectra to colors: observer, daylight and linear sRGB."""
+"""The conversion of spectra to colors: CIE observer, daylight (D65) and linear sRGB."""
 
 from __future__ import annotations
 
@@ -36,9 +36,8 @@ WAVELENGTHS = np.arange(380.0, 781.0, 10.0)  # nm, of D65
 
 
 def weights(nm: Floats) -> Floats:
-    """Weights, (N, 3), of a reflectance at equally spaced wavelengths, nm, that sum to its linear sRGB color under D65.
-
-    A flat reflectance gives gray.
+    """Weights, (N, 3), for the values of a reflectance at equally spaced wavelengths in nm. The weighted sum is its
+    linear sRGB color under D65; a constant reflectance gives gray.
     """
     light = np.interp(nm, WAVELENGTHS, D65, left=0.0, right=0.0)
     rgb = (observer(nm) * light).T @ XYZ_TO_RGB.T

@@ -1,7 +1,7 @@
 """The dependence of a refractive index on the wavelength: formulas and tables.
 
 Formulas take the wavelength in micrometers, as published; the public interface uses nanometers. A formula is valid only
-where it was fitted, so each has a range.
+in the range in which it was fitted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ALL = (0.0, np.inf)
 
 
 class RefractiveIndex(NamedTuple):
-    """The complex index eta + i k at the requested wavelengths; k is 0 if the source has none."""
+    """The complex index eta + i k at the requested wavelengths; k is 0 if the source states none."""
 
     eta: Floats
     k: Floats
@@ -39,7 +39,7 @@ class Dispersion:
     high: float
 
     def at(self, wavelength: Floats) -> RefractiveIndex:
-        """The complex index at wavelengths in nm, all of which must be in range."""
+        """The complex index at wavelengths in nm, all of which must lie within the range of validity."""
         eta = np.asarray(self.eta(wavelength / 1000.0), float)
         return RefractiveIndex(eta, np.zeros_like(eta))
 
@@ -62,7 +62,7 @@ class Constant(Dispersion):
 class Powers(Dispersion):
     """sum_i c_i lambda^e_i: n itself (Cauchy's formula) or n^2 (Schott's old catalogs).
 
-    terms    (c, e), lambda in micrometers
+    terms    pairs (c_i, e_i), for lambda in micrometers
     squared  whether the sum is n^2
     """
 
@@ -76,7 +76,10 @@ class Powers(Dispersion):
 
 @dataclass(frozen=True)
 class Sellmeier(Dispersion):
-    """n^2 = constant + sum_i b_i lambda^2 / (lambda^2 - c_i), with lambda^2 and c_i in square micrometers."""
+    """n^2 = constant + sum_i b_i lambda^2 / (lambda^2 - c_i), with lambda^2 and c_i in square micrometers.
+
+    terms  pairs (b_i, c_i)
+    """
 
     terms: tuple[tuple[float, float], ...]
     constant: float = 1.0
@@ -88,7 +91,10 @@ class Sellmeier(Dispersion):
 
 @dataclass(frozen=True)
 class Gas(Dispersion):
-    """n = 1 + constant + density sum_i b_i / (c_i - 1 / lambda^2) (Ciddor1996, eq. 1)."""
+    """n = 1 + constant + density sum_i b_i / (c_i - 1 / lambda^2) (Ciddor1996, eq. 1), with lambda in micrometers.
+
+    terms  pairs (b_i, c_i)
+    """
 
     terms: tuple[tuple[float, float], ...]
     density: float = 1.0
@@ -104,7 +110,8 @@ class Gas(Dispersion):
 class Table(Dispersion):
     """Measured values, interpolated linearly in the wavelength.
 
-    wavelengths  nm, ascending
+    wavelengths  wavelengths in nm, ascending
+    etas, ks     real and imaginary part of the index at these wavelengths
     """
 
     wavelengths: tuple[float, ...]
@@ -132,9 +139,9 @@ class OpticalConstants:
     """The refractive index of a substance with its description.
 
     name    the name by which it is selected
-    title   a description
+    title   its description
     curve   the index as a function of the wavelength
-    source  the reference
+    source  the reference for the values
     """
 
     name: str
@@ -153,10 +160,12 @@ class OpticalConstants:
         return not isinstance(self.curve, Constant)
 
     def at(self, wavelength: float | list[float] | Floats, outside: str = "refuse") -> RefractiveIndex:
-        """The index at vacuum wavelengths in nm, as arrays of the same shape.
+        """The index, as arrays of the shape of `wavelength`.
 
-        outside  for wavelengths out of range: "refuse" raises an error, "level" uses the value at the nearer end
-        Raises InputError for wavelengths that are refused or not positive, and where the formula gives no real index.
+        wavelength  vacuum wavelength, nm; a number or an array
+        outside     treatment of wavelengths out of range: "refuse" raises an error, "level" uses the value at the
+                    nearer end of the range
+        Raises InputError for wavelengths that are refused or not positive, and if the formula gives no real index.
         """
         given = np.asarray(wavelength, np.float64)
         low, high = self.range
@@ -179,12 +188,12 @@ class OpticalConstants:
 
     @property
     def sodium(self) -> float:
-        """eta at 589.3 nm or the nearest known wavelength, for use as a single number."""
+        """eta at 589.3 nm, or at the nearest known wavelength, for use as a single number."""
         return float(self.at(SODIUM, "level").eta)
 
 
 class DispersiveIndex(float):
-    """A dielectric's index together with its dispersion. As a number it is the index at 589.3 nm."""
+    """A dielectric's index together with its dispersion. As a number, it is the index at 589.3 nm."""
 
     constants: OpticalConstants
 

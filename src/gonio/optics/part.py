@@ -1,6 +1,6 @@
 """The base of the parts of a microfacet material: distributions of normals, masking terms and Fresnel kinds.
 
-Each is a class with one named instance. A user-defined part is tested when it joins its family, so that a missing or
+Each is a class with one named instance. A user-defined part is tested when it is registered, so that a missing or
 broken formula is reported with its line immediately, instead of deep inside a render.
 """
 
@@ -21,14 +21,15 @@ SAMPLES = {"vec3": (0.36, 0.48, 0.8), "vec2": (0.3, 0.4), "spectrum": (0.2, 0.5,
 
 
 class MissingFormula(InputError, NotImplementedError):
-    """The error for a call of a method that a user-defined part does not define."""
+    """The error for a call of a method that a user-defined part lacks."""
 
 
 class Part:
     """Base of distributions of normals, masking terms and Fresnel kinds.
 
-    name      used in options, scenes and manuals; derived from the class name by default
-    formulas  method -> kinds of its arguments and of its result; `_given` supplies arguments that are not values
+    name      the name used in options, scenes and manuals; derived from the class name by default
+    formulas  method -> kinds of its arguments, followed by that of its result; `_given` supplies arguments that are not
+              values
     """
 
     name: ClassVar[str] = ""
@@ -41,11 +42,15 @@ class Part:
             cls.name = "" if words.startswith("-") else words
 
     def missing(self) -> str:
-        """The signature of a method that must be defined and is not: "D(self, m, alpha)"; "" if none is missing."""
+        """The signature of a required method that is not defined, "D(self, m, alpha)"; "" if none is missing."""
         return ""
 
     def lacks(self, what: str, method: str) -> MissingFormula:
-        """The error for a call of a missing method with signature `method`."""
+        """The error for a call of a missing method.
+
+        what    what the class has or lacks, such as "no `D`", for the message
+        method  signature of the method to write
+        """
         return MissingFormula(f"{type(self).__name__} has {what}", self.place(), f"write {method}; see {GUIDE}")
 
     def check_formulas(self) -> None:
@@ -59,7 +64,7 @@ class Part:
                 self._try(method, kinds)
 
     def place(self, method: str = "") -> str:
-        """FILE:LINE of the class, or of a method of it."""
+        """FILE:LINE of the class, or of one of its methods; "" if unknown."""
         try:
             thing = inspect.unwrap(getattr(type(self), method)) if method else type(self)
             return f"{inspect.getsourcefile(thing)}:{inspect.getsourcelines(thing)[1]}"
@@ -67,7 +72,7 @@ class Part:
             return ""
 
     def _given(self, kind: str) -> object:
-        """An argument that is not a value, such as a distribution."""
+        """An argument of a given kind that is not a value, such as a distribution."""
         raise NotImplementedError(kind)
 
     def _try(self, method: str, kinds: tuple[str, ...]) -> None:

@@ -10,6 +10,6 @@ SMOOTH = 1e-4
 
 
 def widths(alpha: Pair) -> tuple[Pair, Mask]:
-    """(alpha clamped to at least `SMOOTH`, whether the surface is smooth)."""
+    """alpha clamped to at least `SMOOTH`, and whether the surface is smooth."""
     smooth = (alpha.x < SMOOTH) & (alpha.y < SMOOTH)
     return vec2(maximum(alpha.x, SMOOTH), maximum(alpha.y, SMOOTH)), smooth

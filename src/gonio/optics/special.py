@@ -1,4 +1,4 @@
-"""Special functions for optics, built from the vocabulary only."""
+"""Special functions for optics, written in the vocabulary of `gonio.ops`."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ def erfinv(x: Scalar) -> Scalar:
 def gaussian_ramp(a: Scalar) -> Scalar:
     """int_-inf^a (a - x) exp(-x^2) dx / sqrt(pi) = a (1 + erf a) / 2 + exp(-a^2) / (2 sqrt(pi)), for a >= 0.
 
-    The integral over the slopes of a Gaussian below a. In float32 it is a rational function with an error of 8e-8: with
-    erf and exp, Beckmann's pdf took 1.8 times as long. The coefficients were fitted for Gonio by least squares of the
-    relative error at 4000 Chebyshev points, reweighted toward the largest; from a = 4 on the value is a, within 2e-10.
+    The integral over Gaussian slopes below a. In float32, it is a rational function with an error of 8e-8; with erf and
+    exp, Beckmann's pdf takes 1.8 times as long. The coefficients were fitted for Gonio by least squares of the relative
+    error at 4000 Chebyshev points, reweighted toward the largest error; for a >= 4, the value is a within 2e-10.
     """
     if not is_short(a):
         return 0.5 * a * (1.0 + erf(a)) + (0.5 / SQRT_PI) * exp(-sqr(a))
@@ -70,7 +70,7 @@ def gaussian_ramp(a: Scalar) -> Scalar:
 
 
 def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
-    """The polynomial with these coefficients, in ascending powers."""
+    """The polynomial with these coefficients, in ascending powers, at x."""
     value = fma(x, coefficients[-1], coefficients[-2])
     for c in reversed(coefficients[:-2]):
         value = fma(value, x, c)
@@ -79,7 +79,8 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 @function
 def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
-    """cos(theta)^p, from the squared sine if it is below 0.1: near 1 the cosine is too coarsely rounded for large p.
+    """cos(theta)^p, computed from the squared sine where this is below 0.1: near 1, the cosine is rounded too coarsely
+    for large p.
 
     log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)); the first omitted term is below 1e-18.
     """
@@ -93,7 +94,8 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
 
 @function
 def exprel(x: V) -> V:
-    """(e^x - 1) / x, 1 at x = 0: up to |x| = 1/2 by its series, whose first omitted term is below 2e-17 of the sum."""
+    """(e^x - 1) / x, and 1 at x = 0. Up to |x| = 1/2, it is computed by its series, whose first omitted term is below
+    2e-17 of the sum."""
     t = clamp(x, -0.5, 0.5)
     series = 1.0 + t * (1.0 / 13.0)
     for n in range(12, 1, -1):
@@ -104,7 +106,8 @@ def exprel(x: V) -> V:
 
 @function
 def logrel(x: Scalar) -> Scalar:
-    """log(1 + x) / x for x > -1, 1 at x = 0: up to |x| = 1/4 by 2 atanh(x / (2 + x)), relative error below 1e-17."""
+    """log(1 + x) / x for x > -1, and 1 at x = 0. Up to |x| = 1/4, it is computed by 2 atanh(x / (2 + x)), with a
+    relative error below 1e-17."""
     t = clamp(x, -0.25, 0.25)
     z2 = sqr(t / (2.0 + t))
     series = 1 / 17 + z2 * (1 / 19)
@@ -116,19 +119,19 @@ def logrel(x: Scalar) -> Scalar:
 
 @function
 def power_integral(log_t: Scalar, q: Scalar) -> Scalar:
-    """int_1^t s^(q - 1) ds = (t^q - 1) / q from log t; log t at q = 0."""
+    """int_1^t s^(q - 1) ds = (t^q - 1) / q, given log t; at q = 0, it is log t."""
     return log_t * exprel(q * log_t)
 
 
 @function
 def power_quantile(area: Scalar, q: Scalar) -> Scalar:
-    """log t of the t for which `power_integral` is `area`: the inverse distribution function of a power law."""
+    """log t for which `power_integral` is `area`: the inverse distribution function of a power law."""
     return area * logrel(q * area)
 
 
 @function
 def log_share(q: Scalar, p: Scalar) -> Scalar:
-    """log q of a fraction q, given p = 1 - q too: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
+    """log q of a fraction q, given also p = 1 - q. For p <= 1/2, where log would cancel, it is 2 atanh(p / (p - 2)).
 
     The first omitted term of the series is below 4e-10 of the sum.
     """
@@ -155,8 +158,8 @@ def beta(a: Scalar, b: Scalar) -> Scalar:
     """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
 
     Both arguments are shifted up by three with B(a, b) = B(a + 1, b) (a + b) / a; then Stirling's series is used with
-    its leading terms combined into ratios. Relative error below 1e-8 in float64, about 1e-6 in float32. Arguments above
-    1e8 count as 1e8: their fourth power must not overflow float32.
+    its leading terms combined into ratios. The relative error is below 1e-8 in float64 and about 1e-6 in float32.
+    Arguments above 1e8 are treated as 1e8, since their fourth power must not overflow float32.
     """
     a, b = minimum(a, 1e8), minimum(b, 1e8)
     ratio: Scalar | float = 1.0

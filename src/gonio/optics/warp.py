@@ -9,7 +9,7 @@ from .special import exprel, power_of_cosine
 
 @function
 def square_to_cosine_hemisphere(u1: Scalar, u2: Scalar) -> Direction:
-    """A direction with density cos(theta) / pi about +z; Malley's method (PBRT4)."""
+    """A direction with density cos(theta) / pi about +z, by Malley's method (PBRT4)."""
     r = ops.sqrt(u1)
     phi = (2.0 * ops.pi) * u2
     s, c = sincos(phi)
@@ -25,7 +25,7 @@ def square_to_cosine_hemisphere_pdf(w: Direction) -> Scalar:
 def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
     """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994).
 
-    sin^2 is computed from the logarithm of the cosine: at p = 1e5 the difference 1 - cos^2 has no digits in float32.
+    sin^2 is computed from the logarithm of the cosine: at p = 1e5, the difference 1 - cos^2 has no digits in float32.
     """
     log_cos = ops.log(1.0 - u1) / (p + 1.0)
     cos_theta = ops.exp(log_cos)
@@ -43,7 +43,7 @@ def square_to_power_lobe_pdf(cos_theta: Scalar, p: Scalar) -> Scalar:
 
 @function
 def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
-    """(axis.w)^p, from their distance: near the peak the dot product is rounded too coarsely for large p."""
+    """(axis.w)^p, computed from |axis - w|: near the peak, the dot product is rounded too coarsely for large p."""
     off = w - axis
     versine = 0.5 * dot(off, off)
     return power_of_cosine(dot(axis, w), versine * (2.0 - versine), p)
@@ -51,7 +51,8 @@ def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
 
 @function
 def to_frame(axis: Direction, w: Direction) -> Direction:
-    """w taken from the frame of +z to that of a unit axis; the basis is discontinuous only at axis = -z (Duff2017)."""
+    """w transformed from a frame about +z to one about a unit axis; the basis is discontinuous only at axis = -z
+    (Duff2017)."""
     side = ops.copysign(ops.ones_like(axis.z), axis.z)
     a = -1.0 / (side + axis.z)
     b = axis.x * axis.y * a

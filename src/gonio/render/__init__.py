@@ -86,7 +86,7 @@ def _path(named: str | Path | None) -> Path | None:
 
 
 def _shown(scene: MaterialLike, allow_code: bool) -> tuple[Path, BSDF | None]:
-    """(path of a scene, None), or (name of a material, the material), which may be given as text."""
+    """(path of a scene, None), or (name of a material, the material), which may be given as a string."""
     from ..catalog import notation, operands
     from ..catalog.material import material
 

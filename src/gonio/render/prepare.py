@@ -152,7 +152,7 @@ def _advice(render: Renders) -> list[str]:
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
-    """The settings that a picture depends on, as text."""
+    """The settings that a picture depends on, as a string."""
     ours = {} if settings is None else {**asdict(settings), "program": _code_of(settings.program)}
     others: dict[str, images.Value] = {**more, "features": request.denoise}
     if request.until_error is not None:

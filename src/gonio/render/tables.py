@@ -203,8 +203,8 @@ def _preset(
     target: MaterialLike, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
     flip: bool,
 ) -> Baked:  # fmt: skip
-    """E and E_avg as in the homework's text or in its figures. E_avg of the figures is free of noise, and the bytes of
-    their pictures wrap."""
+    """E and E_avg as in the homework's text or in its figures. E_avg of the figures is free of noise, and in their
+    pictures bytes above 255 wrap around."""
     if preset not in PRESETS:
         raise InputError(f"unknown preset '{preset}' of a table", "--preset", did_you_mean(preset, list(PRESETS)))
     if target != "ggx":

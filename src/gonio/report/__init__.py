@@ -2,7 +2,7 @@
 text.
 
     listing.py   the list of figures, report.toml
-    entries.py   the kinds of figures, and how each is made
+    entries.py   the kinds of figures, and the code that makes each
     words.py     report.md, which is written once and then edited only by its author
     document.py  the page, report.html; formulas.py typesets its formulas, printing.py prints it as a PDF
 """

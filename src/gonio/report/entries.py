@@ -33,7 +33,7 @@ Words = Annotated[str, Field(min_length=1)]
 
 @dataclass(frozen=True)
 class Making:
-    """How and where figures are made.
+    """The options and the folder with which figures are made.
 
     options  options of all pictures, as given by the command; those that differ from their defaults override the list
     folder   the folder of the figures
@@ -91,7 +91,7 @@ class Figure(Part):
     text: str = ""
 
     def with_defaults(self, common: PictureKeys, scene: str) -> Figure:
-        """The figure, with the list's options and scene where it has none of its own."""
+        """The figure, with the options and scene of the list for those that it does not set itself."""
         return self
 
     def title(self) -> str:
@@ -111,7 +111,8 @@ class Figure(Part):
 
     def identity(self, making: Making) -> str:
         """Check everything that can be checked before rendering. Returns a hash of everything that the figure depends
-        on, or "" for a figure that is made each time, which takes seconds. Raises InputError."""
+        on, or "" for a figure that takes only seconds and is made each time. Raises InputError for a figure that cannot
+        be made."""
         raise NotImplementedError
 
     def make(self, making: Making, file: Path) -> Facts:
@@ -290,7 +291,7 @@ class Bake(Figure):
 
 
 class Check(Figure):
-    """A table of verdicts about the student's own work, as given by gonio check."""
+    """A table of verdicts about the student's own work, as given by `gonio check`."""
 
     suffix: ClassVar[str] = ".csv"
     type: Literal["check"]

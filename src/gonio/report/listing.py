@@ -51,11 +51,12 @@ class Listing:
 
 
 def listing(target: str, options: Mapping[str, Sequence[str] | None], allow_code: bool, allow_outside: bool) -> Listing:
-    """The list in a .toml, or in the report.toml of a scene's folder if no option lists figures; else that of the
-    options.
+    """The list in a .toml, or in the report.toml of a scene's folder if no option lists figures; otherwise the list
+    given by the options.
 
+    target   a .toml, a scene or a material
     options  the values of "study", "plot", "bake" and "work"
-    Raises InputError with file and key.
+    Raises InputError, with file and key, for an invalid list.
     """
     path, given = Path(os.path.expanduser(target)), any(options.values())
     file = path if path.suffix.lower() == ".toml" else path / LIST_FILE

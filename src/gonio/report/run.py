@@ -82,7 +82,8 @@ def report(
     output  folder of the report; None is NAME-report in the current folder
     The folder contains report.md, report.html and the figures. report.md is written only if it is missing: edit its
     text, and call again. Unchanged figures are not made again.
-    Other options as in `go.render`, for all pictures. Returns a Report. Raises InputError, MachineError.
+    Other options are as in `go.render`, for all pictures. Returns a Report. Raises InputError for an invalid list,
+    scene or option, MachineError if this machine cannot render or print it.
     """
     lists = {"study": study, "plot": plot, "bake": bake, "work": work}
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
@@ -105,8 +106,10 @@ def write(
 ) -> Report:
     """Make the figures and the document.
 
-    step  called before each figure with the number of figures made, their total number, and the name of the next one
-    tell  called with notices about results of an earlier run
+    lists  the values of "study", "plot", "bake" and "work"
+    step   called before each figure with the number of figures made, their total number, and the name of the next one
+    tell   called with notices about results of an earlier run
+    The other arguments are as in `report`.
     """
     content = listing(target, lists, options.allow_code, options.allow_outside)
     folder = files.check_folder(Path(f"{content.name}-report") if output is None else output).absolute()
@@ -222,5 +225,5 @@ def _write_settings(content: Listing, names: Sequence[str], facts: Sequence[Fact
 
 
 def given(options: RenderOptions) -> RenderOptions:
-    """Only the options of a render, from an object that has more."""
+    """The options of a render, copied from an object that has more fields."""
     return RenderOptions(**{one.name: getattr(options, one.name) for one in fields(RenderOptions)})

@@ -1,6 +1,6 @@
 """report.md: the text of a report and the places of its figures.
 
-Gonio writes it once and from then on only reads it; its author edits it.
+Gonio writes the file once and from then on only reads it; its author edits it.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ def references(text: str) -> Iterator[Reference]:
 def check_references(text: str, folder: Path, made: Collection[str], allow_outside: bool) -> None:
     """Raise InputError for a picture or table that does not exist and is not about to be made.
 
-    made  files in the folder `figures` that the list makes
+    made           files in the folder `figures` that the list makes
+    allow_outside  allow files outside the folder
     """
     for line, target in references(text):
         if target not in {f"{FOLDER}/{name}" for name in made}:
@@ -82,7 +83,8 @@ def check_references(text: str, folder: Path, made: Collection[str], allow_outsi
 
 
 def local(folder: Path, target: str, location: str, allow_outside: bool) -> Path:
-    """The path of a picture or table that the text shows. Raises InputError if it cannot be used."""
+    """The path of a picture or table that the text shows. Raises InputError, which names `location`, if it cannot be
+    used."""
     if re.match(r"[a-zA-Z][a-zA-Z+.-]+:", target):
         raise InputError(f"'{target}' is not a file", location, "save it in the report's folder, and name it there")
     path = folder / target

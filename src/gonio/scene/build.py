@@ -269,7 +269,7 @@ class _Builder:
             self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
 
     def plugin(self, material: MaterialPart, where: str) -> PluginDict:
-        """The material as a Mitsuba dict."""
+        """The material as a Mitsuba dict; errors name `where`, as in the methods below."""
         plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
         # As in the lab, back sides are not black; the flag has no effect on materials that transmit light.
         plugin["two_sided"] = material.two_sided is not False

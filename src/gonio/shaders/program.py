@@ -318,7 +318,7 @@ def listed(doc: str) -> Iterator[tuple[str, str]]:
 
 
 def check(model: object, functions: str | Sequence[str], location: str) -> tuple[str, ...]:
-    """Return those of the requested functions that the model has, without repetition.
+    """Return the requested functions without repetition, and without "terms" if the model has none.
 
     functions  names in a sequence, or in one string separated by commas
     location   the place that errors name

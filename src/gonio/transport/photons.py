@@ -224,7 +224,7 @@ class PhotonMap:
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
     """The indices that sort keys stably.
 
-    Sorts by 16 bits at a time, which NumPy does by counting: sorting by 32 bits takes twice as long.
+    The keys are sorted by 16 bits at a time, which NumPy does by counting: sorting by 32 bits takes twice as long.
     """
     order = np.argsort(key.astype(np.uint16), kind="stable")
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]

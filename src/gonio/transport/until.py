@@ -115,7 +115,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _Wide:
-    """Two halves that were too blurred, shown as long as their successors are worse.
+    """Two halves that were too blurred, shown as long as the halves that replaced them have a larger error.
 
     error   error of their picture
     blur    the part of `error` due to blur

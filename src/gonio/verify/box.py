@@ -1,6 +1,8 @@
-"""The parameter values at which a BSDF is tested in addition to the given ones: corners, edges and random points of the
-declared ranges, and the values just past every discontinuity in a scan along one parameter. A material that is correct
-at its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of two parameters.
+"""The parameter values at which a BSDF is tested in addition to the given ones.
+
+These are corners, edges and random points of the declared ranges, and the values just past every discontinuity in a
+scan along one parameter. A material that is correct at its defaults may be wrong for a coat above 0.9, for a narrow
+lobe, or for a combination of two parameters.
 
     for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
 
@@ -38,9 +40,9 @@ class Place:
     """A point in the ranges of the parameters.
 
     values   the parameter values that differ from those of the given material, by path
-    why      "given", "choice", "color", "corner", "edge", "interior", "jump" or "pair"
-    subject  the BSDF there
-    along    the parameters that vary; if empty, all axes of `subject`
+    why      why it was chosen: "given", "choice", "color", "corner", "edge", "interior", "jump" or "pair"
+    subject  the BSDF with these values
+    along    the axes of the parameters that vary; if empty, all axes of `subject`
     """
 
     values: dict[str, Any]
@@ -49,7 +51,7 @@ class Place:
     along: tuple[Axis, ...] = ()
 
     def inside(self) -> Place:
-        """The point moved away from the ends of the ranges, where values may be clamped and have no derivatives."""
+        """The place moved away from the ends of the ranges, where values may be clamped and have no derivatives."""
         moved = {}
         for number, axis in enumerate(self.along or axes(self.subject)):
             value = tree.value_at(self.subject.model, axis.path)
@@ -69,12 +71,16 @@ class Place:
 
     @property
     def words(self) -> str:
-        """ "alpha = 1, coat = 0.5"."""
+        """The values as text: "alpha = 1, coat = 0.5"."""
         return ", ".join(f"{name} = {_short(value)}" for name, value in self.values.items())
 
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
-    """The places other than the given one, without duplicates, in order of importance."""
+    """The places at which to test a subject in addition to the given one, without duplicates, in order of importance.
+
+    effort  the cost of the trial, which determines their number
+    seed    seed of random places
+    """
     along, others = axes(subject), _choices(subject)
     if not (along or others) or effort.places <= 0:
         return []
@@ -119,8 +125,8 @@ WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # positions of the widths along the two axe
 
 
 def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Saturated values for all colors at once, with the channels of each color permuted differently; every second one
-    with narrow lobes, whose shadowing loss is too small to hide a Fresnel term above 1."""
+    """Saturated values for all colors at once, with the channels of each color permuted differently. Every second set
+    also makes lobes narrow, so that their shadowing loss is too small to hide a Fresnel term above 1."""
     colors = [axis for axis in along if axis.kind == "color"]
     narrow = {axis.path: _plain(axis.at(NARROW)) for axis in along if axis.kind == "alpha"}
     return [
@@ -132,13 +138,13 @@ def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
 
 
 def _unequal(subject: Subject, along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Two unequal widths where one number or two equal ones are given."""
+    """Two unequal widths for each parameter that has one number or two equal ones."""
     alphas = [axis for axis in along if axis.kind == "alpha" and _equal(tree.value_at(subject.model, axis.path))]
     return [{axis.path: _plain([float(axis.at(s)) for s in shares]) for axis in alphas} for shares in WIDTHS if alphas]
 
 
 def _inside(along: list[Axis], rng: np.random.Generator) -> dict[str, Any]:
-    """Random values of all parameters; two per width, one for each axis."""
+    """Random values of all parameters, with separate values for the two axes of a width."""
     return {axis.path: axis.at(rng.uniform(size=2) if axis.kind == "alpha" else rng.uniform()) for axis in along}
 
 
@@ -148,13 +154,13 @@ def _equal(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """A float, or a tuple of floats."""
+    """The value as a float or a tuple of floats."""
     return tuple(np.asarray(value, float).tolist()) if np.ndim(value) else float(value)
 
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
-    """Each other option of a choice and each inverted flag, in rounds of one per parameter: only the first few are
-    tested, since each compiles new code."""
+    """Each other option of every choice and each inverted flag, in rounds of one per parameter. Only the first few are
+    tested, since each requires the compilation of new code."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
     turns: list[list[dict[str, str | bool]]] = []
@@ -196,10 +202,13 @@ def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis,
 
 
 def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]]:
-    """Values just past a jump, the largest jump first.
+    """Parameter values just past a jump, by path, the largest jump first.
 
-    Each parameter is swept through its range, with the others as given. A step of eval, pdf or the mean weight from one
-    value to the next that is many times as large as the neighboring steps is a jump.
+    Each parameter is swept through its range, with the others as given. A jump is a step of `eval`, `pdf` or the mean
+    weight, from one value to the next, that is many times as large as the neighboring steps.
+
+    along  axes of the parameters to sweep
+    seed   seed of the directions and random numbers
     """
     sized: list[tuple[float, dict[str, Any]]] = []
     for axis in along:
@@ -225,10 +234,10 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
 
 
 def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
-    """Sizes of the jumps in curves (SCAN, N) along the first axis, and the index just past each.
+    """Sizes of the jumps in N curves (SCAN, N) along the first axis, and the index just past each jump.
 
-    The bend is a second difference divided by the value, 0 for linear curves. Its median over the N curves shows a
-    small factor for all directions, its 90th percentile a change for a few.
+    The bend is the second difference divided by the value, which is 0 for linear curves. Its median over the N curves
+    reveals a small factor for all directions, its 90th percentile a change for a few.
     """
     least = 1e-6 * float(np.max(np.abs(curve), initial=0.0, where=np.isfinite(curve)))
     if least <= 0.0:
@@ -249,10 +258,10 @@ def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
 
 
 def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], seed: int) -> list[np.ndarray]:
-    """eval, pdf and weights (SCAN, N) at the same directions and random numbers for every value.
+    """`eval`, `pdf` and weights, (SCAN, N) each, at the same directions and random numbers for every value of the
+    parameter at `path`.
 
-    along  the paths of all parameters that are swept in turn: each is passed as an array, so that one kernel serves
-           them all
+    along  paths of all parameters that are swept in turn; each is passed as an array, so that one kernel serves all
     """
     rng = np.random.default_rng([seed, 72])
     sides = np.array(subject.sides or (1,))
@@ -292,13 +301,13 @@ def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], s
 
 
 def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
-    """The value of a parameter, repeated `count` times in the form that `per_ray` takes."""
+    """The value of a parameter, repeated `count` times in the form that `per_ray` accepts."""
     value = np.asarray(tree.value_at(subject.model, path), float)
     return np.full(count, float(value)) if value.ndim == 0 else np.tile(value, (count, 1))
 
 
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
-    """The result of `per_ray_of`, or None if the subject takes no arrays."""
+    """The result of `per_ray_of`, or None if the subject does not accept arrays."""
     try:
         together = per_ray_of(subject, values)
         probe = directions.at(np.full(len(next(iter(values.values()))), 30.0), 10.0)
@@ -309,8 +318,11 @@ def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | Non
 
 
 def per_ray_of(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject:
-    """The subject with one value per ray for some parameters, by path: (N,) or (N, 3) for a color, (N,) or (N, 2) for a
-    pair of alphas. Raises InputError for values that it rejects."""
+    """The subject with one value per ray for some parameters.
+
+    values  path -> (N,); also (N, 3) for a color, and (N, 2) for a pair of alphas
+    Raises InputError for values that the subject rejects.
+    """
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():

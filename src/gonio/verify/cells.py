@@ -1,9 +1,10 @@
 """Cells of the sphere that follow a BSDF's samples, for the chi-square test.
 
-A lobe of width 0.005 covers a hundred-thousandth of the sphere: fixed cells would put all of it into one, or number
-millions. So a small first draw (the pilot) places the edges: 100 rows per side of the surface and 200 columns per row,
-at quantiles of the pilot, at equal steps, and at increasing distances from its median for the tails. The coordinates
-are (1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no cancellation near the pole.
+A lobe of width 0.005 covers a hundred-thousandth of the sphere: fixed cells would either contain the whole lobe in one
+cell, or number millions. So a small first set of samples (the pilot) places the edges of 100 rows per side of the
+surface and of 200 columns per row: at quantiles of the pilot, at equal steps, and at increasing distances from its
+median for the tails. The coordinates are (1 - |z|, a pseudo-angle of (x, y)): areas are equal, there is no
+transcendental function, and no cancellation near the pole.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps rows
 class Grid(NamedTuple):
     """The cells for several wo.
 
-    wo     (N, 3)
-    sides  the sides of the surface that have cells, 1 above and -1 below
-    rows   edges of 1 - |z|, (N, sides, rows + 1), float32
+    wo       directions, (N, 3)
+    sides    the sides of the surface that have cells: 1 above, -1 below
+    rows     edges of 1 - |z|, (N, sides, rows + 1), float32
     columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
-    pilot  the samples that placed the cells, (n, 3) for each wo
+    pilot    the samples that placed the cells, (n, 3) for each wo
     """
 
     wo: np.ndarray
@@ -49,7 +50,7 @@ class Grid(NamedTuple):
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Cells placed by the pilot's samples; None if no sample has a density."""
+    """Place cells by a subject's samples; None if no sample has a density."""
     rng = np.random.default_rng([seed, 11])
     pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
     many = np.repeat(wo, pilot, axis=0)
@@ -62,9 +63,12 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
 
 
 def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Cells placed by given samples (n, 3) of each wo, on the sides with samples or with a positive pdf.
+    """Place cells by given samples, on the sides of the surface with samples or with a positive pdf.
 
-    A wo whose samples are so close together that the rounding of float32 directions matters is skipped.
+    pilot  samples (n, 3) for each wo
+    pdf    function (wo, wi) that returns the density
+    cells  numbers of rows and columns per side
+    A wo is omitted if its samples are so close together that the rounding of float32 directions matters.
     """
     sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
     resolved = [i for i, wi in enumerate(pilot) if _spread(wi) > FINEST]
@@ -95,19 +99,19 @@ def _spread(wi: np.ndarray) -> float:
 
 
 def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
-    """Whether the pdf is positive on that side, at any of 256 random wi per wo."""
+    """Whether the pdf is positive on a side of the surface, at any of 256 random wi per wo."""
     rng = np.random.default_rng(3)
     wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
     return bool(np.any(pdf(np.repeat(wo, 256, axis=0), wi) > 0.0))
 
 
 def height(w: np.ndarray) -> np.ndarray:
-    """1 - |z| of directions (N, 3), from x and y: no cancellation near the pole."""
+    """1 - |z| of directions (N, 3), computed from x and y to avoid cancellation near the pole."""
     return (w[:, 0] ** 2 + w[:, 1] ** 2) / (1.0 + np.abs(w[:, 2]))
 
 
 def pseudo_angle(w: np.ndarray) -> np.ndarray:
-    """Pseudo-angle in [0, 4]: monotonic in the azimuth, y / (|x| + |y|) in the first quadrant."""
+    """The pseudo-angle in [0, 4], which increases with the azimuth and is y / (|x| + |y|) in the first quadrant."""
     reach = np.abs(w[:, 0]) + np.abs(w[:, 1])
     t = w[:, 1] / np.where(reach > 0, reach, 1.0)
     return np.where(w[:, 0] < 0, 2.0 - t, np.where(w[:, 1] < 0, 4.0 + t, t))
@@ -121,7 +125,8 @@ def azimuth(turn: np.ndarray) -> np.ndarray:
 
 
 def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """count + 1 edges on [low, high]: half at quantiles, a quarter evenly spaced, a quarter at increasing distances."""
+    """count + 1 edges on [low, high]: half of them at quantiles, a quarter evenly spaced, and a quarter at increasing
+    distances."""
     inside = values[(values > low) & (values < high)]
     if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
@@ -145,15 +150,18 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
 
 
 def _growing(first: float, last: float, count: int) -> np.ndarray:
-    """Distances in geometric progression, up to a ratio of at least 1e4: the tail of a lobe of width 1e-4 extends to a
-    million times its height."""
+    """Distances in geometric progression, up to a ratio of at least 1e4, since the tail of a lobe of width 1e-4 extends
+    to a million times its height."""
     first = max(first, 1e-10)
     return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
 
 
 def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds (a, b, c, d), (..., rows, columns) each, of the cells [a, b] x [c, d] in (1 - |z|, azimuth), from the
-    edges of rows (..., rows + 1) and columns (..., rows, columns + 1)."""
+    """The bounds (a, b, c, d), (..., rows, columns) each, of the cells [a, b] x [c, d] in (1 - |z|, azimuth).
+
+    rows     edges of 1 - |z|, (..., rows + 1)
+    columns  edges of the pseudo-angle, (..., rows, columns + 1)
+    """
     turn = azimuth(columns.astype(float))
     c, d = turn[..., :-1], turn[..., 1:]
     heights = rows.astype(float)[..., None]
@@ -162,7 +170,7 @@ def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def direction(height: np.ndarray, azimuth: np.ndarray, side: np.ndarray | float) -> np.ndarray:
-    """Unit vectors (..., 3) with the given 1 - |z| and azimuth, on a side of the surface."""
+    """Unit vectors (..., 3) with the given height 1 - |z| and azimuth, on a side of the surface."""
     r = np.sqrt(height * (2.0 - height))
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), (1.0 - height) * side], -1)
 
@@ -192,6 +200,6 @@ def cell_of(grid: Grid, which: Array, wi: Array) -> tuple[Array, Array]:
 
 
 def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> Array:
-    """The index of the cell that contains a value: the last whose lower edge is not above it."""
+    """The index of the cell that contains a value: the last one whose lower edge is not above it."""
     dr = backend.drjit()
     return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)

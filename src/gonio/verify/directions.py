@@ -25,13 +25,13 @@ def angles(w: np.ndarray) -> np.ndarray:
 
 
 def text(w: np.ndarray) -> str:
-    """One direction as "theta,phi" in degrees, the form that `--at` takes."""
+    """A direction as a string "theta,phi" in degrees, the form that `--at` accepts."""
     theta, phi = angles(w)
     return f"{theta:.9g},{phi:.9g}"
 
 
 def parse(pair: str) -> tuple[np.ndarray, np.ndarray]:
-    """(wo, wi) from "theta_o,phi_o/theta_i,phi_i" in degrees. Raises InputError if the text is malformed."""
+    """(wo, wi) from a string "theta_o,phi_o/theta_i,phi_i" in degrees. Raises InputError if it is malformed."""
     try:
         (to, po), (ti, pi) = ([float(x) for x in part.split(",")] for part in pair.split("/"))
     except ValueError:
@@ -56,12 +56,12 @@ def on_side(w: np.ndarray, side: int) -> np.ndarray:
 
 
 def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Uniform numbers (count, 3) in [0, 1), exact in float32, so that none rounds up to 1."""
+    """Uniform random numbers (count, 3) in [0, 1) that are exact in float32, so that none is rounded up to 1."""
     return rng.random((count, 3), dtype=np.float32).astype(np.float64)
 
 
 def single(w: np.ndarray) -> np.ndarray:
-    """The directions rounded to float32, in float64: both precisions then get the same input."""
+    """The directions rounded to float32, as float64 arrays, so that both precisions get the same input."""
     return w.astype(np.float32).astype(np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The cost of a trial: directions, samples, accuracy."""
+"""The cost of a trial: numbers of directions and samples, and accuracy."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from .cells import CELLS
 class Effort:
     """The cost of a trial.
 
-    pairs            pairs of directions for the pointwise laws
-    log_samples      binary logarithm of the samples of the chi-square test, per direction
-    furnace          directions wo of the furnace
-    furnace_samples  calls of `sample` in the furnace, per direction
-    accuracy         requested of integrals
+    name             its name in `EFFORTS`
+    pairs            number of pairs of directions for the pointwise laws
+    log_samples      binary logarithm of the number of samples per wo in the chi-square test
+    furnace          number of directions wo in the furnace
+    furnace_samples  number of samples per wo in the furnace
+    accuracy         accuracy that is requested of integrals
     widths           other widths of microfacet distributions at which sampling is tested
+    places           number of other parameter values at which every law is tested (`gonio.verify.box`)
     cells            rows and columns of the chi-square test, per side of the surface
-    full             whether the given values are tested: directions reach 89.9 degrees, and claims are checked
-    places           number of other parameter values at which every law is tested, see `gonio.verify.box`
+    full             whether the given parameter values are tested; directions then reach 89.9 degrees, and facts that
+                     the material declares are checked
     """
 
     name: str

@@ -1,7 +1,7 @@
 """The albedos of a BSDF that different integrators measure, and the resulting bias of a picture.
 
-A path tracer uses a BSDF in two ways. It traces the sampled directions, whose mean weight is an albedo; and it samples
-lights, with `eval` as the value and `pdf` for the balance heuristic that weights both (Veach1997, eq. 9.10). In a
+A path tracer uses a BSDF in two ways. It traces sampled directions, whose mean weight is an albedo; and it samples
+lights, with `eval` as the value and `pdf` for the balance heuristic that combines both (Veach1997, eq. 9.10). In a
 furnace of radiance 1, every estimator must return int eval dwi. The difference, as a fraction of the reflected light,
 is the bias of a picture.
 
@@ -35,18 +35,18 @@ Part: TypeAlias = Literal["all", "weights", "pdf"]
 class Estimates(NamedTuple):
     """Directional albedos by each estimator, for N directions wo.
 
-    wo, mass  as `severity.views` returns them
-    value     int eval dwi plus the light of the delta lobes, (N, channels): the limit of light sampling
-    sampled   mean weight (N, channels): the limit of BSDF sampling
-    both      the two combined by the balance heuristic, light samples uniform on the sphere
-    consistent, consistent_both  `sampled` and `both` with each sample weighted by eval / pdf: what remains of the
-              difference between them and `value` is due to the pdf, the rest to the weights
+    wo, mass  directions and their fractions of the hemispheres, from `severity.views`
+    value     int eval dwi plus the light of the delta lobes, (N, channels), the limit of light sampling
+    sampled   mean weight, (N, channels), the limit of BSDF sampling
+    both      the two combined by the balance heuristic, with light samples uniform on the sphere
+    consistent, consistent_both  `sampled` and `both` with each sample weighted by eval / pdf: their difference from
+              `value` is due to the pdf; the rest of the difference of `sampled` and `both` is due to the weights
     noise     two standard errors of `sampled` and `both`
-    parts     `value`, `sampled` and `consistent`, means over the channels, per bin of wi: (3, N, BINS)
+    parts     `value`, `sampled` and `consistent` per bin of wi, averaged over the channels, (3, N, BINS)
     doubt     three standard errors of the last two, (N, BINS)
-    unseen    fraction of light that rare samples of huge weight may add beyond those observed, (N,)
+    unseen    fraction of light that rare samples of huge weight may add beyond the observed ones, (N,)
     claimed   int pdf dwi, (N,)
-    drawn     fraction of samples that did not fail and are not delta samples, (N,)
+    drawn     fraction of samples that have not failed and are not delta samples, (N,)
     """
 
     wo: np.ndarray
@@ -65,7 +65,7 @@ class Estimates(NamedTuple):
 
 
 def of_subject(subject: Subject) -> Estimates:
-    """The estimates for radiance, computed when a law first fails and cached for all laws."""
+    """The estimates for radiance, which are computed when the first law fails and cached for all laws."""
     if "estimates" not in subject.memo:
         subject.memo["estimates"] = estimate(subject)
     estimates: Estimates = subject.memo["estimates"]
@@ -73,7 +73,7 @@ def of_subject(subject: Subject) -> Estimates:
 
 
 def estimate(subject: Subject, mode: Mode = "radiance") -> Estimates:
-    """The results of the three integrators for each direction of `severity.views`."""
+    """The results of all estimators for each wo of `severity.views`."""
     wo, mass = views(subject.sides)
     n = len(wo)
     many = np.repeat(wo, SAMPLES, axis=0)
@@ -122,8 +122,8 @@ def _followed_weight(subject: Subject, wo: np.ndarray, s: SampleArrays) -> np.nd
 
 
 def _integral(subject: Subject, many: np.ndarray, wo: np.ndarray, channels: int, mode: Mode) -> np.ndarray:
-    """Integrals over wi of eval, of eval times the balance heuristic of light samples, of pdf, and of mean eval per
-    bin: (N, 2 channels + 1 + BINS)."""
+    """The integrals over wi of `eval`, of `eval` times the balance heuristic of light samples, of `pdf`, and of the
+    mean of `eval` per bin, (N, 2 channels + 1 + BINS)."""
 
     def answers(o: np.ndarray, i: np.ndarray) -> np.ndarray:
         value = np.nan_to_num(subject.eval(o, i, mode), posinf=0.0, neginf=0.0)
@@ -148,9 +148,9 @@ def _integral(subject: Subject, many: np.ndarray, wo: np.ndarray, channels: int,
 
 
 def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
-    """Contribution to the mean of samples beyond the largest observed weight, (N, 1); 0 where weights are bounded.
+    """The contribution of samples beyond the largest observed weight to the mean, (N, 1); 0 if weights are bounded.
 
-    By Hill's estimate of the tail's exponent: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) beyond t.
+    It uses Hill's estimate of the exponent of the tail: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) above t.
     """
     largest = np.partition(weight.mean(1).reshape(n, SAMPLES), -TAIL, axis=1)[:, -TAIL:]
     least, most = np.maximum(largest.min(1), 1e-30), largest.max(1)
@@ -160,14 +160,15 @@ def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
 
 
 def _bins(w: np.ndarray) -> np.ndarray:
-    """1 in the column of a direction's bin, (N, BINS); the bin edges are those of the first cells of the cubature."""
+    """1 in the column of each direction's bin, else 0, (N, BINS). The edges of the bins are edges of the first cells of
+    the cubature."""
     number = (w[:, 0] > 0.0) + 2 * (w[:, 1] > 0.0) + 4 * (np.abs(w[:, 2]) > np.sqrt(0.5)) + 8 * (w[:, 2] > 0.0)
     return (number[:, None] == np.arange(BINS)).astype(float)
 
 
 def _split(value: Scalar, w: Direction) -> list[Scalar]:
-    """A Dr.Jit value in the entry of its bin, 0 in the others. This runs in the kernel that sums them: sixteen columns
-    of NumPy take longer than most models."""
+    """A Dr.Jit value in the entry of its bin, and 0 in the others. This runs in the kernel that sums the values, since
+    sixteen columns in NumPy take longer than most models."""
     dr = backend.drjit()
     sides = [(~side, side) for side in (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)]
 
@@ -181,7 +182,7 @@ def _split(value: Scalar, w: Direction) -> list[Scalar]:
 def _eval_over_pdf(
     subject: Subject, wo: np.ndarray, wi: np.ndarray, weight: np.ndarray, good: np.ndarray, mode: Mode
 ) -> tuple[np.ndarray, np.ndarray]:
-    """eval / pdf of the samples with a density, and their pdf; other samples keep their weight."""
+    """eval / pdf of the samples with a density, or the weights of other samples; and the pdf."""
     weight, pdf = weight.copy(), np.zeros(len(wo))
     if good.any():
         unit = wi[good] / np.maximum(np.linalg.norm(wi[good], axis=1, keepdims=True), 1e-12)
@@ -193,20 +194,21 @@ def _eval_over_pdf(
 
 
 def _stratified(count: int) -> np.ndarray:
-    """A low-discrepancy sequence in [0, 1)^3: multiples of inverse powers of the positive root of x^4 = x + 1."""
+    """A low-discrepancy sequence in [0, 1)^3, of multiples of inverse powers of the positive root of x^4 = x + 1."""
     steps = 1.2207440846057596 ** -np.arange(1.0, 4.0)
     u = (0.5 + np.arange(count)[:, None] * steps) % 1.0
     return directions.single(np.minimum(u, 1.0 - 2.0**-24))
 
 
 def _batched(values: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over each wo's samples, and its standard error from eight interleaved batches, (N, channels) each."""
+    """The mean over the samples of each wo, and its standard error from eight interleaved batches, (N, channels)
+    each."""
     parts = values.reshape(n, SAMPLES // 8, 8, -1).mean(1)
     return parts.mean(1), parts.std(1) / np.sqrt(7.0)
 
 
 def _deltas(wi: np.ndarray, weight: np.ndarray, pdf: np.ndarray, delta: np.ndarray, n: int) -> np.ndarray:
-    """Sum of weight times probability over the sampled delta directions, (N, channels)."""
+    """The sum of weight times probability over the sampled delta directions, (N, channels)."""
     result = np.zeros((n, weight.shape[1]))
     chosen = (delta & (pdf > 0.0)).reshape(n, SAMPLES)
     for i in range(n):
@@ -221,11 +223,13 @@ def _deltas(wi: np.ndarray, weight: np.ndarray, pdf: np.ndarray, delta: np.ndarr
 
 
 def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None = None) -> Bias:
-    """The error of BSDF sampling, with and without light samples, relative to the limit of light sampling.
+    """The bias of BSDF sampling relative to the limit of light sampling.
 
-    part  "weights" or "pdf" for the part that is due to weights other than eval / pdf, or to a pdf other than that of
-          the samples
-    The larger of the two errors counts; the field `both` of the result is the error with light samples.
+    part   "all", or only the part that is due to weights other than eval / pdf ("weights") or to a pdf other than that
+           of the samples ("pdf")
+    light  the estimates to use; None for those of the subject for radiance
+    Of the errors without light samples, with light samples and under a small light, the largest counts. The field
+    `both` of the result is the error with light samples.
     """
     light = light or of_subject(subject)
     biases = []
@@ -259,7 +263,7 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
 
 
 def _of_power(subject: Subject) -> Estimates:
-    """Estimates of power, without the factor eta^2 of radiance."""
+    """The estimates for power, without the factor eta^2 of radiance."""
     return estimate(subject, "importance") if subject.transmits else of_subject(subject)
 
 
@@ -271,14 +275,14 @@ def gain_bias(subject: Subject) -> Bias:
 
 
 def loss_bias(subject: Subject) -> Bias:
-    """The power lost by a subject that claims to reflect all of it, a lossless variant."""
+    """The power lost by a lossless variant, which claims to reflect all of it."""
     light = _of_power(subject)
     lost = np.maximum(1.0 - light.value, 0.0)
     return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")
 
 
 def stated_bias(subject: Subject) -> Bias:
-    """The reflected power minus the stated albedo: a base that is weighted by that albedo is wrong by as much."""
+    """The reflected power minus the stated albedo, which is also the error of a base weighted by that albedo."""
     light = _of_power(subject)
     stated = subject.model.stated_albedo(light.wo)
     off = light.value - stated.value
@@ -286,7 +290,10 @@ def stated_bias(subject: Subject) -> Bias:
 
 
 def undefined_bias(subject: Subject, seed: int) -> Bias:
-    """The fraction of random wi for which values are not finite."""
+    """The fraction of random wi for which values are not finite.
+
+    seed  seed of the directions
+    """
     wo, mass = views(subject.sides)
     many = np.repeat(wo, UNDEFINED, axis=0)
     rng = np.random.default_rng([seed, 10])

@@ -1,7 +1,7 @@
-"""The expectation of the chi-square test: a pdf's integral over every cell.
+"""The expectation of the chi-square test: the integral of a pdf over every cell.
 
-Cells whose error exceeds what the noise of their counts allows are divided, even if only the samples that placed the
-cells show a lobe that is narrower than a cell.
+Cells are divided until their error is below a tolerance, which depends on the noise of their counts. The samples that
+placed the cells also cause divisions, since a lobe may be narrower than a cell.
 
     expected = expect(subject, grid, tolerance)
 """
@@ -24,9 +24,14 @@ MAX_CELLS = 400_000  # cells per round, about 10 M directions
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all cells (N,), its error from
-    cells that were not fully divided, and an estimate of what each cell lacks of lobes that no sample of the pilot has
-    shown (see `cubature`), (N, sides, rows, columns)."""
+    """The integral of a pdf over cells, for N directions wo.
+
+    cells   probability of each cell, (N, sides, rows, columns)
+    total   integral of the pdf over all cells, (N,)
+    error   error of `total` due to cells that are not fully divided, (N,)
+    unseen  estimate of the probability that each cell lacks because of lobes that no sample of the pilot has hit (see
+            `cubature`), (N, sides, rows, columns)
+    """
 
     cells: np.ndarray
     total: np.ndarray
@@ -35,10 +40,11 @@ class Expectation(NamedTuple):
 
 
 def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
-    """The pdf's integral over every cell; cells whose error exceeds what their noise allows are divided.
+    """Integrate a pdf over every cell.
 
-    pdf        the subject with this pdf, or a function of rows
-    tolerance  allowed error of a cell, relative to the square root of its expected count at `1 / tolerance^2` samples
+    pdf        the subject with this pdf, or a function (wo, wi) of NumPy arrays
+    grid       the cells
+    tolerance  allowed error of a cell with probability p, divided by sqrt(p); 1 / sqrt(n) is the noise of n samples
     """
     look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
     a, b, c, d = (edge.ravel() for edge in boxes(grid.rows, grid.columns))
@@ -83,7 +89,8 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
 
 
 def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which those of each box meet, (N, 2)."""
+    """The quarters of boxes (N, 4) as (4 N, 4), and the height and azimuth at which the quarters of each box meet,
+    (N, 2)."""
     a, b, c, d = box.T
     # the heights of a narrow lobe span decades: they are halved geometrically
     m = np.where(b > 4.0 * a, np.maximum(np.sqrt(a * b), b / 64.0), 0.5 * (a + b))
@@ -93,8 +100,8 @@ def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
-    """The samples that placed a grid's cells, at (1 - |z|, azimuth) in the boxes of the cells `owner`; their light is a
-    fraction of all samples."""
+    """The samples that placed the cells of a grid, at (1 - |z|, azimuth) in the boxes of the cells `owner`. The light
+    of a sample is its fraction of all samples."""
     dr = backend.drjit()
     kind = backend.types("float32")
     which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])
@@ -111,7 +118,7 @@ def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
 
 
 def _within(points: Points, divided: np.ndarray, middle: np.ndarray) -> Points:
-    """The points in divided boxes, renumbered by their quarters, which meet at `middle` (boxes, 2)."""
+    """The points in divided boxes, with the indices of the boxes' quarters, which meet at `middle` (boxes, 2)."""
     inside = Points(*[column[divided[points.cell]] for column in points])
     box = (np.cumsum(divided) - 1)[inside.cell]
     return inside._replace(cell=4 * box + (inside.at > middle[box]) @ [1, 2])
@@ -122,21 +129,21 @@ _RIM = rim(1e-4)
 
 
 class _Look(Protocol):
-    """The pdf at nodes of boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere."""
+    """The pdf at the nodes of boxes [a, b] x [c, d] in (1 - |z|, azimuth), in which areas equal those on the sphere."""
 
     def __call__(
         self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
     ) -> Seen: ...
 
     def at(self, row: np.ndarray, wi: np.ndarray) -> np.ndarray:
-        """The pdf at directions (M, 3), for the wo of these rows."""
+        """The pdf at directions wi (M, 3), for the wo with the indices `row`."""
 
 
 CHUNK = 1 << 22  # directions at a time
 
 
 class _ByRows:
-    """The pdf as a function of rows (wo, wi)."""
+    """The pdf as a function (wo, wi) of NumPy arrays."""
 
     def __init__(self, pdf: Density, wo: np.ndarray) -> None:
         self.pdf, self.wo = pdf, wo

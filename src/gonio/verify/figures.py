@@ -1,4 +1,4 @@
-"""The evidence that laws collect, and its figures for the report, drawn as SVG by Matplotlib."""
+"""The evidence that laws collect, and the figures of it in the report, which Matplotlib draws as SVG."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def _label(axis: Axes, x: str, y: str, title: str = "") -> None:
 class SampleCells:
     """The cells of the chi-square test for one wo.
 
-    expected, observed  samples in each cell, (sides, rows, columns)
-    rows, columns       edges of the cells, see `gonio.verify.cells`
+    expected, observed  expected and observed number of samples in each cell, (sides, rows, columns)
+    rows, columns       edges of the cells, as in `gonio.verify.cells`
     drawn               total number of samples
     wo, sides           the tested direction, and the sides of the surface with cells
     """
@@ -68,7 +68,8 @@ class SampleCells:
     sides: tuple[int, ...] = (1,)
 
     def draw(self) -> tuple[str, str]:
-        """Samples, the number that the pdf predicts, and the difference in standard deviations, near the main lobe."""
+        """Draw the observed and the expected number of samples near the main lobe, and the difference in standard
+        deviations."""
         observed, expected = self.observed, self.expected
         side = int(np.argmax(observed.sum((1, 2))))
         o, e = observed[side].astype(float), expected[side]
@@ -115,9 +116,9 @@ class SampleCells:
 class AlbedoCurves:
     """Directional albedo for wo (N, 3), by two estimators.
 
-    quadrature, error  the integral of eval and its error, (N, channels)
+    quadrature, error  integral of `eval` and its error, (N, channels)
     sampling, noise    mean weight and its standard error, (N, channels)
-    furnace, loss      albedo of the lossless variant, if there is one, and its average loss
+    furnace, loss      albedo of the lossless variant, if there is one, and the average loss in a furnace
     """
 
     wo: np.ndarray
@@ -129,7 +130,7 @@ class AlbedoCurves:
     loss: float = 0.0
 
     def draw(self) -> tuple[str, str]:
-        """Albedo against angle by both estimators, and the loss in the white furnace."""
+        """Draw the albedo by both estimators as a function of the angle, and the loss in the white furnace."""
         wo = self.wo
         theta = np.degrees(np.arctan2(np.hypot(wo[:, 0], wo[:, 1]), wo[:, 2]))
         order = np.argsort(theta)
@@ -165,7 +166,7 @@ class AlbedoCurves:
 
 @dataclass
 class ReciprocityMap:
-    """The largest relative difference of f over azimuths, by (theta_o, theta_i).
+    """The largest relative difference between f(wo, wi) and f(wi, wo) over azimuths, by (theta_o, theta_i).
 
     below  whether the angles extend to 180 degrees
     """
@@ -174,7 +175,7 @@ class ReciprocityMap:
     below: bool
 
     def draw(self) -> tuple[str, str]:
-        """Largest relative difference between f(wo, wi) and f(wi, wo) over azimuths."""
+        """Draw the differences as a map over theta_o and theta_i."""
         figure, axes = _canvas(4.9, 3.7, 1)
         end = 180.0 if self.below else 90.0
         image = axes[0].imshow(
@@ -198,14 +199,14 @@ class ReciprocityMap:
 
 @dataclass
 class RoundingErrors:
-    """The relative error of float32 per pair, and the cosines of wo and wi, (N,) each."""
+    """The relative error of float32 for each pair, and the cosines of wo and wi, (N,) each."""
 
     error: np.ndarray
     cos_o: np.ndarray
     cos_i: np.ndarray
 
     def draw(self) -> tuple[str, str]:
-        """Error of float32 against the smaller cosine."""
+        """Draw the error of float32 as a function of the smaller of the two cosines."""
         cos = np.minimum(self.cos_o, self.cos_i)
         error = np.maximum(self.error, 1e-10)
         pick = np.argsort(-error)[:400]

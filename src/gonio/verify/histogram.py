@@ -27,7 +27,8 @@ MIN_EXPECTED = 10.0  # samples in a pooled cell: Pearson's statistic then follow
 
 
 class Counts(NamedTuple):
-    """Samples in each cell (N, sides, rows, columns), all others (N,), and the number of samples drawn per wo."""
+    """The number of samples in each cell (N, sides, rows, columns), that of all others (N,), and the number of samples
+    drawn per wo."""
 
     cells: np.ndarray
     others: np.ndarray
@@ -35,7 +36,7 @@ class Counts(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """p-values for one wo: of all cells, of the coarse cells, and of the number of samples outside all cells."""
+    """The p-values for one wo: of all cells, of coarse cells, and of the number of samples outside all cells."""
 
     fine: float
     coarse: float
@@ -46,7 +47,10 @@ class Outcome(NamedTuple):
 
 
 def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
-    """Draw 2^log_samples for each wo and count them, in one kernel."""
+    """Draw 2^log_samples samples for each wo and count them, in one kernel.
+
+    seed  seed of the samples
+    """
     dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
@@ -61,14 +65,18 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
 
 
 def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
-    """As `count`, for given samples (n, 3) of a grid with a single wo; the rest of the `drawn` samples failed."""
+    """Count given samples (n, 3) in a grid with a single wo. The rest of the `drawn` samples are those that failed."""
     kind = backend.types("float32")
     wi = backend.vector_of(samples, 3, kind)
     return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
 
 
 def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> Counts:
-    """Count of valid directions in each cell; `which` is the index of each direction's wo."""
+    """The number of valid directions in each cell, and that of all others.
+
+    which  index of each direction's wo
+    drawn  number of samples drawn per wo
+    """
     dr = backend.drjit()
     UInt = backend.types("float32").module.UInt32
     cell, inside = cell_of(grid, which, wi)
@@ -80,7 +88,8 @@ def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> C
 
 
 def random_numbers(kind: Types, index: Array, seed: int) -> Array:
-    """Three independent numbers in [0, 1) for each index by hashing, without state; each seed gives another stream."""
+    """Three independent random numbers in [0, 1) for each index, by hashing without a state. Each seed gives another
+    stream."""
     dr = backend.drjit()
     UInt = kind.module.UInt32
     key = mix(mix(index, dr.opaque(UInt, seed & 0xFFFFFFFF)), UInt(0x9E3779B9))
@@ -91,10 +100,11 @@ def random_numbers(kind: Types, index: Array, seed: int) -> Array:
 
 
 def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None = None) -> Outcome:
-    """p-values for one wo.
+    """The p-values for one wo.
 
-    grid  the cells, to allow for rounding: cells barely larger than the spacing of float32 directions gain or lose
-          samples by rounding alone
+    row   index of wo
+    grid  the cells, if rounding is to be allowed for: cells barely larger than the spacing of float32 directions gain
+          or lose samples by rounding alone
     """
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]
@@ -113,9 +123,9 @@ STEP = 2.0**-24  # rounding error of a component of a float32 direction, half a 
 
 
 def _rounding(grid: Grid, row: int) -> np.ndarray:
-    """Fraction of a cell's samples that rounding moves to the next one, (sides, rows, columns): the rounding error of a
-    coordinate divided by the cell's width, summed over both. An error of a component changes 1 - |z| by sin theta
-    times as much, and the azimuth by 1 / sin theta."""
+    """The fraction of a cell's samples that rounding moves to the next cell, (sides, rows, columns): the rounding error
+    of a coordinate divided by the width of the cell, summed over the two coordinates. An error of a component of a
+    direction changes 1 - |z| by sin theta times as much, and the azimuth by 1 / sin theta times as much."""
     edges = grid.rows[row].astype(float)
     heights, middle = np.diff(edges, axis=-1), 0.5 * (edges[..., 1:] + edges[..., :-1])
     sin = np.sqrt(np.maximum(middle * (2.0 - middle), STEP))
@@ -128,12 +138,12 @@ def _rounding(grid: Grid, row: int) -> np.ndarray:
 def _pearson(
     expected: np.ndarray, observed: np.ndarray, unseen: np.ndarray, rounded: np.ndarray | float = 0.0
 ) -> float:
-    """p-value of the chi-square test over cells, with small ones pooled, conditional on their total number of samples,
-    which `_others` tests.
+    """The p-value of the chi-square test over cells, with small ones pooled, conditional on their total number of
+    samples, which `_others` tests.
 
-    unseen   samples that the expectation of each cell may lack; its square adds to the variance
-    rounded  samples that rounding may move to the next cell; treated likewise, but ignored for pooled cells, which are
-             wide
+    unseen   number of samples that the expectation of each cell may lack; its square adds to the variance
+    rounded  number of samples that rounding may move to the next cell; its square also adds to the variance, except for
+             pooled cells, which are wide
     """
     inside, total = expected.sum(), observed.sum()
     if total < MIN_EXPECTED or inside <= 0.0:
@@ -162,10 +172,10 @@ QUADRATURE = 3e-5  # error of float32 pdfs summed over thousands of cells
 
 
 def _others(total: float, error: float, others: int, drawn: int) -> float:
-    """p-value of the number of samples outside all cells, whose expected fraction is 1 - int pdf.
+    """The p-value of the number of samples outside all cells, whose expected fraction is 1 - int pdf.
 
-    The integral is known to within `QUADRATURE` plus its own error; of the expectations in this interval, the one
-    nearest to the observation is used.
+    The integral is known to within `QUADRATURE` plus its own error; the expectation in this interval that is nearest to
+    the observation is used.
     """
     known = QUADRATURE + error
     share = float(np.clip(others / drawn, 1.0 - total - known, 1.0 - total + known))

@@ -1,5 +1,7 @@
 """Checks of delta lobes: direction, index, radiance versus power, the reverse path, Fresnel's equations, rotation,
-tint, float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` turns them into a verdict.
+tint, float32 and derivatives.
+
+Each check yields a `Miss` per kind of error; `laws/delta.py` turns these into a verdict.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ FLAT = 1e-3  # difference of an index from 1 below which nothing is refracted
 
 
 class Probe(NamedTuple):
-    """A subject, directions wo (N, 3), and its delta lobes at these, for radiance and for power."""
+    """A subject, directions wo (N, 3), and its delta lobes for these directions, in radiance and in power."""
 
     subject: Subject
     wo: np.ndarray
@@ -36,7 +38,7 @@ class Probe(NamedTuple):
     seed: int
 
     def lobes(self, part: Lobes) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
-        """For each lobe number n: the rows of the directions that have it, n, and wo and wi of these rows."""
+        """For each lobe, by its number n: the indices of the wo that have it, n, and wo and wi for these indices."""
         for n in range(part.valid.shape[1]):
             rows = np.flatnonzero(part.valid[:, n])
             if len(rows):
@@ -44,12 +46,13 @@ class Probe(NamedTuple):
 
 
 class Miss(NamedTuple):
-    """One error.
+    """An error of delta lobes.
 
-    size     relative error of the worst direction
+    size     relative error for the worst direction
     text     description of the error
-    wo, wi   the worst direction and its lobe
-    average  mean error of the directions that have the lobe; `share` is the fraction of them with more than 0.01
+    wo, wi   the worst direction wo, and the direction of its lobe
+    average  mean error over the directions wo that have the lobe
+    share    fraction of these directions with an error of more than 0.01
     cause    the probable mistake
     """
 
@@ -75,13 +78,13 @@ def _miss(off: np.ndarray, text: str, wo: np.ndarray, wi: np.ndarray, cause: str
 
 
 def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Largest difference over channels, relative to the brightest channel of either, (N,)."""
+    """The largest difference over the channels, relative to the brightest channel of the two values, (N,)."""
     size = np.maximum(np.maximum(np.abs(a).max(1), np.abs(b).max(1)), 1e-6)
     return np.asarray(np.abs(a - b).max(1) / size)
 
 
 def distinct(a: float, b: float) -> tuple[str, str]:
-    """Two numbers with as many digits as needed to distinguish them, at least four."""
+    """Two numbers as text, with as many digits as needed to distinguish them, at least four."""
     for digits in range(4, 18):
         texts = f"{a:.{digits}g}", f"{b:.{digits}g}"
         if texts[0] != texts[1]:
@@ -95,8 +98,8 @@ def distinct(a: float, b: float) -> tuple[str, str]:
 def direction(probe: Probe) -> Misses:
     """Check that directions are unit vectors, and that refraction follows Snell's law with the lobe's own eta.
 
-    Reflection far from the mirror direction, and transmission without refraction, are tested for reciprocity only:
-    gratings and corner cubes have them.
+    Reflection far from the mirror direction, and transmission without refraction, are tested for reciprocity only,
+    since gratings and corner cubes have such lobes.
     """
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -145,8 +148,8 @@ def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misse
 
 
 def indices(probe: Probe) -> Misses:
-    """Check that eta is 1 in reflection, that eta from below is the inverse of eta from above, and that it agrees with
-    a parameter that gives the index."""
+    """Check that eta is 1 for reflection, that eta from below is the inverse of eta from above, and that it agrees with
+    a parameter that defines the index."""
     named = _named_index(probe.subject)
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -166,7 +169,7 @@ def indices(probe: Probe) -> Misses:
 
 
 def _named_index(subject: Subject) -> float | None:
-    """The index below divided by that above, if a parameter of the material itself gives it."""
+    """The index below divided by that above, if a parameter of the material itself defines it."""
     names = subject.parameters
     try:
         if "eta" in names and names["eta"].kind == "float":
@@ -182,7 +185,8 @@ def _named_index(subject: Subject) -> float | None:
 
 
 def modes(probe: Probe) -> Misses:
-    """Check that radiance is 1 / eta^2 times power in transmission, and equals it in reflection (Veach1997, 5.2)."""
+    """Check that the light in radiance is 1 / eta^2 times that in power for transmission, and equal to it for
+    reflection (Veach1997, 5.2)."""
     if not probe.subject.transmits:
         return
     for rows, n, o, i in probe.lobes(probe.radiance):
@@ -205,9 +209,9 @@ def modes(probe: Probe) -> Misses:
 def _power_of_index(
     radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray, total: np.ndarray
 ) -> str:
-    """The cause if radiance divided by power is the same power of the index for all transmission.
+    """The cause if radiance divided by power (mode "importance") is the same power of the index for all transmission.
 
-    If the power of all lobes, `total` (N, channels), is 1 only without such a factor, power is wrong, not radiance.
+    total  power of all lobes, (N, channels); if it is 1 only without such a factor, power is wrong, not radiance
     """
     if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
         return ""
@@ -248,7 +252,7 @@ def _one_side(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: 
 
 
 def way_back(probe: Probe) -> Misses:
-    """Check that the lobe along wi, viewed from wi, leads back to wo and carries the same power."""
+    """Check that, for a lobe along wi, a lobe viewed from wi leads back to wo and carries the same power."""
     for rows, _, o, i in probe.lobes(probe.power):
         there, _ = lobes.along(lobes.rows_of(probe.power, rows), i)
         fine = np.isfinite(i).all(1) & (np.abs(np.linalg.norm(i, axis=1) - 1.0) < SINGLE) & (np.abs(i[:, 2]) > 1e-3)
@@ -266,8 +270,8 @@ def way_back(probe: Probe) -> Misses:
 
 
 def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarray, through: np.ndarray) -> str:
-    """The cause if the light carried one way is a constant times that carried back for all views of a side, or if
-    reflection from the denser side follows Schlick's curve of the angle there."""
+    """The cause if the light carried one way is a constant times that carried back, for all views of a side, or if
+    reflection from the denser side follows Schlick's curve at the angle on that side."""
     off = (_relative(there, back) > 1e-4) & through
     if off.sum() < 4:
         return ""
@@ -294,7 +298,7 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
 
 
 def fresnel(probe: Probe) -> Misses:
-    """Check that a material that gives its index reflects by Fresnel's equations, or by Schlick's curve, up to a
+    """Check that a material with a stated index reflects by Fresnel's equations, or by Schlick's curve, up to a
     constant factor."""
     subject, wo, power = probe.subject, probe.wo, probe.power
     index = _named_index(subject)
@@ -335,8 +339,8 @@ def fresnel(probe: Probe) -> Misses:
 
 
 def _absorbs(value: np.ndarray, share: np.ndarray, cosine: np.ndarray, ratio: np.ndarray, least: float) -> bool:
-    """Whether transmitted light (N, channels) is 1 - F times a constant times exp(-depth / cos), as for an absorbing
-    layer on the denser side of the surface (Beer's law)."""
+    """Whether the transmitted light `value` (N, channels) is 1 - F times a constant times exp(-depth / cos), as with an
+    absorbing layer on the denser side of the surface (Beer's law)."""
     dense = np.where(ratio > 1.0, np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / ratio**2, 0.0)), cosine)
     rows = (share < 0.99) & (dense > 0.1)
     if rows.sum() < 4:
@@ -353,8 +357,8 @@ def _absorbs(value: np.ndarray, share: np.ndarray, cosine: np.ndarray, ratio: np
 
 
 def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The error of values (N, channels) against the best-fitting multiple of a curve (N,), relative to the largest
-    value, (N,); and that multiple."""
+    """The difference of values (N, channels) from the best-fitting multiple of a curve (N,), relative to the largest
+    value, (N,); and this multiple."""
     size = float(np.sum(curve**2))
     scale = value.T @ curve / size if size > 0.0 else np.zeros(value.shape[1])
     most = np.maximum(np.abs(value).max(0), 1e-6)
@@ -403,8 +407,11 @@ def tint(probe: Probe) -> Misses:
 
 
 def _bounces(probe: Probe, name: str, rows: np.ndarray, i: np.ndarray) -> bool:
-    """Whether a lobe's light passes through or reflects off this albedo once, twice, and so on, as between two
-    panes."""
+    """Whether a lobe's light is a power series in an albedo, that is, reflected or transmitted with it once, twice, and
+    so on, as between two panes.
+
+    name  path of the albedo
+    """
     values = []
     for albedo in statistics.STEPS:
         changed = lobes.of(probe.subject.replace(**{name: float(albedo)}), probe.wo, probe.seed)
@@ -413,8 +420,8 @@ def _bounces(probe: Probe, name: str, rows: np.ndarray, i: np.ndarray) -> bool:
 
 
 def float32(probe: Probe) -> Misses:
-    """Check that float32 has the same lobes with the same light, except within 3 degrees of the horizon, where an edge
-    may be near."""
+    """Check that the lobes in float32 are the same, with the same light, except within 3 degrees of the horizon, where
+    an edge may be near."""
     rounded = lobes.of(probe.subject, probe.wo, probe.seed, precision="float32")
     for rows, _, o, i in probe.lobes(probe.radiance):
         exact, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
@@ -429,8 +436,8 @@ def float32(probe: Probe) -> Misses:
 
 
 def derivatives(probe: Probe) -> Misses:
-    """Check that d (weight x pdf) / d parameter by automatic differentiation equals finite differences, at fixed random
-    numbers."""
+    """Check that d (weight x pdf) / d parameter by automatic differentiation equals finite differences, for fixed
+    random numbers."""
     model = probe.subject.model
     if not isinstance(model, BSDF) or probe.subject.stochastic:
         return
@@ -471,7 +478,7 @@ Carried: TypeAlias = Callable[[Any], tuple[Any, Any]]  # maps a shift to values,
 
 
 def _autodiff(carried: Carried, count: int) -> tuple[np.ndarray, Any]:
-    """Derivatives with respect to the shift at 0, (N, 3), and whether the values exist."""
+    """The derivatives with respect to the shift at 0, (N, 3), and whether the values exist."""
     dr = backend.drjit()
     delta = dr.opaque(backend.types("float64").float, 0.0)
     dr.enable_grad(delta)
@@ -483,7 +490,7 @@ def _autodiff(carried: Carried, count: int) -> tuple[np.ndarray, Any]:
 
 
 def _slope_error(exact: np.ndarray, lit: Any, carried: Carried, size: float) -> np.ndarray:
-    """Relative error of derivatives (N, 3) against finite differences, (N,); 0 where the values have an edge."""
+    """The relative difference of derivatives (N, 3) from finite differences, (N,); 0 where the values have an edge."""
     dr, kind, count = backend.drjit(), backend.types("float64"), len(exact)
     step = 1e-4 * size
     ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0, 0.0)]

@@ -1,4 +1,4 @@
-"""The delta lobes of a BSDF, from its own samples: their directions, the light they carry, and their probabilities.
+"""The delta lobes of a BSDF, found from its samples: their directions, the light they carry, and their probabilities.
 
 `eval` is 0 for a delta lobe, but `sample` determines it completely: the direction, the probability (`pdf` of a delta
 sample), and the light that it carries, weight x pdf, which does not depend on how the lobe is selected.
@@ -23,12 +23,12 @@ NEAR = 1e-3  # directions that differ by less belong to one lobe
 class Lobes(NamedTuple):
     """L lobes for each of N directions wo.
 
-    valid   (N, L) whether there is such a lobe
-    wi      (N, L, 3)
-    weight  (N, L, channels)
-    pdf     (N, L) probability
-    eta     (N, L) index on wi's side divided by that on wo's, as sampled
-    share   (N, L) fraction of the samples, accurate to about 0.01
+    valid   whether a direction has the lobe, (N, L)
+    wi      direction of the lobe, (N, L, 3)
+    weight  weight of its samples, (N, L, channels)
+    pdf     its probability, as the samples state it, (N, L)
+    eta     index on wi's side divided by that on wo's, as the samples state it, (N, L)
+    share   observed fraction of the samples, accurate to about 0.01, (N, L)
     """
 
     valid: np.ndarray
@@ -49,7 +49,7 @@ class Lobes(NamedTuple):
 
 
 def chosen(count: int, seed: int) -> np.ndarray:
-    """Random numbers (n, 3) that select every lobe of one wo: the first in equal steps and near both ends."""
+    """Random numbers (n, 3) that select every lobe of one wo: the first number is in equal steps and near both ends."""
     first = np.concatenate([(np.arange(count) + 0.5) / count, ENDS, 1.0 - np.array(ENDS)])
     u = directions.numbers(np.random.default_rng([seed, 31]), len(first))
     u[:, 0] = np.minimum(first, 0.99999994)
@@ -87,11 +87,11 @@ def of(
 
 
 def along(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The total light of the lobes along wi (N, 3), (N, channels), and whether there are any, (N,)."""
+    """The total light, (N, channels), of the lobes along wi (N, 3), and whether there are any such lobes, (N,)."""
     mine = lobes.valid & (np.abs(lobes.wi - wi[:, None]).max(2) < NEAR)
     return np.sum(lobes.carried * mine[..., None], axis=1), mine.any(1)
 
 
 def rows_of(lobes: Lobes, rows: np.ndarray) -> Lobes:
-    """The lobes of the given rows of wo."""
+    """The lobes of the wo with the given indices."""
     return Lobes(*[part[rows] for part in lobes])

@@ -1,4 +1,4 @@
-"""The report as files: report.json, and one self-contained report.html with pictures.
+"""The files of a report: report.json, and one self-contained report.html with pictures.
 
 The page needs neither network nor scripts: figures are inline SVG, and colors follow the reader's light or dark
 setting.
@@ -61,14 +61,14 @@ figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 
 
 def write(report: Report, folder: Path) -> Path:
-    """Write report.json and report.html into a folder, both or neither; returns the path of the page."""
+    """Write report.json and report.html into a folder, both or neither. Returns the path of the page."""
     contents = {"report.json": json.dumps(report.as_dict(), indent=2) + "\n", "report.html": page(report)}
     files.write_all(files.check_folder(folder), {name: text.encode() for name, text in contents.items()})
     return folder / "report.html"
 
 
 def page(report: Report) -> str:
-    """The page's HTML."""
+    """The HTML of the page."""
     title = report.cards[0].subject.target if report.cards else "nothing"
     broken = len(report.failures)
     word = "All laws hold" if not broken else f"{broken} {'law is' if broken == 1 else 'laws are'} violated"

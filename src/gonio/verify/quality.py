@@ -3,8 +3,8 @@
     gonio models --quality
     go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples lost, variance 0.013, ..."
 
-A path tracer multiplies by the weight of each sample, so the weight's variance is noise in the picture, and a failed
-sample is a wasted path. Both can be poor while every law holds.
+A path tracer multiplies by the weight of each sample, so the variance of the weight is noise in the picture, and a
+failed sample is a wasted path. Both can be high even if every law holds.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ ROUNDING = 1e-9  # relative variance below which it counts as 0
 
 @dataclasses.dataclass(frozen=True)
 class Quality:
-    """Means over the directions wo with reflected or transmitted light.
+    """Measures of sampling quality, averaged over the directions wo with reflected or transmitted light.
 
     failed    fraction of failed samples, those with pdf = 0
     variance  variance of the weight, divided by its squared mean; a failed sample has weight 0
-    cosine    variance if wi is cosine-sampled (on both sides for transmitting materials), divided by the model's own;
-              None with a delta lobe, which cosine sampling never hits, or if the model has no variance
-    ideal     mean^2 / (mean^2 + variance): efficiency relative to sampling without variance
+    cosine    variance of cosine sampling (on both sides for transmitting materials), divided by that of the model's
+              sampling; None with a delta lobe, which cosine sampling never hits, or if the model's variance is 0
+    ideal     mean^2 / (mean^2 + variance), the efficiency relative to sampling without variance
     """
 
     failed: float
@@ -50,12 +50,12 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """ "sampling: 2.1 % of samples lost, variance 0.04, 31 x as efficient as cosine sampling, 96 % of the ideal"."""
+        """The measures as text: "sampling: 2.1 % of samples lost, variance 0.04, ..."."""
         return "sampling: " + ", ".join(text for text in self.texts if text)
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """The four values as text; "" for one that is None."""
+        """The four measures as text; "" for one that is None."""
         return (
             f"{100.0 * self.failed:.2g} % of samples lost",
             f"variance {_short(self.variance)}",
@@ -73,7 +73,10 @@ def _short(value: float) -> str:
 
 
 def of(subject: Subject, seed: int = 1) -> Quality | None:
-    """The quality of a subject's sampling; None if it cannot be sampled, or is black."""
+    """The quality of a subject's sampling; None if it cannot be sampled or is black.
+
+    seed  seed of the samples
+    """
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", GonioWarning)
@@ -83,12 +86,12 @@ def of(subject: Subject, seed: int = 1) -> Quality | None:
 
 
 def of_models() -> dict[str, tuple[str, Quality | None]]:
-    """Every material at its defaults, by name: its title and quality."""
+    """The title and the quality of every material at its defaults, by name."""
     return {name: (one.title, of(one)) for name, cls in models().items() for one in [_default(cls)]}
 
 
 def _default(cls: type[BSDF]) -> Subject:
-    """A material at its defaults; required inner materials are the first of INNER that it accepts."""
+    """A material at its defaults. Required inner materials are the first of INNER that it accepts."""
     required = [name for name, parameter in cls.parameters().items() if parameter.required]
     for turn in range(len(INNER)):
         inner = {name: INNER[(turn + i) % len(INNER)] for i, name in enumerate(required)}

@@ -22,7 +22,7 @@ MIN_RATIO = 1e-4  # first value divided by the last, for a range that starts at 
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The range of one parameter; `ratio` is whether it is divided in equal ratios."""
+    """The range of one parameter, along which it is tested. `ratio` is whether it is divided in equal ratios."""
 
     path: str
     low: float
@@ -31,7 +31,7 @@ class Axis:
     kind: str = "float"
 
     def at(self, share: float | np.ndarray) -> Any:
-        """The value at a position in the range, 0 at the low end and 1 at the high end."""
+        """The value at a position in the range: 0 is the low end, 1 the high end."""
         if not self.ratio:
             return self.low + share * (self.high - self.low)
         low = self.low if self.low > 0.0 else MIN_RATIO * self.high
@@ -60,8 +60,8 @@ def axes(subject: Subject) -> list[Axis]:
 
 
 def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
-    """Whether an inner material has a delta lobe at this value although the outer one declares none, so that it was not
-    written for such lobes."""
+    """Whether an inner material has a delta lobe at this value although the outer one declares none and hence does not
+    support such lobes."""
     if _hides_delta(subject.model):
         return False  # this is already so at the given values, which are tested anyway
     try:

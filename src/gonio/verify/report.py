@@ -1,4 +1,4 @@
-"""A report: the cards of a trial, for the terminal and as a dictionary."""
+"""The report of a trial: a card per subject, for the terminal and as a dictionary."""
 
 from __future__ import annotations
 
@@ -21,18 +21,22 @@ SIGNIFICANCE = 0.01  # probability of a false rejection in a whole report
 
 
 def significance(tests: int) -> float:
-    """The p-value below which each of `tests` tests rejects, by Sidak's correction; SIGNIFICANCE if there are none."""
+    """The p-value below which each of a number of tests rejects, by Sidak's correction; SIGNIFICANCE for none."""
     return statistics.sidak(SIGNIFICANCE, tests)
 
 
 @dataclasses.dataclass
 class Report:
-    """The cards of a run.
+    """The report of a trial.
 
-    tests      statistical tests in the whole report
-    threshold  p-value below which one of them rejects, by Sidak's correction
+    cards      the verdicts on each subject
+    seed       seed of all random numbers
+    effort     name of the effort, "quick", "default" or "deep"
+    tests      number of statistical tests in the whole report
+    threshold  p-value below which a test rejects, by Sidak's correction
+    seconds    duration of the trial
     mended     failures of the baseline that no longer occur, as text
-    unread     shaders that could not be read, next to others that were tested
+    unread     shaders that could not be read, if others were tested
     """
 
     cards: list[Card]
@@ -50,8 +54,8 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        """0 if nothing fails, 1 if something does, 4 if every failure is invisible in pictures, 2 if something could
-        not be read."""
+        """The exit code: 0 if nothing fails, 1 if something fails, 4 if every failure is invisible in pictures, 2 if
+        something could not be read."""
         if self.unread or self.passed:
             return InputError.code if self.unread else 0
         return 4 if all(verdict.grade is Grade.INVISIBLE for verdict in self.failures) else 1
@@ -62,12 +66,12 @@ class Report:
 
     @property
     def untried(self) -> list[str]:
-        """The laws that could not be tested here, or only in part."""
+        """The laws that could not be tested on this machine, or only in part."""
         verdicts = [verdict for card in self.cards for verdict in card.verdicts]
         return list(dict.fromkeys(verdict.law for verdict in verdicts if verdict.status == NOT_TRIED))
 
     def __getitem__(self, law: str) -> Verdict:
-        """The first failing verdict of that law, else the first."""
+        """The first failing verdict of a law, by its name, else its first verdict."""
         verdicts = [card[law] for card in self.cards]
         return next((verdict for verdict in verdicts if verdict.failed), verdicts[0])
 
@@ -89,7 +93,7 @@ class Report:
         }
 
     def show(self, console: Console) -> None:
-        """Print a table per subject, then the explanation of each failure, and a summary."""
+        """Print a table for each subject, with the explanation of each failure, and a summary."""
         from rich.markup import escape
 
         for card in self.cards:

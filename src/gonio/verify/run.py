@@ -1,4 +1,4 @@
-"""A trial: every law on every subject, independent of the results of other laws."""
+"""A trial: the test of every law on every subject, independent of the results of other laws."""
 
 from __future__ import annotations
 
@@ -64,22 +64,28 @@ def verify(
 
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
-    target    anything that `go.material` accepts; a target's name as `gonio verify` takes it; or a list of these
-    vary      for a target's name: "alpha=0.01..1" for five values, each with its own card, or "alpha=0.1,0.5"
-    quick     a fast first check; `deep` has more samples, more directions, more widths
-    seed      of all random numbers, 1 if None; the same seed gives the same report
-    law       a law's name, or several; all if None
+    target    anything that `go.material` accepts, the name of a target as for `gonio verify`, or a list of these
+    vary      for the name of a target, the values of a parameter, each with its own card: "alpha=0.01..1" for five
+              values, or "alpha=0.1,0.5"
+    quick     whether to run only a fast first check
+    deep      whether to use more samples, directions and widths
+    seed      seed of all random numbers, 1 if None; the same seed gives the same report
+    law       name of a law, or a list of names; None selects all laws
     output    folder for report.html and report.json
-    junit     file for JUnit's XML; `sarif` one for SARIF
-    baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
-    tolerate  "invisible", "small" or "visible": failures of that grade and below do not fail the report
-    progress  called with the number of steps done, the number of all steps, and the name of the next
-    isolated  whether each BSDF is tested in its own process, which it may crash or block; by default, if it is named
-    workers   number of such processes at a time; the report is the same
-    timeout   seconds per law in such a process, 300 if not given
-    memory    GB per process, half of the machine's if not given
+    junit     file for JUnit's XML
+    sarif     file for SARIF
+    baseline  file of known failures, which do not fail the report
+    write_baseline  file into which to write the failures of this report as a baseline
+    tolerate  "invisible", "small" or "visible": failures of this grade and below do not fail the report
+    progress  function that is called with the number of completed steps, the number of all steps, and the name of the
+              next step
+    isolated  whether each BSDF is tested in its own process, which it may crash or block; None isolates BSDFs that are
+              given by name
+    workers   number of such processes at a time, on which the results do not depend
+    timeout   seconds per law in such a process; None means 300
+    memory    GB per process; None means half of the machine's memory for all processes together
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` shows the table of the terminal.
-    Raises InputError for unknown laws and targets. A failing BSDF fails the law and raises nothing.
+    Raises InputError for unknown laws and targets. An error inside a BSDF fails the law and is not raised.
     """
     seed = DEFAULT_SEED if seed is None else seed
     if seed < 0:
@@ -103,7 +109,7 @@ def verify(
 
 
 def _target(given: Target) -> BSDF | Subject | str:
-    """A target as a text, which may name a plugin, or as a material."""
+    """A target as a string, which may name a plugin, or as a material."""
     if isinstance(given, str | Path | Subject):
         return given if isinstance(given, Subject) else str(given)
     if isinstance(given, Mapping):
@@ -113,14 +119,14 @@ def _target(given: Target) -> BSDF | Subject | str:
 
 
 def _effort(quick: bool, deep: bool) -> str:
-    """The key of `EFFORTS`."""
+    """The key of the effort in `EFFORTS`."""
     if quick and deep:
         raise InputError("both quick and deep given", "--quick", "give one of them")
     return "quick" if quick else "deep" if deep else "default"
 
 
 def _isolable(targets: Sequence[BSDF | Subject | str]) -> bool:
-    """Whether another process can load the targets by their names, without registrations of this program."""
+    """Whether another process can load the targets by their names, without classes that this program registered."""
     if not all(isinstance(one, str) for one in targets) or not sys.executable:
         return False
     return not any(name in str(one) for one in targets for name in members.registered)
@@ -129,7 +135,7 @@ def _isolable(targets: Sequence[BSDF | Subject | str]) -> bool:
 def _here(
     subjects: list[Subject], laws: list[Law], effort: str, seed: int, progress: Callable[[int, int, str], None] | None
 ) -> Report:
-    """The trial, run in this process."""
+    """Run the trial in this process."""
     started = time.perf_counter()
     steps, done = len(subjects) * len(laws), 0
     results = []
@@ -149,7 +155,13 @@ def _here(
 
 
 class Judged(NamedTuple):
-    """The findings on a subject, before the number of tests in the whole report is known."""
+    """The findings on a subject, before the number of statistical tests in the whole report is known.
+
+    subject  the subject with the given parameter values
+    others   the other parameter values at which it was tested
+    laws     each law with its results at all places
+    quality  quality of the sampling; None if it was not measured
+    """
 
     subject: Subject
     others: list[Place]
@@ -166,6 +178,7 @@ class Judged(NamedTuple):
         """The verdicts, with the severity and the cause of each failure, for which the BSDF is called again.
 
         threshold  p-value below which a test rejects; None for that of a report on this subject alone
+        begin      function that is called with the name of each law before its verdict
         """
         threshold = significance(len(self.p_values)) if threshold is None else threshold
         answers = []
@@ -196,9 +209,10 @@ def judged(
 ) -> Judged:
     """The findings of the laws on a subject.
 
-    begin  called with the name of the next law, or of another step
-    skip   steps to skip, and why: the BSDF crashed the process there, or did not return
-    result called with a law's name and its preliminary result: its size and cause come with the verdict
+    begin   function that is called with the name of the next law or other step
+    skip    steps to skip, each with the reason: the BSDF crashed the process there, or did not return
+    result  function that is called with the name of a law and its preliminary result, without size and cause, which the
+            verdict adds
     """
     begin(PLACES)
     others = [] if PLACES in skip else _places(one, effort, seed)
@@ -215,7 +229,7 @@ def judged(
 
 
 class Asked(NamedTuple):
-    """A law's result for a subject at one place, and the seconds that it took."""
+    """The result of a law for a subject at one place, and the seconds that it took."""
 
     place: Place
     what: Finding | Verdict
@@ -223,9 +237,10 @@ class Asked(NamedTuple):
 
 
 def _preliminary(all_: list[Asked], declared: bool) -> str:
-    """A law's result at all places, before its statistical tests are decided: their threshold depends on all laws.
+    """A law's result at all places as text, before its statistical tests are decided, since their threshold depends on
+    all laws.
 
-    declared  whether a violation of the law is declared; the verdict compares its size
+    declared  whether a violation of the law is declared; the verdict then compares its size
     """
     verdicts = [asked.what for asked in all_ if isinstance(asked.what, Verdict)]
     findings = [asked.what for asked in all_ if isinstance(asked.what, Finding)]
@@ -239,7 +254,8 @@ def _preliminary(all_: list[Asked], declared: bool) -> str:
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
-    """The other parameter values; none if the BSDF fails while they are chosen, which the laws will report."""
+    """The other parameter values at which to test; none if the BSDF fails while they are chosen, which the laws then
+    report."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", GonioWarning)  # the ends of the ranges are chosen on purpose
         try:
@@ -249,7 +265,7 @@ def _places(one: Subject, effort: str, seed: int) -> list[Place]:
 
 
 def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
-    """The law's results at the given values and, unless it fails there, at the others."""
+    """A law's results at the given parameter values and, unless it fails there, at the others."""
     results = []
     if law.samples and one.guided:
         others = others[:GUIDES]
@@ -275,8 +291,8 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
 
 
 def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
-    """The verdict over all places, and the result behind it: that at the given values, unless the law holds there and
-    fails elsewhere. After three failures, the remaining places are skipped."""
+    """The verdict over all places, and the result from which it follows: that at the given values, unless the law holds
+    there and fails elsewhere. After three failures, the remaining places are skipped."""
     first = _verdict(law, all_[0], threshold, seed)
     answer, where = first, all_[0]
     failed: list[Asked] = []
@@ -299,7 +315,7 @@ def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[V
 
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
-    """A law's finding; an error inside the BSDF is a failure of this law only."""
+    """The finding of a law. An error inside the BSDF is a failure of this law only."""
     try:
         with warnings.catch_warnings(), limited(law.name):
             warnings.simplefilter("ignore", GonioWarning)  # variants use the ends of the ranges on purpose
@@ -319,7 +335,11 @@ def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
 def decide(
     law: Law, one: Subject, finding: Finding, threshold: float, seed: int, place: Place | None = None
 ) -> Verdict:
-    """The verdict on a finding, with the p-value below which a test rejects."""
+    """The verdict on a finding.
+
+    threshold  p-value below which a test rejects
+    place      the parameter values of the finding; None for the given ones
+    """
     why = list(finding.problems)
     statistical: list[str] = []
     lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
@@ -378,7 +398,7 @@ def decide(
 
 
 def _exceeds(finding: Finding) -> str:
-    """A sentence that states a measured value above its tolerance."""
+    """A sentence that states the measured value, which exceeds its tolerance."""
     figure = finding.shown or f"{finding.figure:.3g}"
     return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
 

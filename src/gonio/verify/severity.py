@@ -1,7 +1,8 @@
 """The severity of a violated law: the resulting bias of a picture, and its grade.
 
-A bias is a fraction of the reflected light, at the worst direction wo, and averaged over the hemisphere of wo with the
-cosine, which is the average over a sphere seen by an orthographic camera. `estimators` computes the bias of sampling.
+A bias is a fraction of the reflected light. It is stated for the worst direction wo, and as the cosine-weighted average
+over the hemisphere of wo, which is the average over a sphere viewed by an orthographic camera. `estimators` computes
+the bias of sampling.
 
     bias = severity.between(subject, pair)     bias.worst, bias.average, bias.share, bias.words
 """
@@ -29,10 +30,11 @@ PER_VIEW = 2048  # samples per wo of `by_samples`
 
 
 class Grade(enum.StrEnum):
-    """The severity of a failure; `LIMITS` holds the limits of the average and of the worst direction.
+    """The severity of a failure. `LIMITS` contains the limits for the average and for the worst direction.
 
     NAN, NOISE, FITTING and INTERFACE (a call that integrators do not make, or whose result they ignore) do not bias a
-    picture; BY_NATURE and INNER mean that the defect is not this material's own.
+    picture. BY_NATURE and INNER mean that the defect is not one of this material: it follows from the kind of material,
+    or is that of an inner material.
     """
 
     INVISIBLE = "invisible"
@@ -57,15 +59,15 @@ _KINDS = {"nan": Grade.NAN, "noise": Grade.NOISE, "derivatives": Grade.FITTING, 
 class Bias:
     """The effect of a violation on a picture, as fractions of the reflected light (1 is all of it).
 
-    worst    at the worst wo, in the worst channel
-    average  cosine-weighted over the hemisphere of wo
-    share    fraction of that hemisphere where it exceeds 1 %
+    worst    bias for the worst wo, in the worst channel
+    average  cosine-weighted average of the bias over the hemisphere of wo
+    share    fraction of this hemisphere in which the bias exceeds 1 %
     where    the worst wo, or another description of the place
-    kind     "bias", "lost" or "gained" energy; "nan", with fractions of directions instead of light; "noise", which
-             costs samples and biases nothing; "derivatives", which affects fitting only; "interface", which affects
-             only callers of the methods that `where` names
-    furnace  the average under uniform light, where errors of opposite sign cancel; None if sampling is not concerned
-    both     the same with light and BSDF samples combined
+    kind     "bias"; "lost" or "gained" energy; "nan", with fractions of directions instead of light; "noise", which
+             costs samples but does not bias; "derivatives", which affects fitting only; "interface", which affects only
+             callers of the methods that `where` names
+    furnace  average under uniform light, where errors of opposite sign cancel; None if sampling is not affected
+    both     average with light and BSDF samples combined; None if sampling is not affected
     """
 
     worst: float
@@ -87,7 +89,7 @@ class Bias:
 
     @property
     def words(self) -> str:
-        """ "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
+        """The bias as text: "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
         if self.kind == "noise":
             return f"it costs samples and biases nothing: {self.where}"
         if self.kind == "interface":
@@ -114,7 +116,7 @@ class Bias:
 
 
 def percent(share: float) -> str:
-    """ "4.8 %", "120 %"."""
+    """A fraction as a percentage: "4.8 %", "120 %"."""
     if share > 100.0:
         return "more than 10,000 %"
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
@@ -124,8 +126,8 @@ def percent(share: float) -> str:
 
 
 def views(sides: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """16 directions wo per side, and their fractions of the cosine-weighted hemispheres of all sides, which sum to
-    1."""
+    """16 directions wo per side of the surface, and the fractions of the cosine-weighted hemispheres that they
+    represent, which sum to 1."""
     # Equal steps of sin^2 theta have equal fractions; their midpoints avoid the round angles at which a material may
     # change. The normal itself, where azimuths are undefined, is left out.
     middles = np.degrees(np.arcsin(np.sqrt((np.arange(12) + 0.5) / 12.0)))
@@ -140,9 +142,13 @@ def views(sides: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
 def summed(
     off: np.ndarray, light: np.ndarray, wo: np.ndarray, mass: np.ndarray, kind: Kind | None = None, where: str = ""
 ) -> Bias:
-    """The bias of values with the error `off` where `light` is reflected, (N, channels) each.
+    """The bias that results from errors of the reflected light.
 
-    off  signed; without a `kind`, an error of the same sign nearly everywhere is lost or gained energy
+    off       signed errors, (N, channels)
+    light     reflected light, (N, channels)
+    wo, mass  directions and their fractions, from `views`
+    kind      kind of the bias; if None, an error of the same sign nearly everywhere is lost or gained energy
+    where     text to append to the description of the worst wo
     """
     floor = np.maximum(FLOOR * light.max(1, keepdims=True), 1e-3 * light.max(initial=0.0))
     relative = off / np.maximum(np.maximum(light, floor), 1e-12)
@@ -161,9 +167,11 @@ def summed(
 
 
 def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """The bias of a value relative to another that it should equal: int |a - b| dwi / int |a| dwi.
+    """The bias of a value relative to another value to which it should be equal: int |a - b| dwi / int |a| dwi.
 
-    None if nothing is reflected, or if values are random.
+    pair   function (wo, wi) that returns the two values, a and b
+    where  text to append to the description of the worst wo
+    Returns None if nothing is reflected, or if values are random.
     """
     if subject.stochastic or not subject.has_density or not subject.steady:
         return None
@@ -179,7 +187,8 @@ def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """As `between`, by Monte Carlo, with half of the directions uniform: for differences too irregular for cells."""
+    """As `between`, but by Monte Carlo integration, with half of the directions uniform, for differences that are too
+    irregular for cells."""
     if subject.stochastic or not subject.steady:
         return None
     wo, mass = views(subject.sides)
@@ -196,7 +205,8 @@ def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def seeds(subject: Subject) -> cubature.Sampler:
-    """A sampler by which the cubature places its cells: the subject's samples; those that are not unit vectors fail."""
+    """A sampler by which the cubature places its cells: that of the subject, where samples that are not unit vectors
+    fail."""
 
     def sample(wo: np.ndarray, u: np.ndarray) -> object:
         s = subject.sample(wo, u, precision="float32")

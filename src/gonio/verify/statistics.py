@@ -1,6 +1,6 @@
-"""Probabilities of the statistical tests.
+"""Tail probabilities for the statistical tests.
 
-`scipy.special` has these tails too, but takes 0.4 s to import, a tenth of a quick trial; the tests compare against it.
+`scipy.special` has these functions too, but takes 0.4 s to import, a tenth of a quick trial; tests compare with it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ ROUNDING, TINY = 2.0**-50, 1e-300
 
 
 def chi_square_tail(statistic: float, degrees: int) -> float:
-    """P(X >= statistic) of the chi-square distribution: the incomplete gamma function Q(degrees / 2, statistic / 2)."""
+    """P(X >= statistic) for the chi-square distribution: the incomplete gamma function Q(degrees / 2, statistic / 2)."""
     a, x = 0.5 * degrees, 0.5 * statistic
     if not math.isfinite(x) or x <= 0.0:
         return 0.0 if x > 0.0 else math.nan if math.isnan(x) else 1.0
@@ -32,12 +32,15 @@ def chi_square_tail(statistic: float, degrees: int) -> float:
 
 
 def normal_two_sided(z: float) -> float:
-    """P(|Z| >= |z|) of the standard normal distribution."""
+    """P(|Z| >= |z|) for the standard normal distribution."""
     return math.erfc(abs(z) / math.sqrt(2.0))
 
 
 def binomial_two_sided(count: int, trials: int, probability: float) -> float:
-    """Probability of a count at least as far from its expectation, on either side: twice the smaller tail."""
+    """The probability of a count at least as far from its expectation on either side, as twice the smaller tail.
+
+    probability  probability of each trial
+    """
     at_least = _beta(count, trials - count + 1, probability) if count > 0 else 1.0
     at_most = _beta(trials - count, count + 1, 1.0 - probability) if count < trials else 1.0
     return min(1.0, 2.0 * min(at_most, at_least))
@@ -61,8 +64,8 @@ def _beta(a: float, b: float, x: float) -> float:
 
 
 def _fraction(first: float, terms: Callable[[int], tuple[float, float]]) -> float:
-    """1 / (first + a_1 / (b_1 + a_2 / (b_2 + ...))), (a_n, b_n) = terms(n), by Lentz's method as modified by Thompson
-    and Barnett, "Coulomb and Bessel functions of complex arguments and order", J. Comput. Phys. 64, 1986."""
+    """1 / (first + a_1 / (b_1 + a_2 / (b_2 + ...))) with (a_n, b_n) = terms(n), by Lentz's method as modified by
+    Thompson and Barnett, "Coulomb and Bessel functions of complex arguments and order", J. Comput. Phys. 64, 1986."""
     value = c = first or TINY
     d, change, n = 0.0, 2.0, 0
     while abs(change - 1.0) > ROUNDING:  # false for NaN
@@ -76,7 +79,8 @@ def _fraction(first: float, terms: Callable[[int], tuple[float, float]]) -> floa
 
 
 def sidak(significance: float, tests: int) -> float:
-    """Significance per test, such that the probability of a false rejection in any of them is the given one."""
+    """The significance of each of a number of tests for which `significance` is the probability of a false rejection in
+    any of them."""
     return -math.expm1(math.log1p(-significance) / max(tests, 1))
 
 
@@ -86,12 +90,12 @@ STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 
 def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) -> bool:
-    """Whether values are a power series of an albedo with no negative coefficient: light that is reflected once, twice,
-    and so on. A color that is gamma-decoded, or multiplied twice, has no first power.
+    """Whether values are a power series in an albedo without negative coefficients, as for light that is reflected
+    once, twice, and so on. A color that is gamma-decoded, or multiplied twice, has no first power.
 
     rows         values at the albedos STEPS, (7, N)
     noise        relative noise of the values
-    first_power  whether the first power must occur; light that crosses five panes has none
+    first_power  whether the first power must occur; it does not in light that crosses five panes
     """
     moved = rows[-1] > rows[0] * (1.0 + 1e-6) + 1e-9 * rows.max(initial=0.0)
     if not moved.any():
@@ -115,8 +119,9 @@ LAYERS = 4  # maximum number of times that light passes a layer
 
 
 def is_dimmed(rows: np.ndarray, noise: float) -> bool:
-    """Whether values are a + b r + sum c_k (1 - r)^k for a reflectance r, with a + b r and all c_k >= 0: the light of a
-    layer, and light from below that passes the layer several times. A color that is multiplied twice, r^2, has a < 0.
+    """Whether values are a + b r + sum c_k (1 - r)^k for a reflectance r, with a + b r and all c_k >= 0, as for the
+    light of a layer plus light from below that passes the layer several times. A color that is multiplied twice, r^2,
+    has a < 0.
 
     rows   values at the reflectances STEPS, (7, N)
     noise  relative noise of the values

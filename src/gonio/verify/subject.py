@@ -1,8 +1,8 @@
-"""A BSDF as the laws see it: its protocol, and the facts that it declares about itself.
+"""A subject, a BSDF under test: its protocol, and the facts that it declares about itself.
 
 A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions that the BSDF supports, and provides a
-copy bound for wavefronts of Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a
-`Fault` that names the line. Nothing here depends on the material.
+copy bound for Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a `Fault` that names
+the line. Nothing in this module depends on the material.
 """
 
 from __future__ import annotations
@@ -41,10 +41,11 @@ class Subject:
     """A BSDF under test.
 
     model     the material or plugin
-    target    its name: "conductor", "glass.py:Glass", "mitsuba:plastic"
+    target    its name, such as "conductor", "glass.py:Glass" or "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
-    drawn_by  the subject whose samples show where light is, if a guide of its own would take seconds; else None
-    memo      cache of values that are expensive to compute: `estimators`
+    drawn_by  the subject whose samples show where light is, if computing a guide of its own would take seconds; else
+              None
+    memo      cache of values that are expensive to compute, such as those of `estimators`
     """
 
     model: Any
@@ -72,12 +73,12 @@ class Subject:
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal differs from that of the surface."""
+        """Whether its normal may differ from that of the surface."""
         return bool(self.model.perturbs_normal)
 
     @functools.cached_property
     def guided(self) -> bool:
-        """Whether it, or a material inside it, has only an `eval` and is sampled by a guide computed from that."""
+        """Whether it, or an inner material, defines only `eval` and is sampled by a guide computed from it."""
         return isinstance(self.model, BSDF) and any(one.guided for _, one in tree.walk(self.model))
 
     @property
@@ -87,12 +88,12 @@ class Subject:
 
     @property
     def stochastic(self) -> bool:
-        """Whether `eval` and the weight are random numbers with the correct expectation."""
+        """Whether `eval` and the weight are random estimates whose expectation is the exact value."""
         return bool(getattr(self.model, "stochastic", False))
 
     @property
     def zero_weight_is_failure(self) -> bool:
-        """Whether a sample of weight 0 counts as failed: Mitsuba's plugins signal failures by that alone."""
+        """Whether a sample of weight 0 counts as failed, since Mitsuba's plugins signal failures only in this way."""
         return bool(getattr(self.model, "zero_weight_is_failure", False))
 
     @property
@@ -110,23 +111,23 @@ class Subject:
 
     @property
     def breaches(self) -> dict[str, KnownViolation]:
-        """The violations of laws that it declares, by the law's name."""
+        """The violations that it declares, by the names of the laws."""
         return self.model.violations()
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """Laws that this kind of material violates by nature, with the reasons."""
+        """The laws that this kind of material violates by nature, with the reasons."""
         return getattr(self.model, "by_nature", {})
 
     @property
     def inner(self) -> list[Subject]:
-        """The materials inside it, each as a subject."""
+        """The inner materials, each as a subject."""
         held = getattr(self.model, "held", None)
         children = held if held is not None else tree.children(self.model) if isinstance(self.model, BSDF) else {}
         return [Subject(inner, f"{self.target}'s {name}") for name, inner in children.items()]
 
     def with_sound_inside(self) -> Subject:
-        """The same with diffuse materials inside, which violate no law."""
+        """The same BSDF with diffuse inner materials, which violate no law."""
         if hasattr(self.model, "with_diffuse_inside"):
             return Subject(self.model.with_diffuse_inside(), self.target, self.settings)
         sound = models()["lambert"]()
@@ -134,7 +135,7 @@ class Subject:
 
     @functools.cached_property
     def sides(self) -> tuple[int, ...]:
-        """The sides of the surface from which it reflects or transmits: (1,), (1, -1), or () where it is black."""
+        """The sides of the surface from which it reflects or transmits, 1 above and -1 below; () if it is black."""
         rng = np.random.default_rng(5)
         sides = []
         for side in (1, -1):
@@ -163,7 +164,8 @@ class Subject:
 
     @functools.cached_property
     def steady(self) -> bool:
-        """Whether repeated calls of `eval` and `sample` give the same results, for `eval` also with fewer pairs."""
+        """Whether repeated calls of `eval` and `sample` give the same results, and those of `eval` also with fewer
+        pairs."""
         rng = np.random.default_rng(7)
         wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
         first = self.eval(wo, wi)
@@ -176,18 +178,21 @@ class Subject:
         )
 
     def replace(self, **values: Any) -> Subject:
-        """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""
+        """The same BSDF with other parameter values.
+
+        values  values by path: "alpha", "base.alpha"
+        """
         model = self.model
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values}, drawn_by=self.drawn_by)
 
     def rebuilt(self) -> Subject | None:
-        """A new object of the same BSDF that has not been called yet; None if none can be made."""
+        """A new object for the same BSDF that has not been called yet; None if it cannot be created."""
         make = getattr(self.model, "rebuilt", None)
         return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:
-        """The command line that tests this BSDF."""
+        """The command line that tests this BSDF, with additional arguments `more`."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
             # a file of the user's relative to the current folder
@@ -200,19 +205,23 @@ class Subject:
     def eval(
         self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> np.ndarray:
-        """f |cos theta_i| of rows (N, 3): (N, channels) in float64."""
+        """f |cos theta_i| for wo and wi, (N, 3) each: (N, channels), float64.
+
+        mode       as in `BSDF.eval`
+        precision  precision of the evaluation; None for the best
+        """
         value = self._call("eval", wo, wi, mode=mode, precision=precision or self.best)
         return self._shaped("eval", value, len(wo), 2)
 
     def pdf(self, wo: np.ndarray, wi: np.ndarray, precision: Precision | None = None) -> np.ndarray:
-        """Density, (N,) in float64."""
+        """Density with which `sample` chooses wi, 1/sr, (N,), float64. Arguments as for `eval`."""
         value = self._call("pdf", wo, wi, precision=precision or self.best)
         return self._shaped("pdf", value, len(wo), 1)
 
     def sample(
         self, wo: np.ndarray, u: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> SampleArrays:
-        """Directions, weights, densities and flags of rows (N, 3), in float64 and bool."""
+        """A `Sample` with arrays of float64 and bool. `wo` and `u` are (N, 3) each; other arguments as for `eval`."""
         s = self._call("sample", wo, u, mode=mode, precision=precision or self.best)
         if not isinstance(s, tuple) or len(s) != 5:
             raise Fault(f"sample returned {type(s).__name__}, a Sample expected", _place(self.model, "sample"))
@@ -228,13 +237,13 @@ class Subject:
     def f(
         self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> np.ndarray:
-        """The BSDF without the cosine, 1/sr; 0 where cos theta_i = 0."""
+        """The BSDF without the cosine, 1/sr; 0 for cos theta_i = 0. Arguments as for `eval`."""
         value = self.eval(wo, wi, mode, precision)
         cos = np.abs(wi[:, 2:])
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
 
     def bound(self, precision: Precision = "float32") -> Any:
-        """The model bound to Dr.Jit arrays of that precision; new parameter values do not recompile kernels."""
+        """The model bound to Dr.Jit arrays of a precision, so that new parameter values do not recompile kernels."""
         if isinstance(self.model, BSDF):
             return self.model.bind(backend.types(precision))
         return self.model
@@ -279,7 +288,7 @@ class Subject:
 
 @dataclasses.dataclass(frozen=True)
 class Described(Subject):
-    """A subject that is tested in another process: its names, without the model."""
+    """A subject that is tested in another process: its name and title, without the model."""
 
     heading: str = ""
 
@@ -294,7 +303,10 @@ class Described(Subject):
 
 
 def guarded(model: Any, method: str, run: Any) -> Any:
-    """The result of calling `run`; an exception inside the model becomes a Fault that names its line."""
+    """The result of calling `run`. An exception inside the model becomes a Fault that names its line.
+
+    method  name of the method that is called
+    """
     try:
         with watch.calling(model, method) if watch.calling else contextlib.nullcontext():
             return run()
@@ -312,7 +324,7 @@ def guarded(model: Any, method: str, run: Any) -> Any:
 
 
 def _line(model: Any, error: BaseException) -> str:
-    """file:line of the innermost frame inside the model's own file, else of the innermost frame at all."""
+    """FILE:LINE of the innermost frame in the model's own file; if there is none, of the innermost frame."""
     frames = traceback.extract_tb(error.__traceback__)
     try:
         own = Path(inspect.getsourcefile(type(model)) or "").name
@@ -331,7 +343,7 @@ def _place(model: Any, method: str) -> str:
 
 
 def of(model: Any) -> Subject:
-    """The subject of a Python object, named by its class, with the parameters that differ from their defaults."""
+    """The subject for a Python object, named by its class, with the parameters that differ from their defaults."""
     if isinstance(model, Subject):
         return model
     if not isinstance(model, BSDF):

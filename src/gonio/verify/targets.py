@@ -1,11 +1,11 @@
 """Subjects from the targets that a user names:
 
-conductor                a model's name; materials inside it are given by name too: --param a=lambert
+conductor                the name of a model; inner materials are also given by name: --param a=lambert
 glass.py:Glass           a class in a Python file, which is executed because the user named it
 glass.py:my_glass        a Mitsuba plugin that the file registers, by that name or by its class
 mitsuba:roughplastic     a plugin of Mitsuba, or one in a folder of GONIO_PLUGINS, with its properties as parameters,
-                         also as in mitsuba:roughplastic(alpha=0.3)
-plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
+                         which may also be set in the name: mitsuba:roughplastic(alpha=0.3)
+plastic.xml, .json       a Mitsuba description; also as a string: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL format
 chest.gltf:Wood          a material of a glTF file
 gold.json                the result of a fit, or a material in Gonio's notation
@@ -29,9 +29,11 @@ JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[Subject]:
     """The subjects that a target names, one per value of the parameter that varies.
 
-    settings  "name=value" each
-    vary      "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
-    Raises InputError with the nearest known spelling.
+    target    a string in one of the forms above
+    settings  values of parameters, each "name=value"
+    vary      values of the parameter that varies: "name=low..high" (five values, in geometric progression if high / low
+              is ten or more), or "name=v1,v2,..."; "" for none
+    Raises InputError for unknown names, with the most similar known one.
     """
     given = dict(map(notation.assignment, settings))
     if not vary:
@@ -81,7 +83,7 @@ def _properties(given: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _property(text: str) -> Any:
-    """A plugin's property from the command line: number, true or false, color, or a name."""
+    """A property of a plugin from the command line: a number, true or false, a color, or a name."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     try:

@@ -1,4 +1,4 @@
-"""A card as a table for the terminal, and the values at one pair of directions."""
+"""Print a card as a table on the terminal, and the values for one pair of directions."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def show_card(card: Card, console: Console) -> None:
 
 
 def _mark(verdict: Verdict) -> str:
-    """The status, and the severity of a failure: FAIL visible."""
+    """The status of a verdict, and the severity of a failure: "FAIL visible"."""
     return f"{MARKS[verdict.status]} {verdict.grade}" if verdict.grade else MARKS[verdict.status]
 
 
@@ -101,7 +101,7 @@ def _explain(verdict: Verdict, console: Console) -> None:
 
 
 class Values(TypedDict):
-    """The values of a subject for one pair."""
+    """The values of a subject for one pair of directions."""
 
     f: list[float]
     eval: list[float]
@@ -109,7 +109,7 @@ class Values(TypedDict):
 
 
 def pair(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> dict[str, object]:
-    """The values of a subject for one pair, in both directions and in each precision, as plain numbers."""
+    """The values of a subject for a pair of directions and the swapped pair, in each precision, as plain numbers."""
     answers = {
         label: {"fault": str(answer)} if isinstance(answer, Fault) else answer
         for label, answer in _answers(subject, wo, wi).items()

@@ -1,4 +1,5 @@
-"""A trial in parts, one per target: each is stored when it is done, and other processes or machines may compute it.
+"""A trial in parts, one per target. Each part is stored when it is done, and other processes or machines may compute
+it.
 
 The threshold of a statistical test depends on the number of tests in the whole report, which is known only at the end.
 A part is therefore decided first by the number of its own tests, and again if the final number makes a difference.
@@ -39,7 +40,7 @@ def trial(
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """As `child.trial`, computed by the current executor of parts."""
+    """As `child.trial`, but computed by the current executor of parts."""
     # Several local processes split the targets themselves; quick trials end before anything could be lost.
     if not executor.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
@@ -76,7 +77,11 @@ def _judged(
     hashes: Mapping[str, str],
     progress: Progress | None,
 ) -> dict[int, list[Card | Unread]]:
-    """The cards of some targets, by number; for a shader that cannot be read, the error."""
+    """The cards of some targets, by number; for a shader that cannot be read, the error.
+
+    numbers  indices of the targets in the task
+    hashes   file name -> hash of its content, for the files that targets name
+    """
     ones = [task._replace(items=[task.items[number]]) for number in numbers]
     arguments = [(one, threshold, limit, memory, dict(hashes)) for one in ones]
     keys = [parts.key_of(one, threshold, sorted(hashes.items()), facts.code(), facts.versions()) for one in ones]
@@ -93,7 +98,7 @@ def _judged(
 
 
 def _files(item: Item) -> list[Path]:
-    """The files that a target names."""
+    """The files that a target and its settings name."""
     if not isinstance(item.target, str):
         return []
     paths = [path for text in (item.target, *item.settings) for path in outside.files_in(text)]
@@ -107,7 +112,7 @@ def _files(item: Item) -> list[Path]:
 def part(
     task: Task, threshold: float | None, limit: float | None, memory: float | None, hashes: dict[str, str]
 ) -> Arrays:
-    """One target's cards, computed in a separate process."""
+    """Compute the cards of the only target of a task in a separate process. For the arguments, see `_judged`."""
     with tempfile.TemporaryDirectory(prefix="gonio-verify-") as folder:
         (item,) = task.items
         for name, content in hashes.items():

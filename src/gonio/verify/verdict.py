@@ -1,7 +1,7 @@
 """The findings of laws on a subject, and the verdicts and cards derived from them.
 
 A law returns a `Finding`: a measured value, and the p-values of its statistical tests. `gonio.verify.run` decides the
-tests once their number in the whole report is known.
+tests when their number in the whole report is known.
 """
 
 from __future__ import annotations
@@ -25,15 +25,21 @@ TOLERATED = "tolerated"  # fails, but no more than the user tolerates in picture
 
 
 class Evidence(Protocol):
-    """The observations of a law, for the report's figure."""
+    """The observations of a law, of which the report shows a figure."""
 
     def draw(self) -> tuple[str, str]:
-        """(SVG, caption) of the figure."""
+        """Draw the figure; returns its SVG and its caption."""
 
 
 @dataclasses.dataclass
 class Trial:
-    """One statistical test: its p-value, its description, and how to repeat it with another seed."""
+    """A statistical test.
+
+    p       its p-value
+    where   description of the tested case
+    repeat  function that repeats the test with another seed and returns the p-value
+    second  p-value of the repetition; None if it was not repeated
+    """
 
     p: float
     where: str
@@ -45,17 +51,21 @@ class Trial:
 class Finding:
     """The result of a law.
 
-    figure     measured size of the violation; compared with `tolerance`
-    tolerance  largest size that passes; `reason` justifies it
-    shown      the size as text, if a number alone is unclear; `allowed` is the tolerance in the same unit
-    worst      description of the worst case; `at` is its pair of directions, for the command that repeats it
-    settings   parameter values of the worst case, if they are not the given ones
+    figure     measured size of the violation, which is compared with `tolerance`
+    tolerance  largest size that passes
+    reason     justification of the tolerance
+    shown      the size as text, if a number alone is unclear
+    allowed    the tolerance in the unit of `shown`
+    worst      description of the worst case
+    at         pair of directions of the worst case, for the command that repeats it
+    settings   parameter values of the worst case, if they differ from the given ones
+    trials     statistical tests
     problems   violations that fail the law regardless of the size
-    untried    why part of the law could not be tested here, so that it cannot pass; "" if all was tested
+    untried    the reason why part of the law could not be tested, so that it cannot pass; "" if all was tested
     notes      further information
-    breach     size to compare with a declared violation, if that is not `figure`
-    evidence   data of the report's figure
-    details    data for the law's own `bias` and `ratios`
+    breach     size to compare with a declared violation, if it is not `figure`
+    evidence   data for the figure in the report
+    details    data for the methods `bias` and `ratios` of the law
     """
 
     figure: float
@@ -76,18 +86,24 @@ class Finding:
 
 
 class DoesNotApply(Exception):
-    """Raised by a law that does not apply to a subject; the text gives the reason."""
+    """Raised by a law that does not apply to a subject; its message is the reason."""
 
 
 @dataclasses.dataclass
 class Verdict:
-    """A law's verdict on one subject.
+    """The verdict of a law on one subject. For fields that are not listed, see `Finding` and `Law`.
 
-    places  number of parameter settings at which it was tested, including the given one
-    bias    for a failure or a declared violation, the effect on a picture; None if unknown
-    grade   the severity of that effect; None if unknown
-    cause   for a failure, the probable mistake; "" if none is clear
-    reproduction  for a failure of a Mitsuba plugin, a program that shows it without Gonio
+    law      name of the law
+    status   "pass", "fail" or another status
+    p        smallest p-value of its statistical tests; None if there are none
+    command  command line that repeats the test
+    why      the reasons for a failure
+    seconds  time that the law took
+    places   number of parameter settings at which the law was tested, including the given one
+    bias     for a failure or a declared violation, its effect on a picture; None if unknown
+    grade    severity of that effect; None if unknown
+    cause    for a failure, the probable mistake; "" if none is clear
+    reproduction  for a failure of a Mitsuba plugin, a program that reproduces it without Gonio
     """
 
     number: int
@@ -118,25 +134,26 @@ class Verdict:
 
     @property
     def cause_in_words(self) -> str:
-        """The probable mistake of a failure, or that none is known."""
+        """The probable mistake that caused a failure, or the statement that it was not found."""
         unknown = self.failed and self.figure is not None  # an exception explains itself
         return self.cause or ("not found: it is none of the known mistakes" if unknown else "")
 
     @property
     def excused(self) -> bool:
-        """Whether it violates the law without failing the report."""
+        """Whether the law is violated but does not fail the report."""
         return self.status in (KNOWN, TOLERATED)
 
     def as_dict(self) -> dict[str, object]:
-        """All fields but the evidence; numbers that JSON cannot hold become null."""
+        """All fields except the evidence, for JSON; numbers that are not finite become null."""
         names = [field.name for field in dataclasses.fields(self) if field.name != "evidence"]
         return {name: _plain(getattr(self, name)) for name in names}
 
 
 class Unread(NamedTuple):
-    """One of several targets that could not be read, so that no law tests it, and the error.
+    """One of several targets that could not be read and hence was not tested.
 
-    where  the file and line, or what else the error names
+    target             its name
+    what, where, hint  the error: its message, its place (file and line), and a suggestion
     """
 
     target: str
@@ -154,10 +171,11 @@ class Unread(NamedTuple):
 class Card:
     """All verdicts on one subject.
 
-    covered    the parameter values at which it was tested
-    notes      its behavior: what it printed, what ended its process
+    covered    description of the parameter values at which it was tested
+    notes      observations on its behavior, such as printed output or the end of its process
     quality    quality of its sampling; None if it could not be measured
-    p_values   p-values of its statistical tests, and `threshold` below which they rejected
+    p_values   p-values of its statistical tests
+    threshold  p-value below which a test rejected
     """
 
     subject: Subject
@@ -169,7 +187,7 @@ class Card:
     threshold: float = 0.0
 
     def decided_by(self, threshold: float) -> bool:
-        """Whether the verdicts are the same with another threshold: no p-value lies between the two."""
+        """Whether the verdicts are the same for another threshold, that is, no p-value lies between the two."""
         low, high = sorted((self.threshold, threshold))
         return not any(low <= p < high for p in self.p_values)
 

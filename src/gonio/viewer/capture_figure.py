@@ -24,8 +24,8 @@ MAX_PERCENT = 50.0  # upper limit of the scales of differences and of errors
 
 
 def draw(capture: Capture) -> Drawing:
-    """The first photograph of a sample, the fit to it, their difference, and the classification of its pixels; and the
-    values and standard errors of the samples over theta_h and theta_d, gray where there are none."""
+    """The first photograph of a sample, the fit to it, their difference, and the classification of its pixels; also the
+    values and standard errors of the samples as functions of theta_h and theta_d, gray where there are no samples."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 

@@ -20,12 +20,12 @@ def compensation(*models: MaterialLike, output: str | Path | None = None, sample
 
         go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
 
-    models   more materials to compare: one with a base as a method, any other as a base
+    models   more materials to compare: a material with a base is compared as a method, any other is used as a base
     output   folder for a picture and JSON; None writes nothing
     samples  random walks per point of the reference
-    Returns the dictionary that `gonio compensation --json` prints: `albedo` [material][method] over `roughness` and
+    Returns the dictionary that `gonio compensation --json` prints: `albedo` [material][method] at each `roughness` and
     `mu`, its `rms` distance to the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`,
-    and the `cost`.
+    and the `cost`. Raises InputError for a folder that cannot be written and for invalid materials.
     """
     folder = None if output is None else files.check_folder(Path(output))
     own = [material(model) for model in models]

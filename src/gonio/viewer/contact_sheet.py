@@ -95,7 +95,8 @@ def study(
     output    file to write, .png, .pdf or .svg; None writes nothing
     exposure  stops, the same for all pictures, or "auto"
     title     heading of the sheet; the scene's name if not given
-    Other options as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError, MachineError.
+    Other options are as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError for an invalid
+    scene, path, value or option, MachineError if this machine cannot render it.
     """
     named = _named(scene)
     request = Request(
@@ -109,7 +110,7 @@ def study(
 
 
 def _named(scene: MaterialLike) -> notation.Settings | None:
-    """The material that is studied, None for a scene."""
+    """The material that is varied, None for a scene."""
     if not isinstance(scene, str | Path):
         shown = material(scene)
         return type(shown), {name: getattr(shown, name) for name in shown.parameters()}
@@ -126,7 +127,7 @@ def render_sheet(
     report: Callable[[int, int, str], None] = lambda done, total, state: None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Sheet:
-    """Render every combination and draw the sheet; raises InputError before rendering if possible.
+    """Render every combination and draw the sheet. Errors are raised before rendering if possible.
 
     named   the material that is varied, instead of a scene
     report  called before each picture with pictures done, all pictures, and a description of the next

@@ -43,13 +43,13 @@ class Conversion:
 def convert(
     source: str | Path, output: str | Path, *, exposure: exposures.Exposure = 0.0, phi: int | None = None
 ) -> Conversion:
-    """Write a picture, measured values, or another program's material in the format of another suffix.
+    """Write a picture, measured values, or another program's material in the format of the output's suffix.
 
         go.convert("ball.exr", "ball.png", exposure="auto")
         go.convert("gold.binary", "gold.bsdf").facts["error"]
 
-    source    a picture, a file of measured values, one that describes a material (.gltf, .mtlx, .json), or a material
-              as a text, such as "openpbr(base_metalness=1)" or FILE.py:CLASS
+    source    a picture, a file of measured values, a file that describes a material (.gltf, .mtlx, .json), or a
+              material, such as "openpbr(base_metalness=1)" or "FILE.py:CLASS"
     output    the file to write
     exposure  for a .png: stops, or "auto"
     phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
@@ -70,7 +70,7 @@ def converted(
     phi: int | None = None,
     location: str = "source",
 ) -> Conversion:
-    """As `convert`, without its warnings; `location` is the place of an error about the source."""
+    """As `convert`, without its warnings; errors about the source name `location`."""
     kind = operands.kind_of(source, {Kind.PICTURE, Kind.NAME, Kind.CODE, Kind.TABLE, Kind.DOCUMENT}, location)
     if phi is not None and kind is not Kind.TABLE:
         raise InputError(f"{phi} given for {source}, which is not a table of measured values", "phi", "omit it")

@@ -22,8 +22,8 @@ SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, 
 
 @dataclass(frozen=True)
 class Curve:
-    """One view: values and density over the angle of wi (degrees), and the reflectance of delta lobes. Values and
-    density are nan where they are not known."""
+    """One view: values and density as functions of the angle of wi (degrees), and the reflectance of delta lobes.
+    Values and density are nan where they are not known."""
 
     view: float
     angles: Floats

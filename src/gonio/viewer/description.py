@@ -28,7 +28,7 @@ def info(path: str | Path) -> dict[str, Any]:
 
 
 def described(path: str, location: str) -> tuple[Kind, dict[str, Any]]:
-    """The kind of a file, and its contents; `location` is the place named in errors about the path."""
+    """The kind of a file, and its contents; errors about the path name `location`."""
     kind = operands.kind_of(path, ACCEPTED, location)
     if kind is Kind.DOCUMENT:
         return kind, {"path": path, "materials": documents.described(path)}

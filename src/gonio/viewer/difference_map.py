@@ -21,7 +21,11 @@ _LONGEST = 44  # characters of a name
 
 def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDArray[np.float64]:
     """(f_A - f_B) / max(f_A, f_B) in the plane of incidence, over theta_o (rows, 0 first) and theta_i from -90 to 90
-    degrees (columns, positive on the side of the mirror direction); nan if one is not known, or both are 0."""
+    degrees (columns, positive on the side of the mirror direction); nan if one is not known, or both are 0.
+
+    compared  the comparison of the two materials
+    steps     number of values of theta_o
+    """
     view = (np.arange(steps) + 0.5) / steps * 90.0
     light = (np.arange(steps) + 0.5) / steps * 180.0 - 90.0
     theta_o, theta_i = (np.radians(angles.ravel()) for angles in np.meshgrid(view, light, indexing="ij"))

@@ -142,7 +142,8 @@ def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
 
 
 def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
-    """Write compensation.png and compensation.json to a folder: albedo over roughness, and distance to the walk."""
+    """Write compensation.png and compensation.json to a folder: albedo as a function of roughness, and the distance to
+    the random walk."""
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 

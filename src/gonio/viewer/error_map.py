@@ -65,14 +65,14 @@ def compare(
 
     test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top; or two materials,
                      as `go.material` takes them
-    metric           for `tolerance` and the map: for pictures "relmse", "rmse" or "flip", for materials "mean",
-                     "largest" or "albedo"; None is the first of these
+    metric           the metric that `tolerance` and the map use: for pictures "relmse", "rmse" or "flip", for materials
+                     "mean", "largest" or "albedo"; None: the first of these
     tolerance        the largest value that passes
     output           file of a map of the error, .png, .pdf or .svg; None writes nothing
-    encoding         of .png files: "srgb", or "linear" for data such as a table
-    Returns a Comparison with all metrics and whether it passed; for materials, a Difference, which says where f and the
-    albedo differ. FLIP is HDR-FLIP, unless a picture is a .png. Raises InputError for pictures that cannot be read or
-    differ in size, and for arguments that are neither pictures nor materials.
+    encoding         encoding of .png files: "srgb", or "linear" for data such as a table
+    Returns a Comparison with all metrics and whether it passed; for materials, a Difference, which also gives the
+    places where f and the albedo differ most. FLIP is HDR-FLIP, unless a picture is a .png. Raises InputError for
+    pictures that cannot be read or differ in size, and for arguments that are neither pictures nor materials.
     """
     if output is not None:
         figures.check_output(Path(output))
@@ -92,7 +92,7 @@ def compare(
 def compare_materials(
     test: Any, reference: Any, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
-    """As `compare`, for two materials, either of which may be text."""
+    """As `compare`, for two materials, each a string or an object."""
     named = []
     for one in (test, reference):
         if not _is_material(one):
@@ -107,7 +107,7 @@ def compare_materials(
 
 
 def _is_material(given: object) -> bool:
-    """Whether the argument is a material; text that may name a picture counts as a picture."""
+    """Whether the argument is a material; a string that may name a picture counts as a picture."""
     if not isinstance(given, str | Path):
         return is_material(given)
     return operands.readings(str(given))[0] in operands.MATERIALS

@@ -38,7 +38,7 @@ def explain(name: MaterialLike = "") -> Explanation:
 
     name  a material, as `go.material` takes it, a distribution of normals, a masking term, an integrator, a law, ...;
           or a family, such as "fresnel", whose members are listed; "" lists the families
-    Raises InputError, with the closest known name, for an unknown one.
+    Raises InputError, with the closest known name, for an unknown name.
     """
     if not name:
         return Explanation((families.index(),))

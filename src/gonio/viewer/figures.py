@@ -70,7 +70,7 @@ class Drawing:
     path: Path | None = None
 
     def save(self, path: str | Path) -> Drawing:
-        """Write it as .png, .pdf or .svg, completely or not at all; returns the drawing with that path."""
+        """Write the figure as .png, .pdf or .svg, completely or not at all. Returns the drawing with that path."""
         suffix = _suffix(Path(path))
         return replace(self, path=files.write_whole(path, self._file(suffix[1:])))
 
@@ -109,7 +109,10 @@ def _suffix(path: Path) -> str:
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """An empty figure with a heading, its size in inches; it opens no window, whatever the backend."""
+    """An empty figure with a heading. It opens no window, whatever the backend.
+
+    width, height  size of the figure, inches
+    """
     load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -135,7 +138,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """A typed value: JSON if possible, where the leading zero is optional; otherwise the text itself."""
+    """A typed value: JSON if possible, where a leading zero is optional; otherwise the string itself."""
     stripped = text.strip()
     with_zeros = re.sub(r"(?<![\w.])\.(?=\d)", "0.", stripped)
     try:
@@ -164,7 +167,7 @@ def split_values(text: str) -> list[Any]:
 
 
 def show_value(value: object, longest: int = 28) -> str:
-    """A value as text for a label."""
+    """A value as text for a label, abbreviated to `longest` characters."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     # integers beyond the range of floats are shown as text

@@ -63,7 +63,7 @@ class AccessControl:
 
 
 class GuardedHTTP(H11Protocol):
-    """HTTP that ends connections whose request does not arrive, or whose answer is not received, in time.
+    """HTTP that ends connections whose request does not arrive, or whose response is not received, in time.
 
     If there are too many of either kind, the oldest is ended.
     """

@@ -26,8 +26,8 @@ LONGEST = 32  # most characters in a panel's title
 
 
 def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
-    """f over theta_d (rows, 90 degrees first) and theta_h (columns); nan if it is not known. At phi_d = 90 degrees, all
-    pairs are above the surface."""
+    """f at `steps` values each of theta_d (rows, 90 degrees first) and theta_h (columns); nan where it is not known. At
+    phi_d = 90 degrees, all pairs are above the surface."""
     middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
     theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
     wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))

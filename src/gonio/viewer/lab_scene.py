@@ -35,6 +35,8 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
     environment, or a lamp that surrounds that point, becomes an environment. A texture cannot be shown by sliders, so
     it is replaced by its parameter's default, with a note.
 
+    allow_outside  allow the scene to read files outside its folder
+    allow_code     allow the scene to run materials in Python files
     Raises InputError as the reader of scenes does, including for a file outside the scene's folder.
     """
     description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code, names_output=False)

@@ -22,10 +22,11 @@ _RADIUS = 1.45  # radius of a panel's disk, inches
 
 
 def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """The figure. `panels` has one list per view, with the curve of each material in the order of the labels. `known`
-    states the angles at which values are known.
+    """The figure. Each panel has its own scale, since peaks differ by orders of magnitude.
 
-    Each panel has its own scale, since peaks differ by orders of magnitude.
+    labels  names of the materials
+    panels  one list per view, with the curve of each material in the order of the labels
+    known   statement of the angles at which values are known
     """
     columns = len(panels) if len(panels) <= 3 else math.ceil(len(panels) / 2)
     rows = math.ceil(len(panels) / columns)

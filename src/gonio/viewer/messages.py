@@ -1,4 +1,4 @@
-"""The messages between page and server: JSON in, JSON and frames out. docs/viewer.md describes them.
+"""The messages between page and server, described in docs/viewer.md: JSON in, JSON and frames out.
 
 All input is validated here (types, ranges, finite numbers, and sizes), so that the rest of the server can rely on it.
 """
@@ -41,7 +41,7 @@ def _direction(vector: Vector) -> Vector:
 
 
 class Part(BaseModel):
-    """The base class of messages: unknown keys, and text in place of numbers, are invalid."""
+    """The base class of messages: unknown keys, and strings in place of numbers, are invalid."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -139,8 +139,8 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Request a material's shader with other choices, with the weights `on` included although they are off, and with
-    tables for the values `fixed`."""
+    """Request a material's shader with other choices, including the weights `on` although they are switched off, and
+    with tables for the values `fixed`."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -156,7 +156,7 @@ _message: TypeAdapter[Message] = TypeAdapter(Message)
 
 
 def parse(text: str) -> Scene | Ack | Upload | Wish:
-    """The message in a text. Raises InputError, which describes the fault, if it is invalid."""
+    """The message in a JSON text. Raises InputError, which describes the fault, if it is invalid."""
     if len(text) > TEXT_BYTES:
         raise InputError(f"a message of {len(text)} characters", "message", f"send at most {TEXT_BYTES}")
     try:

@@ -35,8 +35,8 @@ Json: TypeAlias = "dict[str, object]"  # data for JSON, described in docs/viewer
 class VariantData(TypedDict):
     """A material with some choices, as shader code.
 
-    off     paths of weights that were off when it was written: it applies to balls with the same weights off
-    fixed   values that its tables were computed for (`BSDF.fixed`), by path: it applies to balls with the same values
+    off     paths of weights that were off when the code was written; it applies to balls with the same weights off
+    fixed   values that its tables were computed for (`BSDF.fixed`), by path; it applies to balls with the same values
     facets  [distribution, masking] of the facets that reflect, if any: selects the page's `dfg` table
     """
 
@@ -175,9 +175,10 @@ def material_data(
 ) -> MaterialData:
     """A material with its presets and one variant for every combination of its choices, the model's own first.
 
+    key       its name in the page's data
     on        paths of weights that its balls switch on
     complete  add variants with every layer, and with the choices of presets, for a page that cannot request variants
-    fixed     values by path that its tables depend on: one variant each
+    fixed     sets of values, by path, for which its tables are computed: one variant each
     """
     presets = stage.presets(material.bsdf)
     names = list(material.choices)
@@ -205,8 +206,10 @@ def variant_data(
 ) -> VariantData:
     """Shader, manifest and tables of a model with other choices, without the layers that are off.
 
-    on     paths of weights that are written although they are off
-    fixed  other values that the tables depend on; InputError for paths on which they do not depend
+    choices  values of the choices, by path
+    on       paths of weights that are written although they are off
+    fixed    other values that the tables depend on, by path
+    Raises InputError for paths in `fixed` on which the tables do not depend.
     """
     own = {leaf.path: leaf.value for leaf in tree.leaves(bsdf) if leaf.path in bsdf.fixed}
     if wrong := next((path for path in fixed or {} if path not in own), None):

@@ -86,7 +86,7 @@ class Reference:
         return self._render is None or self.scene is None or self.samples >= self.scene.spp
 
     def show(self, scene: messages.Scene) -> None:
-        """Start a picture; InputError for an unknown material, parameter or picture."""
+        """Start a picture. Raises InputError for an unknown material, parameter or environment image."""
         bsdfs = [self._materials(row, f"rows/{index}") for index, row in enumerate(scene.state.rows)]
         balls = self._balls.place(bsdfs, scene.state.spacing)
         lamps = self._lamps.place(scene.state.lights, self.pictures)

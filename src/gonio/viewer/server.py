@@ -91,7 +91,7 @@ class Application:
         return page.page_data(what, f"/ws?token={self.access.token}", revision)
 
     def renew(self, what: Stage) -> None:
-        """Show another stage on every page; raises the errors of its materials when they are written as shaders."""
+        """Show another stage on every page. Raises InputError if one of its materials cannot be written as a shader."""
         data = self._written(what, self.renderer.revision + 1)
         self.renderer.renew(what)
         self._data, self.fault = data, None
@@ -296,10 +296,12 @@ def serve(
 ) -> None:
     """Show a stage until Ctrl-C.
 
-    host     address to listen on; any but a loopback address opens the page to the network, and a line says so
-    port     port to listen on; 0 takes any free one
-    browser  open the page in a browser
-    as_json  print the address as {"url": ...}
+    host     address to listen on; with an address other than a loopback address the page is open to the network, which
+             a printed line states
+    port     port to listen on; 0 selects any free one
+    browser  whether to open the page in a browser
+    device   device of the reference: "cpu", "cuda" or "auto"
+    as_json  whether to print the address as {"url": ...}
     Raises MachineError if the port is taken or the device missing, InputError if a model cannot be shown.
     """
     if not 0 <= port < 65536:

@@ -74,7 +74,7 @@ class Session:
                 await asyncio.wait_for(self.websocket.close(*self._reason), 1.0)
 
     def end(self, code: int, reason: str) -> None:
-        """Close the connection from the server's side."""
+        """Close the connection from the server's side, with a WebSocket close code and its reason."""
         self._reason = (code, reason)
         self._ended.set()
 
@@ -184,7 +184,7 @@ class Renderer:
         self._thread: threading.Thread | None = None
 
     def renew(self, what: Stage) -> None:
-        """Render another stage from now on; pending requests to the old one are dropped."""
+        """Render another stage from now on; pending requests for the old one are dropped."""
         with self._lock:
             self.stage = what
             self.revision += 1

@@ -118,7 +118,8 @@ class Stage:
 
 
 def replaced(bsdf: BSDF, values: Mapping[str, Value], location: str = "values") -> BSDF:
-    """The material with other values at some paths; InputError for an invalid path or value."""
+    """The material with other values at some paths. Raises InputError, which names `location`, for an invalid path or
+    value."""
     known = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
     for path in values:
         if path not in known:
@@ -185,7 +186,8 @@ def _f0(owner: BSDF, values: Mapping[str, Value]) -> list[float] | None:
 
 
 def homework(metal: str = "Ag") -> Stage:
-    """Two rows of five balls under one light, roughness increasing to the right: Kulla-Conty above, plain below."""
+    """Two rows of five balls under one light, with roughness increasing to the right: Kulla-Conty above, single
+    scattering below."""
     base = model("conductor").preset(metal, alpha=ROUGHNESS[0] ** 2)
     compensated = model("kulla-conty")(base=base)  # type: ignore[call-arg]
     materials = {
@@ -244,7 +246,8 @@ def _short(x: float) -> str:
 def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
     """A stage of models by their names on the command line: "conductor", "conductor(alpha=0.2)", "glass.py:Glass".
 
-    parameters  "name=value" each, for every model that has it; InputError if none has
+    parameters  "name=value" each, for every model that has the parameter
+    Raises InputError for a parameter that no model has.
     """
     files = [file for target in (*targets, *parameters) for file in outside.files_in(target)]
     texts = [file for target in targets if (file := shaders.file_in(target)) is not None]
@@ -260,7 +263,7 @@ def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
 
 
 def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
-    """`targets.named` for materials that a page can show; InputError for anything else."""
+    """`targets.named` for materials that a page can show. Raises InputError for anything else."""
     for target in targets:
         if operands.MATERIALS.isdisjoint(operands.readings(target)):
             hint = "the page needs shader code, which only Gonio's models have"
@@ -269,9 +272,10 @@ def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[Collection[str]] | None = None) -> Stage:
-    """One row per model, of five balls: from smooth to rough if no alpha is given, otherwise over its first number.
+    """One row of five balls per model: from smooth to rough if no alpha is given, otherwise with increasing values of
+    the model's first numeric parameter.
 
-    given  per model, the paths of parameters that the user has set
+    given  for each model, the paths of parameters that the user has set
     """
     if not bsdfs:
         return opening()

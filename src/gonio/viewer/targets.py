@@ -1,8 +1,8 @@
 """Materials named on the command line, with options shared by all: -p masking=schlick-direct.
 
-A shared option is applied to every material that has it, including nested materials: otherwise a comparison would be
-misleading if one row had it and another silently did not. If the parameter is ambiguous, the option is not applied
-there, and a note says so.
+A shared option is applied to every material that has the parameter, including nested materials: otherwise a comparison
+would be misleading, since one row would have it and another silently would not. Where the parameter is ambiguous, the
+option is not applied, and a note says so.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Named(NamedTuple):
 
 
 def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
-    """The materials, and notes on where an option was not applied.
+    """The materials, and notes about options that were not applied to one of them.
 
     options  "name=value" each, shared by all. A material's own parameter has precedence over nested ones of that name;
              a choice, such as masking, is applied to all nested ones, a number or a preset only if there is exactly one

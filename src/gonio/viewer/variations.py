@@ -1,4 +1,5 @@
-"""The variations of a study: paths with their values, typed or given, and the request of each picture."""
+"""The variations of a study: paths with their values, from the command line or from Python, and the request of each
+picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A user's own files, reloaded whenever they are saved.
+"""Reload a user's own files whenever they are saved.
 
     >>> code = Code([Path("ward.py")], make)
     >>> stage = code.run()                   # `make()`, which loads the files and their imports from their folder
@@ -101,7 +101,7 @@ class Code(Generic[Made]):
         return not {"site-packages", "dist-packages"} & {*place.parts} and not self._folders.isdisjoint(place.parents)
 
     def located(self, error: BaseException) -> GonioError:
-        """The error with the line of these files that it came from."""
+        """The error, with the line of these files that caused it."""
         causes = list(_causes(error))
         first = causes[-1]
         if isinstance(first, SyntaxError) and first.filename:

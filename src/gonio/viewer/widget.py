@@ -46,7 +46,7 @@ export default { render };
 def view(*models: MaterialLike, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 
-    models  anything that `go.material` takes; by default two rows of balls with and without Kulla-Conty
+    models  anything that `go.material` takes; if none is given, two rows of balls with and without Kulla-Conty
     height  height of the cell, CSS pixels
     Returns a widget, which the notebook shows. The page runs in the notebook's browser without a server, so there is no
     live reference. Raises InputError if a model cannot be shown, MachineError if anywidget is missing.

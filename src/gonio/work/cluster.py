@@ -61,9 +61,9 @@ class Cluster:
     workers   number of processes to start on this machine instead; as many as it has cores start at once, the others
               one by one while the job runs, since a start slows the running workers down
     security  Dask's `Security` for a scheduler with TLS; None uses Dask's own configuration
-    wait      seconds to wait, with a warning, for the first worker of a scheduler; then MachineError is raised
-    Raises InputError for both or neither of `address` and `workers`, and for an invalid address; MachineError if Dask
-    is not installed or no scheduler answers.
+    wait      seconds to wait, with a warning, for the first worker of a scheduler
+    Raises InputError for both or neither of `address` and `workers`, and for an invalid address. Raises MachineError if
+    Dask is not installed, if no scheduler answers, or if no worker joins it within `wait` seconds.
     """
 
     remote = True
@@ -215,7 +215,7 @@ class Cluster:
     def run(
         self, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """As `Executor.run`; (-1, {}) if no part has finished for a while."""
+        """As `Executor.run`."""
         if not arguments:
             return
         for _ in self._check():

@@ -38,7 +38,8 @@ class Executor(Protocol):
     ) -> Generator[tuple[int, Arrays], None, None]:
         """Yield index and result of each part when it finishes; (-1, {}) if none has finished for a while.
 
-        files  the files that parts open through `file`, by content hash
+        arguments  the arguments of `function` for each part
+        files      the files that parts open through `file`, by content hash
         """
         ...
 
@@ -92,9 +93,10 @@ def each(
     """Yield index and result of each part, stored ones first, the others in the order in which they finish; (-1, {}) if
     none has finished for a while, so that the caller can check for an interrupt.
 
-    keys   hash of everything that a part depends on, for each part; its result is then stored until the job is done
-           (`parts.job`)
-    files  files that the parts read, by content hash
+    arguments  the arguments of `function` for each part
+    keys       for each part, a hash of everything that it depends on; its result is then stored until the job is done
+               (`parts.job`). None: nothing is stored
+    files      files that the parts read, by content hash
     """
     stored = parts.current() if keys else None
     left = []

@@ -1,4 +1,5 @@
-"""What the bits of a result depend on besides its input: the version and code of Gonio, and the processor."""
+"""Everything besides its input that the bits of a result depend on: the version and code of Gonio, and the
+processor."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def folder() -> Path:
 
 
 def key_of(*what: object) -> str:
-    """A hash of what a part depends on: bytes as they are, all other values by their `repr`."""
+    """A hash of everything that a part depends on: bytes are hashed as they are, all other values by their `repr`."""
     digest = hashlib.sha256()
     for one in what:
         content = one if isinstance(one, bytes) else repr(one).encode("utf-8", "surrogateescape")
@@ -90,7 +90,10 @@ def current() -> Parts | None:
 
 @contextlib.contextmanager
 def job(name: str, *what: object) -> Iterator[Parts]:
-    """Store parts inside the `with` block; remove them when it ends, unless by an error or a signal."""
+    """Store parts inside the `with` block. They are removed when it ends, except by an error or a signal.
+
+    name, what  as for `Parts`
+    """
     parts = Parts(name, *what)
     token = _current.set(parts)
     try:

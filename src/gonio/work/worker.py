@@ -29,7 +29,10 @@ _one = threading.Lock()  # only one thread may use Dr.Jit, even if a worker has 
 def do(
     function: executor.Function, arguments: tuple[executor.Argument, ...], wanted: dict[str, str]
 ) -> tuple[float, Arrays]:
-    """Run one part; returns the seconds that it took and its result."""
+    """Run one part. Returns the seconds that it took and its result.
+
+    wanted  the properties that this worker must have, as returned by `about`
+    """
     with _one:
         gc.disable()  # see `cluster.Cluster`: garbage is collected below, in this thread
         started = time.perf_counter()
@@ -57,7 +60,7 @@ def about() -> dict[str, str]:
 
 
 def about_or_why() -> dict[str, str]:
-    """As `about`; if that fails, the reason in place of the version."""
+    """As `about`; if that fails, the reason for the failure replaces the version."""
     try:
         return about()
     except Exception as error:  # that Gonio has another interface, or none is installed
@@ -65,7 +68,7 @@ def about_or_why() -> dict[str, str]:
 
 
 def compare(own: Mapping[str, str], other: object, name: str) -> None:
-    """Raise MachineError, with the worker's name, if its `about` differs from ours."""
+    """Raise MachineError, with the worker's name, if its `about`, `other`, differs from ours, `own`."""
     if not isinstance(other, dict):
         raise MachineError(
             f"Gonio does not answer on worker {name}: {other}", "cluster", "run there: pip install 'gonio[cluster]'"

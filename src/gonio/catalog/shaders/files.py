@@ -181,7 +181,7 @@ def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str,
 def _compiled(
     text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path], files: list[Path]
 ) -> Module:
-    """The module of a text.
+    """The module compiled from a shader's text.
 
     folders  the shader's own folder, in which #include <FILE> does not look, and then the named ones
     files    receives the files that the text includes

@@ -84,7 +84,7 @@ def _written(module: Module, function: Function) -> list[int]:
 
 
 def _rank(module: Module, function: Function) -> tuple[int, int]:
-    """How much a function looks like a BRDF, from its name and from the directions among its arguments."""
+    """How likely a function is to be a BRDF, by its name and by the directions among its arguments."""
     name = title(module, function).lower()
     exact = {"brdf": 6, "bsdf": 6, "evalbrdf": 5, "evaluatebrdf": 5, "brdf_eval": 5, "evalbsdf": 5, "eval": 4}
     near = 4 if name.endswith("_eval") else 3 if "brdf" in name or "bsdf" in name else 0

@@ -69,7 +69,7 @@ Factors = Iterator[tuple[str, str, Values]]
 
 
 def density(ndf: str, cosine: Values, alpha: float, name: str = "") -> Values:
-    """D, or its wrong form `name`."""
+    """D of the distribution `ndf` at the cosine of the half vector, or its wrong form `name`."""
     t2 = 1.0 / cosine**2 - 1.0
     return _DENSITIES[ndf][name](cosine, t2, alpha)
 

@@ -15,7 +15,7 @@ from .base import MATERIALS, verb
 
 
 class Baking(Options):
-    """Which tables are baked, and how."""
+    """The tables to bake, and the method."""
 
     lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""
     resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, for ltc 64 or 16.")] = None

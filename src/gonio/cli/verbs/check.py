@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """What the work is judged by, and how the result is reported."""
+    """Options of the judgment and of its report."""
 
     scene: Annotated[
         Path | None, Option(metavar="FILE", help="The scene of a picture; with --sheet, a folder of scenes.")
@@ -123,8 +123,8 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
 def _with_parameters(
     target: str | None, model: str | None, against: str | None, made: Material
 ) -> tuple[str, str | None]:
-    """The work, and the material or masking term to judge it by; materials with those of the given parameters that they
-    have."""
+    """The work, and the material or masking term by which it is judged. Each of the given parameters is set on the
+    materials that have it."""
     from ...catalog import outside, shaders
     from ...optics.masking import Masking
 

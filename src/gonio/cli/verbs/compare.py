@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """The metric, and the largest difference with which A passes."""
+    """The metric, and the largest difference that passes."""
 
     tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 if the metric exceeds X.")] = None
     metric: Annotated[

@@ -35,7 +35,7 @@ class Place(Options):
 
 
 class Content(Options):
-    """Which parts of the material are written, or what replaces its functions."""
+    """The parts of the material to write, or the approximation that replaces its functions."""
 
     functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample"
     lean: Annotated[

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Until(Options):
-    """When a render stops, and where its state is stored."""
+    """Options that determine when a render stops, and where its state is stored."""
 
     timeout: Timeout = None
     until_error: Annotated[

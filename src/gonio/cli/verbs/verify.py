@@ -42,7 +42,7 @@ class Files(Options):
 
 
 class Effort(Options):
-    """What is judged, and how thoroughly."""
+    """Options that select the laws to test, and the effort."""
 
     vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card per value; a range gives five.")] = ""
     quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Address(Options):
-    """Where the page is served."""
+    """The address of the page's server."""
 
     host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1"
     port: Annotated[int, Option(metavar="N", help="Port to listen on; 0 takes any free one.")] = 0

@@ -1,5 +1,5 @@
-"""Directional albedo: by quadrature for microfacet models, by sampling for any material, and by random walks on the
-facets."""
+"""Directional albedo: by quadrature for microfacet models, by cubature or sampling for any material, and by random
+walks on the facets."""
 
 from .directional import Albedo, albedo, direction
 

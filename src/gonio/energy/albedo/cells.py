@@ -1,4 +1,5 @@
-"""A cell of adaptive cubature: Gauss-Legendre nodes inside, and points at its rim, which detect steps between them."""
+"""A cell of adaptive cubature: Gauss-Legendre nodes inside, and points at the cell's rim, which detect steps between
+them."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ OUTSIDE = 0.07  # distance of the first of four nodes from the rim, as a fractio
 
 
 class Nodes(NamedTuple):
-    """Positions in the unit square of a cell, and their weights, (K,) each."""
+    """Positions (s, t) in the unit square of a cell, and their weights, (K,) each."""
 
     s: np.ndarray
     t: np.ndarray
@@ -22,7 +23,11 @@ class Nodes(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Per cell: the weighted sum over the nodes, (cells, ...), and the smallest and largest value, (cells,)."""
+    """The integrand in cells.
+
+    integral     weighted sum over the nodes, (cells, ...)
+    least, most  smallest and largest value at the nodes, (cells,)
+    """
 
     integral: np.ndarray
     least: np.ndarray
@@ -32,9 +37,9 @@ class Seen(NamedTuple):
 class Points(NamedTuple):
     """Samples inside cells, which reveal lobes that are narrower than a cell.
 
-    cell     index of the cell, (N,)
-    at       the two coordinates, (N, 2)
-    density  the integrand per unit of area in these coordinates, (N,)
+    cell     index of each sample's cell, (N,)
+    at       its two coordinates, (N, 2)
+    density  the integrand per unit area in these coordinates, (N,)
     light    contribution of the sample to an estimate of the integral, (N,)
     """
 
@@ -52,11 +57,11 @@ class Points(NamedTuple):
         return np.bincount(self.cell, self.light, count)
 
     def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """Estimate of the light that a cell's nodes miss, (cells,), if a sample in it is bright and all nodes are dark;
-        else 0.
+        """An estimate of the light that the nodes of each cell miss, (cells,), if a sample in the cell is bright and
+        all nodes are dark; else 0.
 
         area  area of each cell
-        most  the largest density at a cell's nodes, times its area
+        most  largest density at the nodes of each cell, times its area
         """
         bright = np.zeros(len(area))
         np.maximum.at(bright, self.cell, self.density)
@@ -65,15 +70,15 @@ class Points(NamedTuple):
 
 
 def product(order: int) -> Nodes:
-    """Gauss-Legendre in the two directions, `order` nodes each."""
+    """The product of two Gauss-Legendre rules of `order` nodes."""
     x, w = gauss(order)
     s, t = np.meshgrid(x, x, indexing="ij")
     return Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
 
 
 def rim(inset: float) -> Nodes:
-    """The corners and the midpoints of the sides, moved inward by a fraction of the width. They are compared with the
-    nodes; they are not an integration rule, so their weights are equal."""
+    """The corners and the midpoints of the sides, moved inward by a fraction `inset` of the width. They are compared
+    with the nodes; they are not an integration rule, so their weights are equal."""
     ends = (inset, 0.5, 1.0 - inset)
     near = np.array([(a, b) for a in ends for b in ends if (a, b) != (0.5, 0.5)])
     return Nodes(near[:, 0], near[:, 1], np.full(len(near), 1.0 / len(near)))
@@ -81,7 +86,8 @@ def rim(inset: float) -> Nodes:
 
 def rimmed(inset: float) -> Nodes:
     """A rule of four nodes per direction that is exact to degree 5, like Lobatto's, with the outer nodes at a fraction
-    of the width from the rim. It detects a step between the rim and the first node of Gauss's rules, which miss it."""
+    `inset` of the width from the rim. It detects a step between the rim and the first node of a Gauss rule, which the
+    Gauss rules miss."""
     outer = (1.0 - 2.0 * inset) ** 2
     inner = (0.2 - outer / 3.0) / (1.0 / 3.0 - outer)
     share = 0.5 * (1.0 / 3.0 - inner) / (outer - inner)
@@ -92,10 +98,11 @@ def rimmed(inset: float) -> Nodes:
 
 
 def step_aside(inside: Seen, rim: Seen, times: float = 4.0) -> np.ndarray:
-    """Bound on the integral missed between the nodes and the rim if the values at the rim differ strongly, (cells,): no
-    rule resolves a step there, such as the horizon or the critical angle. It has the unit of `least` and `most`.
+    """A bound on the integral missed between nodes and rim, (cells,), if values at the rim differ strongly from those
+    at the nodes. No rule resolves a step there, such as the horizon or the critical angle. The bound has the unit of
+    `least` and `most`.
 
-    times  the ratio above which a difference is not explained by the cell's own slope
+    times  ratio of the values above which a difference is not explained by the slope within the cell
     """
     with np.errstate(invalid="ignore"):  # NaN is reported elsewhere
         more = np.where(rim.most > times * inside.most, rim.most - inside.most, 0.0)

@@ -39,7 +39,8 @@ Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
 
 def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integrand:
-    """An integrand from a function of rows, (N, 3) and (N, 3) -> (N, channels); about ten times slower."""
+    """The integrand for a function of NumPy arrays, (N, 3) and (N, 3) -> (N, channels); about ten times slower than one
+    of Dr.Jit vectors."""
     types = backend.types("float64")
 
     def integrand(wo: Direction, wi: Direction) -> list[Scalar]:
@@ -58,14 +59,20 @@ ONE_WAY = 0.05  # ratio of the ranges of values along the two coordinates below 
 
 
 class Integral(NamedTuple):
-    """value and error, (directions, channels)."""
+    """Integrals and their estimated errors, (directions, channels) each."""
 
     value: np.ndarray
     error: np.ndarray
 
 
 class _Cells(NamedTuple):
-    """Row of wo, side of the surface, lower corner and size in (theta, phi)."""
+    """Cells in (theta, phi).
+
+    row   index of wo
+    side  side of the surface: 1 above, -1 below
+    low   lower corner
+    size  size
+    """
 
     row: np.ndarray
     side: np.ndarray
@@ -81,9 +88,9 @@ class _Cells(NamedTuple):
         return _Cells(*[part[which] for part in self])
 
     def quarters(self, way: np.ndarray | None = None) -> _Cells:
-        """The four quarters of each cell, adjacent in the result.
+        """The four quarters of each cell, which are adjacent in the result.
 
-        way  index in WAYS per cell; None for QUADRANTS
+        way  way to divide each cell, an index in WAYS; None divides all into QUADRANTS
         """
         way = np.zeros(len(self.row), int) if way is None else way
         size = self.size / WAYS[way]
@@ -94,11 +101,12 @@ class _Cells(NamedTuple):
 def integrate(
     sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float = 1e-5, seed: int = 0
 ) -> Integral:
-    """int integrand(wo, wi) dwi for each row of wo (N, 3).
+    """int integrand(wo, wi) dwi over the sphere, for each row of wo (N, 3).
 
-    sample     the model's sampling, which shows where its lobes are
-    integrand  (wo, wi) -> a vector with one entry per channel, from float64 Dr.Jit vectors; it runs inside a kernel
-    tolerance  absolute, per integral; if cells or samples run out, the reported error is larger
+    sample     the `sample` method of the model, which shows where its lobes are
+    integrand  function of float64 Dr.Jit vectors wo and wi that returns one value per channel; it runs inside a kernel
+    tolerance  absolute error per integral; if cells or samples run out, the reported error is larger
+    seed       seed of the samples
     """
     per, *more = SAMPLES
     value, error, unseen = _integrate(sample, integrand, wo, tolerance, seed, per)
@@ -113,12 +121,13 @@ def integrate(
 def _integrate(
     sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float, seed: int, per: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values and errors of integrals whose first cells follow `per` samples of each wo, and an estimate of the light in
-    lobes that are narrower than the cells and that no sample has shown, (N,).
+    """Values and errors of integrals whose first cells follow `per` samples of each wo, and an estimate, (N,), of the
+    light in lobes that are narrower than the cells and that no sample has hit.
 
     Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as one
-    beside the streak. The light of samples that are single in a cell divided because of them estimates what is left
-    (Good1953: if N_1 of N draws are the only ones of their kind, unseen kinds have the probability N_1 / N).
+    beside the streak. The remaining light is estimated by the light of samples that are the only ones in a cell and
+    caused its division (Good1953: if N_1 of N draws are the only ones of their kind, unseen kinds have the probability
+    N_1 / N).
     """
     cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
@@ -166,9 +175,9 @@ def _integrate(
 class _Errors:
     """The errors of the cells that are not divided, summed per integral and channel, (N, C).
 
-    Along the edge of a step, the errors of cells have either sign and mostly cancel: the estimate is three standard
-    errors of their sum. An edge parallel to the cells misleads all of them alike: the estimate adds the sum itself, the
-    larger of two rules.
+    Along the edge of a step, the errors of cells have either sign and mostly cancel, so the estimate contains three
+    standard errors of their sum. If the edge is parallel to the cells, it affects all of them alike, so the estimate
+    also contains the sum itself, for the rule that gives the larger one.
     """
 
     def __init__(self, count: int, channels: int) -> None:
@@ -176,7 +185,12 @@ class _Errors:
         self.squares = np.zeros((count, channels))
 
     def with_cells(self, row: np.ndarray, signed: np.ndarray, size: np.ndarray) -> _Errors:
-        """The sums with more cells: rows of wo (M,), differences of the two rules (2, M, C), and their size (M, C)."""
+        """The sums with M more cells.
+
+        row     index of wo, (M,)
+        signed  differences of the two rules, (2, M, C)
+        size    size of the error, (M, C)
+        """
         count, channels = self.squares.shape
         more = _Errors(count, channels)
         for k in range(channels):
@@ -190,7 +204,7 @@ class _Errors:
 
 
 def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray) -> Points:
-    """The points in divided cells, renumbered by the quarters of these cells."""
+    """The points in divided cells, with the indices of the quarters of these cells."""
     inside = divided[points.cell]
     cell, at = points.cell[inside], points.at[inside]
     parts = WAYS[way[cell]]
@@ -200,8 +214,8 @@ def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray)
 
 
 def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, Points]:
-    """The initial cells, divided around the mirror direction, wo and the samples that carry light, `per` for each wo;
-    and these samples inside them."""
+    """The initial cells, divided around the mirror direction, wo and those of `per` samples for each wo that carry
+    light; and these samples in the cells."""
     n_theta, n_phi = FIRST
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * FIRST_SIZE
     row, side, cell = np.meshgrid(np.arange(len(wo)), [1.0, -1.0], np.arange(len(corner)), indexing="ij")
@@ -247,7 +261,7 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, pe
 
 
 def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    """The sum of the channels at rows of directions, (N,); 0 where it is not finite."""
+    """The sum of the integrand's channels at pairs of directions, (N,); 0 where it is not finite."""
     types = backend.types("float64")
     values = list(integrand(backend.vector_of(wo, 3, types), backend.vector_of(wi, 3, types)))
     backend.drjit().eval(values)
@@ -255,14 +269,15 @@ def _summed(integrand: Integrand, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
 
 
 def _key(row: np.ndarray, below: np.ndarray, at: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """The index of a cell among equal ones, from row of wo, side, and position `at`, (M, 2) below `most`."""
+    """The index of a cell among those of one size, from the index of wo, the side, and the integer position `at`,
+    (M, 2), which is below `most`."""
     a, b = np.minimum(at.astype(np.int64), most - 1).T
     return np.asarray(((row.astype(np.int64) * 2 + below) * most[0] + a) * most[1] + b)
 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:
-    """The integrand at the nodes of every cell, for each of some rules with ORDER^2 nodes, in one kernel; and the way
-    to divide each cell, from the first rule."""
+    """The integrand at the nodes of every cell, for each of several rules with ORDER^2 nodes, evaluated in one kernel;
+    and the way to divide each cell, by the first rule."""
     dr = backend.drjit()
     types = backend.types("float64")
     nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
@@ -305,7 +320,7 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
 
 
 def _range(value: Scalar) -> Scalar:
-    """The largest difference within groups of ORDER values, per cell."""
+    """The largest difference within groups of ORDER values, for each cell."""
     dr = backend.drjit()
     most, least = (dr.block_reduce(op, value, ORDER) for op in (dr.ReduceOp.Max, dr.ReduceOp.Min))
     return dr.block_reduce(dr.ReduceOp.Max, most - least, ORDER)

@@ -5,9 +5,9 @@
 f* is the BSDF without the radiance factor (eta_o/eta_i)^2 (mode "importance"), so that reflected and transmitted power
 add up; 1 means no absorption.
 
-Three methods, in order of accuracy:
-    closed form  known to the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
-    quadrature   microfacet models by `quadrature`; any other `eval` by `cubature`, guided by `sample`
+There are three methods, from most to least accurate:
+    closed form  stated by the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
+    quadrature   for microfacet models by `quadrature`; for any other `eval` by `cubature`, guided by `sample`
     sampling     mean weight of `sample` over randomly shifted lattices, with the standard error over the shifts
 """
 
@@ -33,7 +33,12 @@ METHODS = ("auto", "closed-form", "quadrature", "sampling")
 
 
 class Albedo(NamedTuple):
-    """value (N, channels); error, the estimated error of value (N, channels); method, the name of the method."""
+    """Directional albedos.
+
+    value   the albedos, (N, channels)
+    error   their estimated errors, (N, channels)
+    method  the name of the method
+    """
 
     value: NDArray[np.float64]
     error: NDArray[np.float64]
@@ -55,16 +60,18 @@ def albedo(
     samples: int = 1 << 16,
     seed: int = 0,
 ) -> Albedo:
-    """Directional albedo of any material in terms of power, reflected plus transmitted.
+    """Directional albedo of any material: the reflected plus the transmitted fraction of the power.
 
         go.albedo(go.Conductor.preset("Au", alpha=0.3), mu=[0.2, 1.0]).value        # (2, 3)
 
-    mu       cosine of wo, (N,) or a number in [-1, 1]; below 0, wo lies inside, for materials that transmit
+    mu       cosine of the angle between wo and the normal, a number in [-1, 1] or (N,); if negative, wo lies inside the
+             material, if it transmits
     phi      azimuth of wo, radians
     method   "auto" selects the first of "closed-form", "quadrature" and "sampling" that supports the material
-    samples  for "sampling", total number per direction
-    Returns value, error and method. The error of a quadrature is its difference from a finer or coarser one, that of
-    sampling one standard error.
+    samples  total number of samples per direction, for "sampling"
+    seed     seed of the samples
+    Returns an `Albedo`. The error of a quadrature is its difference from a finer or coarser one, that of sampling is
+    one standard error.
     Raises InputError if the method does not support the material, or if a parameter has one value per ray.
     """
     if not isinstance(model, BSDF):
@@ -95,13 +102,13 @@ def albedo(
 
 
 def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """Unit vectors (N, 3) with cosine mu and azimuth phi."""
+    """Unit vectors (N, 3) with the cosines mu and azimuths phi."""
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
     return frame.spherical_array(sin, mu, phi)
 
 
 def check_uniform(model: BSDF) -> None:
-    """Raise InputError if a parameter has one value per ray."""
+    """Raise InputError if a parameter of the model has one value per ray."""
     for leaf in tree.leaves(model):
         if leaf.parameter.numeric and not backend.is_drjit(leaf.value) and leaf.parameter.rows(leaf.value) != 1:
             where = f"albedo: {type(leaf.owner).__name__}.{leaf.parameter.name}"
@@ -116,8 +123,11 @@ NODES, JUDGE = 64, 96  # for quadratures that a material performs itself, and fo
 def known(
     model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
 ) -> NDArray[np.float64] | None:
-    """The albedo known to the material itself, or by quadrature over its microsurface; with nodes None, by closed forms
-    only."""
+    """The albedo stated by the material itself, or computed by quadrature over its microsurface; None if neither is
+    possible.
+
+    nodes  number of nodes for quadratures; None allows closed forms only
+    """
 
     def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
         return known(material, mu, phi, nodes)
@@ -129,7 +139,7 @@ def known(
 
 
 def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> NDArray[np.float64] | None:
-    """The albedo by quadrature over the normals of the facets."""
+    """The albedo by quadrature over the normals of the facets; None without a rough microsurface."""
     surface = model.microsurface
     if surface is None or min(widths(surface.alpha)) < SMOOTH:
         return None
@@ -160,7 +170,7 @@ def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> N
 
 
 def widths(alpha: object) -> tuple[float, float]:
-    """(alpha_x, alpha_y) as plain numbers."""
+    """The two widths (alpha_x, alpha_y) as plain numbers."""
     x, y = pair_of(alpha)
     return float(x), float(y)
 

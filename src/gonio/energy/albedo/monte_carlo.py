@@ -1,8 +1,9 @@
-"""E(mu, alpha) by Monte Carlo, as in student implementations, for comparison with the quadrature.
+"""E(mu, alpha) by Monte Carlo integration, as in student implementations, for comparison with the quadrature.
 
+The methods of sampling are:
 cosine   cosine-weighted wi; the weight is f pi. Unbiased, but narrow lobes are rarely hit: below roughness 0.3, most
          texels with 1024 samples are far too small
-ggx, beckmann, ... (the distribution's own name)   normals with density D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
+ggx, beckmann, ... (the distribution's name)   normals with density D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
 visible  visible normals; the weight is G / G1(o), at most 1 (Heitz2014b)
 """
 
@@ -25,7 +26,7 @@ POINTS = ("hammersley", "independent", "stratified")
 
 
 class Estimate(NamedTuple):
-    """Mean over the samples, and the standard error under the assumption of independent samples."""
+    """The mean over the samples, and its standard error under the assumption that samples are independent."""
 
     value: np.ndarray
     standard_error: np.ndarray
@@ -49,15 +50,15 @@ def methods(ndf: str) -> tuple[str, ...]:
 
 
 class Sampling(NamedTuple):
-    """How E is estimated from random samples.
+    """The method by which E is estimated from random samples.
 
     method  "cosine", the distribution's name or "visible"; for a table also "quadrature", without samples
-    spp     samples per point, 1 or more
-    points  "hammersley": the same points for every texel, as in the homework; "independent": new ones for each;
-            "stratified": new ones for each, one in each cell of a square grid; `spp` must be a square
+    spp     number of samples per texel, 1 or more
+    points  "hammersley" uses the same points for every texel, as in the homework; "independent" uses new ones for each;
+            "stratified" uses new ones for each, one in each cell of a square grid, so `spp` must be a square
     seed    seed of the points, if they are random
     floor   lower bound of the denominator of D in method "cosine", as in the homework's program: D is then at most
-            alpha_x alpha_y / floor; 0 for none
+            alpha_x alpha_y / floor; 0 for no bound
     """
 
     method: str
@@ -68,9 +69,11 @@ class Sampling(NamedTuple):
 
 
 def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precision: Precision = "float32") -> Estimate:
-    """E at each point from random samples.
+    """E from random samples.
 
-    Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
+    at         the points (mu, alpha, alpha_y, phi) at which E is estimated
+    precision  precision of the formulas, "float32" or "float64"
+    Returns float64 arrays of the broadcast shape of `at`. Raises InputError for unknown names and for spp < 1.
     """
     method, spp, points, seed, floor = sampling
     known_masking(masking_name)
@@ -115,7 +118,7 @@ def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precis
 
 
 def _check(ndf: str, method: str, points: str, spp: int) -> None:
-    """Raise InputError for unknown names and spp < 1."""
+    """Raise InputError for unknown names and for numbers of samples that are not possible."""
     if method not in methods(ndf):
         raise InputError(f"unknown method '{method}'", "method", did_you_mean(method, [*methods(ndf), "quadrature"]))
     if points not in POINTS:

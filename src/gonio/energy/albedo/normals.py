@@ -1,4 +1,4 @@
-"""The quadrature rule for integrals over the normals of microfacets: its variables, and where it is split.
+"""The quadrature rule for integrals over the normals of microfacets: its variables, and the places where it is split.
 
 **The boundary.** In the plane of n and m, a reflection doubles angles. The projection of o onto this plane makes the
 angle delta = atan(tan(theta_o) cos(phi_m)) with n, phi_m measured from o; that of i makes 2 theta_m - delta, so i is
@@ -10,13 +10,13 @@ t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t 
 
   - o.m / (mu cos(theta_m)) = 1 + (S / mu) t cos(b - b_o), with S = |(alpha_x o_x, alpha_y o_y)| and b_o its angle:
     anisotropy affects only the boundary and G;
-  - t = sinh(x) assigns the same number of nodes to each octave of slope, from the peak through GGX's long tail;
+  - t = sinh(x) assigns the same number of nodes to each octave of slope, from the peak through the long tail of GGX;
   - across b - b_o = +-pi/2, the boundary jumps from theta_o's complement, small at grazing, to nearly pi/2, within an
     angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, which is cot(theta_o) for one width. With
     b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the jump takes as much of x as
     the rest;
-  - where the azimuths of m and o are equal, the integrand has an edge at grazing. For one width this is b = b_o, the
-    end of both half turns; for two widths it is nearby, and the half turns are made to end there.
+  - where the azimuths of m and o are equal, the integrand has an edge at grazing angles. For one width, this is
+    b = b_o, the end of both half turns; for two widths, it is nearby, and the half turns are made to end there.
 
 **Glass.** Reflection and transmission share the normals visible from o, theta_m < pi/2 + min(delta, 0). F has a
 square-root singularity at the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so
@@ -50,7 +50,7 @@ Integrand: TypeAlias = Callable[[NDF, Direction, Direction, Scalar, Pair, Array]
 
 @lru_cache
 def longest_slope(ndf: NDF) -> float:
-    """The stretched slope t beyond which a distribution has less than about 1e-9 of its normals."""
+    """The stretched slope t beyond which less than about 1e-9 of a distribution's normals lie."""
     t = np.logspace(-1, 8, 400)
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
@@ -65,7 +65,13 @@ def over_azimuths(
     ndf: NDF, terms: Integrand, channels: int, points: list[np.ndarray], nodes: tuple[int, int],
     sides: int, through: bool,
 ) -> list[np.ndarray]:  # fmt: skip
-    """Integrals over normals, one per point: each lane is a point and a stretched azimuth, with a loop over slopes."""
+    """Integrals over normals, one per point. Each lane loops over the slopes of one point and one stretched azimuth.
+
+    points   mu, alpha_x, alpha_y, phi and eta of each point
+    nodes    numbers of nodes in azimuth and slope
+    sides    number of half turns to integrate: 1 if the two are equal, else 2
+    through  whether to include all normals visible from o, as for glass
+    """
     dr = backend.drjit()
     kind = backend.types("float64")
     n_azimuth, n_slope = nodes
@@ -91,9 +97,9 @@ def over_azimuths(
 class _View(NamedTuple):
     """One direction o per lane.
 
-    sin_o         sine of its angle to the normal
-    cos_bo, sin_bo  the azimuth b_o of the stretched o
-    length        length of the stretched o along the surface
+    sin_o           sine of the angle between o and the normal
+    cos_bo, sin_bo  cosine and sine of the azimuth b_o of the stretched o
+    length          length of the stretched o along the surface
     """
 
     mu: Array
@@ -120,7 +126,7 @@ def _view(mu: Array, alpha: Array, phi: Array) -> _View:
 
 
 def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side: Array) -> tuple[Array, Array]:
-    """(slope of the normals at t = 1, weight) of one stretched azimuth."""
+    """The slope of the normals at t = 1, and the weight, of one stretched azimuth."""
     dr = backend.drjit()
     wo, alpha, cos_bo, sin_bo = view.wo, view.alpha, view.cos_bo, view.sin_bo
     # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the jump's width is limited to 1, where there is no jump
@@ -146,7 +152,7 @@ def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side
 
 
 def _glass_ends(view: _View, eta: Array, side: Array, leap: Array, a: Array, top: Array) -> list[Array]:
-    """(high, low): x where A = cos_c, that is cos(phi_m - phi_o) = +-q; otherwise arbitrary cuts."""
+    """The x, high and low, at which A = cos_c, that is, cos(phi_m - phi_o) = +-q; arbitrary cuts if there are none."""
     dr = backend.drjit()
     cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
     q = dr.sqrt(dr.maximum(dr.square(cos_c) - dr.square(view.mu), 0.0)) / dr.maximum(view.sin_o, 1e-9)
@@ -163,8 +169,8 @@ def _glass_ends(view: _View, eta: Array, side: Array, leap: Array, a: Array, top
 
 
 def _in_pieces(chi: Array, top: Array, high: Array, low: Array) -> tuple[Array, Array]:
-    """(x, half its derivative) in the pieces [-1, low], [low, high], [high, top]; chi is the index of the piece plus
-    the position in it."""
+    """x, and half its derivative, in the pieces [-1, low], [low, high] and [high, top]; chi is the index of the piece
+    plus the position in it."""
     dr = backend.drjit()
     piece = dr.floor(chi)
     start = dr.select(piece < 0.5, -1.0, dr.select(piece < 1.5, low, high))
@@ -181,7 +187,7 @@ def _cuts(view: _View, eta: Array | None, slope: Array, limit: Array) -> list[Ar
     delta = dr.atan((slope.x * view.wo.x + slope.y * view.wo.y) / (spread * view.mu))
 
     def x_at(theta: Array) -> Array:
-        """The variable x at an angle of the normal, limited to the distribution's end."""
+        """The variable x at an angle of the normal, limited to the end of the distribution."""
         inside = theta < 0.5 * ops.pi - 1e-9
         t = dr.select(inside, dr.tan(dr.select(inside, theta, 0.0)) / spread, limit)
         return _asinh(dr.clip(t, 0.0, limit))

@@ -4,9 +4,9 @@ With F = 1, the albedo of a microfacet BRDF is an integral over normals (dwi = 4
 
     E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over the m for which i lies above the surface.
 
-`normals` has the quadrature rule: its variables, and where it is split.
+The quadrature rule is defined in `normals`.
 
-**The error** of any value is estimated by the same integral with other numbers of nodes.
+**The error** of a value is estimated as its difference from the same integral with other numbers of nodes.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class TwoWays(NamedTuple):
 
 
 def known_masking(name: str) -> str:
-    """The name itself; raises InputError if there is no masking term of that name."""
+    """The name itself. Raises InputError if there is no masking term of this name."""
     return masking.term(name).name
 
 
@@ -81,10 +81,10 @@ def moments(
     phi: ArrayLike = 0.0,
     nodes: tuple[int, int] | None = None,
 ) -> Moments:
-    """E at each (mu, alpha): the albedo of D G / (4 cos cos) with F = 1, and with F = (1 - o.m)^5.
+    """The albedo of the microfacet BRDF F D G / (4 cos cos) with F = 1, and with F = (1 - o.m)^5.
 
     mu ... phi  see `Points`
-    nodes       Gauss-Legendre nodes in azimuth and slope; None selects NODES, or TURNED_NODES for two widths
+    nodes       numbers of Gauss-Legendre nodes in azimuth and slope; None selects NODES, or TURNED_NODES for two widths
     Returns float64 arrays of the broadcast shape.
     """
     known_masking(masking_name)
@@ -101,9 +101,12 @@ def reflected(
     ndf: str, masking_name: str, reflectance: Callable[[Scalar], Spectrum], mu: ArrayLike, alpha: ArrayLike,
     alpha_y: ArrayLike | None = None, phi: ArrayLike = 0.0, nodes: tuple[int, int] | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Albedo of a microfacet BRDF for any Fresnel reflectance, a function from the facet's cosine to a spectrum.
+    """The albedo of a microfacet BRDF with any Fresnel reflectance.
 
-    Returns float64 of the broadcast shape, with channels last.
+    reflectance  function of the cosine of incidence on a facet that returns a spectrum
+    mu ... phi   see `Points`
+    nodes        as in `moments`
+    Returns a float64 array of the broadcast shape, with channels last.
     """
     known_masking(masking_name)
 
@@ -123,10 +126,11 @@ def glass(
     eta: ArrayLike,
     nodes: tuple[int, int] = GLASS_NODES,
 ) -> TwoWays:
-    """Power reflected and transmitted by a rough dielectric (albedo 1); their sum is E(mu, alpha, eta).
+    """The power reflected and transmitted by a rough dielectric (albedo 1), whose sum is E(mu, alpha, eta).
 
-    eta  index on the far side divided by that on wo's side: above 1, light enters the denser medium, below 1 it leaves
-         it
+    eta    index on the far side divided by that on wo's side: if it is above 1, wo lies in the less dense medium, if
+           below 1, in the denser one
+    nodes  numbers of nodes in each piece of azimuth and of slope
     """
     known_masking(masking_name)
     kind = fresnel.kind(fresnel_name)
@@ -146,7 +150,10 @@ def glass(
 def average(
     ndf: str, masking_name: str, alpha: ArrayLike, nodes: tuple[int, int] | None = None, count: int = 32
 ) -> np.ndarray:
-    """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by Gauss-Legendre in sqrt(mu)."""
+    """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by a Gauss-Legendre rule of `count` nodes in sqrt(mu).
+
+    nodes  as in `moments`
+    """
     x, w = gauss(count)
     alpha = np.asarray(alpha, float)
     return moments(ndf, masking_name, x**2, alpha[..., None], nodes=nodes).white @ (4.0 * w * x**3)
@@ -163,7 +170,9 @@ def over_normals(
     """int D(m) (o.m) / mu terms(...) dm over the normals that reflect o to a direction above the surface or, with eta,
     over those visible from o.
 
-    terms     (ndf, wo, m, o.m, alpha, eta) -> `channels` values, without D
+    terms     function (ndf, wo, m, o.m, alpha, eta) that returns `channels` values, without D
+    eta       index on the far side divided by that on wo's side, for glass
+    nodes     numbers of nodes in azimuth and slope; for glass, in each piece of them
     Returns one array per channel, of the broadcast shape.
     """
     isotropic = points.alpha_y is None

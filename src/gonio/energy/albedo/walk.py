@@ -7,10 +7,10 @@ masking:
     it escapes upward with probability G1(w, h) = C(h)^Lambda(w),  C(h) = (h + 1) / 2,
     otherwise the next height is C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for upward and downward directions alike.
 
-There it hits a facet with a normal visible from -w, and is reflected with weight F (metal), or reflected or refracted
-with probabilities F and 1 - F (glass). A refracted walker continues in the mirrored frame, in which its own medium is
-above. Each hit adds the direct contribution along the target direction, phase function times G1 (next-event
-estimation), so `value` is unbiased.
+At that height, it hits a facet with a normal visible from -w, and is reflected with weight F (metal), or reflected or
+refracted with probabilities F and 1 - F (glass). A refracted walker continues in the mirrored frame, in which its own
+medium is above. Each hit adds the direct contribution along the target direction, phase function times G1 (next-event
+estimation), so the estimate is unbiased.
 """
 
 from __future__ import annotations
@@ -31,26 +31,30 @@ FLAT = 1e-6  # below this |w.z|, a walker stays at its height
 
 
 def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
-    """Smith's Lambda with its sign: Lambda(-w) = -1 - Lambda(w)."""
+    """Smith's Lambda for directions above and below the horizon: Lambda(-w) = -1 - Lambda(w)."""
     above = distribution("ggx").Lambda(w, alpha)
     return where(w.z > 0.0, above, -1.0 - above)
 
 
 def raised(base: Array, power: Scalar) -> Array:
-    """base^power, with its logarithm limited to +-80: Dr.Jit's float64 power is NaN where it underflows."""
+    """base^power, with its logarithm limited to +-80, since Dr.Jit's float64 power is NaN where it underflows."""
     dr = backend.drjit()
     return dr.exp(dr.clip(power * dr.log(base), -80.0, 80.0))
 
 
 def escape(w: Direction, height: Array, alpha: Pair) -> Array:
-    """G1(w, h): the probability of escape from C(h) = height along w; 0 downward."""
+    """G1(w, h), the probability of escape along w from the height with C(h) = `height`; 0 for downward directions."""
     dr = backend.drjit()
     power = maximum(distribution("ggx").Lambda(w, alpha), 0.0)
     return where(w.z > 0.0, raised(dr.clip(height, 1e-12, 1.0), power), 0.0)
 
 
 def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Array]:
-    """(C(h') at the next hit, whether the walker escapes)."""
+    """C(h') at the next hit, and whether the walker escapes instead.
+
+    height  C(h)
+    u       random number in [0, 1)
+    """
     dr = backend.drjit()
     leaves = u > 1.0 - escape(w, height, alpha)
     bend = signed_lambda(w, alpha)
@@ -63,7 +67,7 @@ def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Arr
 
 
 def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
-    """Density of visible normals, for v above or below the horizon: max(v.m, 0) D(m) / projected area (Heitz2016)."""
+    """Density of visible normals for v above or below the horizon, max(v.m, 0) D(m) / projected area (Heitz2016)."""
     slant = sqrt(v.z * v.z + (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y))
     # v.z + slant cancels for v.z < 0; slant^2 - v.z^2 does not
     tangential = (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y)
@@ -72,7 +76,7 @@ def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
 
 
 class Left(NamedTuple):
-    """The end of a walk: direction, weight (a spectrum), number of hits."""
+    """The end of a walk: the direction, the weight (a spectrum) and the number of hits."""
 
     w: Array
     weight: Array
@@ -89,7 +93,7 @@ class _Facets:
         self.albedo = 1.0 if self.metal else base.albedo  # a metal's reflectance includes it
 
     def eta(self, side: Array) -> Array:
-        """Index on the far side divided by that in the walker's own medium."""
+        """Index on the far side divided by that of the walker's own medium."""
         if self.metal:
             return type(side)(1.0)
         return backend.drjit().select(side > 0.0, self.base.eta, 1.0 / self.base.eta)
@@ -100,7 +104,12 @@ class _Facets:
         return self.base.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
 
     def onward(self, v: Array, wi: Array, side: Array, height: Array) -> Array:
-        """Phase function from v to the target times the probability of escape along it; without the albedo of glass."""
+        """The phase function from v to the target wi times the probability of escape along wi, without the albedo of
+        glass.
+
+        side    1 if the walker's own medium is outside, else -1
+        height  C(h) of the facet
+        """
         dr, alpha = backend.drjit(), self.alpha
         eta = self.eta(side)
         target = vec3(wi.x, wi.y, wi.z) * side
@@ -121,12 +130,13 @@ class _Facets:
 
 
 def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
-    """Follow one walker per lane from wo; returns (light of two or more hits scattered along wi, the end of the walk).
+    """Follow one walker per lane from wo. Returns the light of two or more hits scattered along wi, times
+    |cos theta_i|, and the end of the walk.
 
-    base   a conductor or a dielectric, bound
-    wi     the target, or None
+    base   a bound conductor or dielectric
+    wi     the target direction; None estimates no light
+    rng    random number generators, one per lane
     power  whether transmission is in power; else in radiance, which includes the factor (eta_o / eta_i)^2
-    The value includes |cos theta_i|.
     """
     if isinstance(wo, Node):
         raise RecordingError("a random walk cannot be recorded: its number of steps depends on values", "RandomWalk")
@@ -183,7 +193,8 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
 
 
 def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
-    """One generator per lane, seeded by the bits of the two directions and the seed: new numbers for each pair."""
+    """One random number generator per lane, seeded by the bits of the two directions and the seed, so that each pair
+    has its own numbers."""
     dr = backend.drjit()
     kind = backend.types_like(type(wo))
     UInt = kind.module.UInt32
@@ -201,9 +212,12 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
 
 
 def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean weight, a spectrum, with which walkers from cosine mu leave the surface, and its standard error.
+    """The albedo, a spectrum, as the mean weight with which walkers leave the surface, and its standard error.
 
-    base  a Conductor or Dielectric with ndf "ggx"; if mu < 0, the walk starts inside the glass
+    base   a Conductor or Dielectric with ndf "ggx"
+    mu     cosine between wo and the normal; if it is negative, walks start inside the glass
+    walks  number of walkers
+    seed   seed of the walks
     """
     dr = backend.drjit()
     kind = backend.types("float32")

@@ -1,17 +1,17 @@
 """The energy lost by single scattering, M(mu) = 1 - E(mu), as one short polynomial per roughness.
 
 A compensated material needs M at both directions of every pair. Two bilinear lookups are eight gathers, which cost more
-than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of that. It is
-possible in the variable z of `gonio.energy.bend`, in which M is smooth for any width. M nearly vanishes toward the
-normal (z = 0), and often toward grazing too, where a polynomial in powers of z would lose its digits in float32.
-Therefore it is expressed in the Bernstein basis with non-negative coefficients:
+than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of that. Such a
+polynomial exists in the variable z of `gonio.energy.bend`, in which M is smooth for any width. M nearly vanishes toward
+the normal (z = 0), and often also toward grazing angles, where a polynomial in powers of z would lose its digits in
+float32. Therefore, it is expressed in the Bernstein basis with non-negative coefficients:
 
     M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
 Every term is positive, and z / r is computed without cancellation (`descent`), so M has full precision even where it is
-tiny. The rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, together with M_avg,
-which is the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Anisotropic
-widths add two axes, see `anisotropic`.
+tiny. The rows of a table contain the c_k at equal steps of roughness and are interpolated linearly, together with
+M_avg, the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Tables for
+two widths have two more axes; see `anisotropic`.
 """
 
 from __future__ import annotations
@@ -37,16 +37,18 @@ STEPS_OF_FIT = 8
 
 
 def bernstein(x: np.ndarray, degree: int) -> np.ndarray:
-    """x^k (1 - x)^(degree - k), without binomial factors, k = 0 to degree along the last axis."""
+    """x^k (1 - x)^(degree - k), without binomial factors, for k = 0 to degree along the last axis."""
     k = np.arange(degree + 1)
     return x[..., None] ** k * (1.0 - x[..., None]) ** (degree - k)
 
 
 def fit(form: Form, bend: np.ndarray, missing: Callable[..., np.ndarray], nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """c_k >= 0 at each bend: nearly minimax, by reweighted non-negative least squares.
+    """Fit c_k >= 0 to M at each bend, nearly minimax, by reweighted non-negative least squares.
 
-    missing  a function of mu (rows, nodes) to M
-    Returns (rows, degree + 2); the last channel is M_avg.
+    bend     the bends, (rows,)
+    missing  function of mu (rows, nodes) that returns M
+    nodes    number of Chebyshev nodes of the fit
+    Returns the c_k, followed by M_avg, (rows, degree + 2).
     """
     rise = _nodes(nodes)
     mu = cosine(form, rise, bend[:, None])
@@ -63,12 +65,13 @@ def _nodes(count: int) -> np.ndarray:
 
 
 def _importance(mu: np.ndarray) -> np.ndarray:
-    """The weight of the fit at mu: below mu = 0.02, albedo matters little, and that of glass has a cusp."""
+    """The weight of the fit at mu. It is low below mu = 0.02, where albedo matters little and that of glass has a
+    cusp."""
     return np.minimum(mu / 0.02, 1.0) + 0.02
 
 
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
-    """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
+    """Non-negative coefficients whose largest error times importance is small: the best of several reweighted fits."""
     from scipy.optimize import nnls  # imported late: not needed by renders whose tables exist
 
     weight, best, least = importance, np.zeros(basis.shape[1]), np.inf
@@ -82,14 +85,14 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
 
 
 def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """M for rows of coefficients at mu (rows, nodes), computed as in `missing`."""
+    """M at mu (rows, nodes) from coefficients (rows, degree + 1), computed as in `missing`."""
     fall = 1.0 - numpy_rise(form, mu, bend[:, None])
     return np.einsum("rnk,rk->rn", bernstein(fall, form.degree), coefficients)
 
 
 @cache.of_members
 def isotropic(ndf: str, masking: str) -> Table:
-    """Coefficients over roughness, (ROWS, CHANNELS), for a distribution and masking."""
+    """The table of coefficients over roughness, (ROWS, CHANNELS), for a distribution and a masking term."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, normals.SMALLEST_ALPHA)
@@ -106,7 +109,7 @@ def isotropic(ndf: str, masking: str) -> Table:
 
 @cache.of_members
 def lobe(ndf: str, masking: str) -> Table:
-    """mu^2 over (roughness, u): the inverse distribution function of the lobe proportional to M mu."""
+    """The table of mu^2 over (roughness, u): the inverse distribution function of the lobe proportional to M mu."""
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, normals.SMALLEST_ALPHA)
     form = form_of(ndf, masking)
     bend = numpy_knee(form, masking, alpha)
@@ -123,12 +126,12 @@ TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by 
 
 @cache.of_members
 def anisotropic(ndf: str, masking: str) -> Table:
-    """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) for a metal with two widths.
+    """The table of coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) for a metal with two widths.
 
-    In azimuth, M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi measured from the
-    axis of the larger width; the bend is that of the width along w, alpha_phi^2 = alpha_max^2 cos^2 +
-    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(6 - j), Y = (1 + y) / 2, in c_k; all are
-    non-negative.
+    In azimuth, M depends on y = cos(2 phi') with tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), where phi is
+    measured from the axis of the larger width; the bend is that of the width along w, alpha_phi^2 =
+    alpha_max^2 cos^2 phi + alpha_min^2 sin^2 phi. Channel k HARMONICS + j is the coefficient of Y^j (1 - Y)^(6 - j),
+    with Y = (1 + y) / 2, in c_k; all are non-negative.
     """
 
     def build() -> np.ndarray:
@@ -173,7 +176,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
 
 def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(cos^2 phi, sin^2 phi, alpha_phi) at y = cos(2 phi')."""
+    """cos^2 phi, sin^2 phi and alpha_phi at y = cos(2 phi'), for widths `big` and `small`."""
     # tan^2(phi) = (1 - y) / (1 + y) big / small
     cos2 = small * (1.0 + y) / (small * (1.0 + y) + big * (1.0 - y))
     return cos2, 1.0 - cos2, np.sqrt(big**2 * cos2 + small**2 * (1.0 - cos2))
@@ -188,7 +191,8 @@ SIDES = ("thin", "dense")
 
 @cache.of_members
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from the less dense and denser side."""
+    """The tables of coefficients of rough glass over (root of sqrt(F0), roughness), for light from the less dense side
+    ("thin") and from the denser one ("dense")."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
@@ -213,8 +217,11 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 
 def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scalar]:
-    """The isotropic widths at which glass loses about as much as with the two widths, along a direction, from the less
-    dense and from the denser side; root is sqrt(F0)."""
+    """The isotropic widths at which glass loses about as much energy along w as with two widths, for light from the
+    less dense and from the denser side.
+
+    root  sqrt(F0)
+    """
     thin2, dense2 = _squares(sqr(w.x), sqr(w.y), ops.abs(w.z), sqr(alpha.x), sqr(alpha.y), root)
     return sqrt(ops.clamp(thin2, 1e-8, 1.0)), sqrt(ops.clamp(dense2, 1e-8, 1.0))
 
@@ -222,9 +229,9 @@ def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scala
 def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array, root: Array) -> tuple[Array, Array]:
     """The squares of `widths_along`.
 
-    At normal incidence, the width is about the root of the mean square. At grazing incidence, masking by the width
-    along the direction dominates. With S and D the sum and difference of the squared widths,
-    alpha^2 = S / 2 + o D sin^2 cos(2 phi) + e D^2 / S; o and e are fitted to the width that yields M exactly, for
+    At normal incidence, the width is about the root mean square of the two. At grazing incidence, masking by the width
+    along the direction dominates. With S and D the sum and the difference of the squared widths,
+    alpha^2 = S / 2 + o D sin^2 theta cos(2 phi) + e D^2 / S; o and e are fitted to the width that yields M exactly, for
     indices 1.15, 1.5 and 2.2 and four pairs of widths.
     """
     S, D, difference, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
@@ -237,8 +244,8 @@ def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array,
 
 @cache.of_members
 def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
-    """M_avg of anisotropic glass on its less dense and denser side, over (root of sqrt(F0), sqrt(alpha_min /
-    alpha_max), sqrt(alpha_max)): the mean of M with `widths_along`."""
+    """The table of M_avg of anisotropic glass, for its less dense and its denser side, over (root of sqrt(F0),
+    sqrt(alpha_min / alpha_max), sqrt(alpha_max)). M_avg is the mean of M with `widths_along`."""
 
     def build() -> np.ndarray:
         tables = glass(ndf, masking, fresnel)
@@ -277,7 +284,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 
 @cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """`lobe` over (the root of sqrt(F0), roughness, u), for each side."""
+    """The tables `lobe` of rough glass over (root of sqrt(F0), roughness, u), by side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
@@ -299,7 +306,7 @@ def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.n
 
 
 def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
-    """c_0 to c_10 and M_avg, at an isotropic width."""
+    """The coefficients c_0 to c_10 and M_avg at an isotropic width."""
     row = ops.inset(sqrt(alpha), ROWS)
     return ops.lookup(isotropic(ndf, masking), row)
 
@@ -310,9 +317,9 @@ Coefficients.__doc__ = "c_0 to c_10."
 
 @ops.function
 def turn(channels: tuple[Array, ...], along: Array, across: Array) -> Coefficients:
-    """c_0 to c_10 for a direction, from the channels of `anisotropic`.
+    """The coefficients c_0 to c_10 for a direction, from the channels of `anisotropic`.
 
-    along, across  (1 + y) / 2 and (1 - y) / 2
+    along, across  (1 + y) / 2 and (1 - y) / 2 for the direction's azimuth
     """
     terms = _harmonics(along, across)
     count = (DEGREE + 1) * HARMONICS
@@ -325,7 +332,7 @@ Harmonics.__doc__ = "along^j across^(6 - j)."
 
 @ops.function
 def _harmonics(along: Array, across: Array) -> Harmonics:
-    """along^j across^(6 - j), j = 0 to 6."""
+    """along^j across^(6 - j) for j = 0 to 6."""
     along_to, across_to = [along, along], [across, across]
     for _ in range(HARMONICS - 2):
         along_to.append(along_to[-1] * along)
@@ -344,9 +351,10 @@ def _weigh(factors: tuple[Array, ...], terms: tuple[Array, ...]) -> Array:
 
 
 def missing(form: Form, c: tuple[Array, ...], bend: Array, mu: Array) -> Array:
-    """M(mu), not below 0.
+    """M(mu), clamped to >= 0.
 
-    c     from `coefficients`, the c_k first;  bend  `knee` at this width
+    c     the coefficients c_k, which may be followed by other values
+    bend  `knee` at the width
     """
     ratio = descent(form, mu, bend)
     return _polynomial(c[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)

@@ -4,11 +4,11 @@ From side a, a fraction T_a of the lost energy goes to side b, the rest back to 
 
     f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
 
-so that a's albedo becomes complete for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
+so that no energy is lost from side a for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
 T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is satisfied by
 T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
 
-Anisotropic glass has the M of an isotropic width that depends on the direction (`curves.widths_along`); the lobe is
+M of anisotropic glass is that of an isotropic width that depends on the direction (`curves.widths_along`); the lobe is
 sampled with the mean width.
 """
 
@@ -46,11 +46,11 @@ from .reflecting import has_two_widths
 class Side(NamedTuple):
     """One side of the surface.
 
-    c         coefficients of M; with two widths, at their mean
-    bend      the cosine at which masking sets in
-    scale     1 / (pi M_avg) of that polynomial, 0 if nothing is missing
-    true_scale     1 / (pi M_avg) of M itself; equal to `scale` with one width
-    through   T, the fraction of this side's lost energy that goes to the other side
+    c           coefficients of M; for two widths, at their mean
+    bend        the cosine below which masking is strong
+    scale       1 / (pi M_avg) of the polynomial with these coefficients; 0 if nothing is missing
+    true_scale  1 / (pi M_avg) of M itself; equal to `scale` for one width
+    through     T, the fraction of this side's lost energy that goes to the other side
     """
 
     c: tuple[Scalar, ...]
@@ -61,7 +61,7 @@ class Side(NamedTuple):
 
 
 class TwoWidths(NamedTuple):
-    """Two widths, and the base's rotation."""
+    """The two widths and the rotation of the base."""
 
     alpha: Pair
     rotation: Pair | None
@@ -71,11 +71,11 @@ class Glass(NamedTuple):
     """Both sides of a surface; "thin" is the less dense one.
 
     average  mean of M_avg over the two sides
-    F_avg    the base's albedo; base and lobe together preserve this fraction of the energy
-    place    coordinates in the tables of the lobes' inverses: index, width
+    F_avg    albedo of the base; base and lobe together preserve this fraction of the energy
+    place    coordinates, for index and width, in the tables of the inverses of the lobes
     inside   index inside divided by index outside
-    names    names of the ndf, masking and Fresnel
-    two      the two widths if they differ
+    names    names of the distribution, the masking term and the Fresnel kind
+    two      the two widths, if they differ
     """
 
     thin: Side
@@ -97,7 +97,7 @@ class Glass(NamedTuple):
         return where(self.inside >= 1.0, ~below, below)
 
     def at(self, w: Direction) -> Scalar:
-        """M at a direction, from its own side."""
+        """M for a direction on either side."""
         if self.two is None:
             return self.of_mean_width(w)
         eta = maximum(self.inside, 1.0 / self.inside)
@@ -124,7 +124,7 @@ class Glass(NamedTuple):
         return where(self.is_thin(w), self.thin.true_scale, self.dense.true_scale)
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        """1 - T of wo's side in reflection, T in transmission; 0 along the surface."""
+        """1 - T of wo's side for reflection, T for transmission; 0 if either direction lies in the surface."""
         sides = wo.z * wi.z
         through = self.through(wo)
         return where(sides != 0.0, where(sides > 0.0, 1.0 - through, through), 0.0)
@@ -147,7 +147,7 @@ class Glass(NamedTuple):
         return self.of_mean_width(wi) * abs(wi.z) * scale * self.share(wo, wi)
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A side by u1, then a direction with that density."""
+        """A direction with the density `pdf`: u.x selects the side."""
         thin, passes = self.is_thin(wo), u.x < self.through(wo)
         tables = curves.glass_lobe(*self.names)
         at = inset(u.y, tables["thin"].shape[-1])
@@ -163,7 +163,10 @@ class Glass(NamedTuple):
 
 
 def glass(base: BSDF, surface: Microsurface) -> Glass:
-    """The lost energy of a bound base that transmits."""
+    """The energy lost by single scattering in a bound base that transmits.
+
+    surface  microsurface of the base
+    """
     index = surface.eta
     assert index is not None, "what transmits has an index"
     names = surface.ndf, surface.masking, surface.fresnel

@@ -12,10 +12,11 @@ NOTHING = 1e-5  # smaller values of M_avg are errors of the fit and are not comp
 
 
 class MissingEnergy(Protocol):
-    """M(mu) = 1 - E(mu), E the directional albedo of a base at F = 1, and the broad lobe M(mu_i) mu_i that returns it.
+    """The energy lost by single scattering, M(mu) = 1 - E(mu), where E is the directional albedo of a base at F = 1,
+    and the broad lobe, proportional to M(mu_i) mu_i, that returns it.
 
     average  M_avg = 1 - E_avg = 2 int M mu dmu
-    F_avg    fraction of the light preserved by one bounce, which makes colors more saturated
+    F_avg    fraction of the light that remains after one bounce, which makes colors more saturated
     factor   factor applied once to all light that leaves
     """
 
@@ -29,25 +30,25 @@ class MissingEnergy(Protocol):
     def factor(self) -> Spectrum | float: ...
 
     def at(self, w: Direction) -> Scalar:
-        """M at a direction, from its own side of the surface."""
+        """M for a direction on either side of the surface."""
 
     def over_average(self, w: Direction) -> Scalar:
         """1 / (pi M_avg) on w's side; 0 if nothing is missing."""
 
     def share(self, wo: Direction, wi: Direction) -> Scalar | float:
-        """The fraction of wo's lost energy that leaves on wi's side: all of it above a surface that only reflects."""
+        """The fraction of the energy lost for wo that leaves on wi's side: 1 above a surface that only reflects."""
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> Scalar | float:
         """(eta_o / eta_i)^2 for radiance that passes to the other side, else 1."""
 
     def given(self, wo: Direction) -> Scalar:
-        """M(mu_o) as used for sampling the lobe: 0 if nothing is missing."""
+        """M(mu_o) as used for sampling the lobe; 0 if nothing is missing."""
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of `sample`: M(mu_i) mu_i / (pi M_avg) of wi's side, times the fraction for that side."""
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with that density."""
+        """A direction with the density `pdf`."""
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
         """Index on wi's side divided by that on wo's side."""

@@ -1,15 +1,16 @@
-"""The energy lost by any other base: E(mu) measured with its own `sample`, and the lobe that returns the difference.
+"""The energy lost by any other base: E(mu) computed by its own `sample`, and the lobe that returns the lost energy.
 
 `KullaConty` accepts any base that only reflects. To separate the loss of single scattering from intended absorption, E
-is measured on the lossless variant of the base: F = 1, and 1 for every color that is a fraction of the light (a
+is computed for the lossless variant of the base: F = 1, and 1 for every color that is a fraction of the light (a
 spectrum whose range ends at 1, such as an albedo), also in inner materials. Then, with maxima over the channels,
 
     M(mu) = 1 - max E_white(mu), at least 0,        F_avg = E_avg / max E_avg,white,
 
-so that F_avg is the color of light after one bounce. A material that declares neither (Phong's kd and ks are factors,
-not fractions) is its own lossless variant: the light that its brightest channel does not return counts as lost.
+so that F_avg is the color of light after one bounce. A material with neither F nor such a color (Phong's kd and ks are
+factors, not fractions) is its own lossless variant: the light that its brightest channel does not return counts as
+lost.
 
-Where a base returns more than it receives, nothing is missing and nothing is added; the base's gain is not corrected.
+Where a base reflects more light than it receives, nothing is missing and nothing is added; the gain is not corrected.
 """
 
 from __future__ import annotations
@@ -51,11 +52,11 @@ SMALLEST_MU = 1e-4
 
 
 class Measured(NamedTuple):
-    """M at nodes, linear between them.
+    """M at nodes, between which it is interpolated linearly.
 
-    missing  M at equal steps of x, mu = sin^2(pi x / 2)
+    missing  M at equal steps of x, where mu = sin^2(pi x / 2)
     inverse  mu^2 at equal quantiles of the density M mu
-    scale    1 / (pi M_avg), 0 if nothing is missing
+    scale    1 / (pi M_avg); 0 if nothing is missing
     average  M_avg
     F_avg    the color of light after one bounce
     """
@@ -71,7 +72,7 @@ class Measured(NamedTuple):
         return 1.0
 
     def at(self, w: Direction) -> Scalar:
-        """M at a direction above the surface."""
+        """M for a direction above the surface."""
         _check_computed(w.z)
         mu = clamp(w.z, 0.0, 1.0)
         return _read(self.missing, atan2(sqrt(mu), sqrt(1.0 - mu)) * (2.0 / PI))
@@ -89,11 +90,11 @@ class Measured(NamedTuple):
         return where((self.scale > 0.0) & (wo.z > 0.0), self.at(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg)."""
+        """The density of the lobe, M(mu_i) mu_i / (pi M_avg), 1/sr."""
         return self.at(wi) * maximum(wi.z, 0.0) * self.scale
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with the density `pdf`: mu^2 from the table of its inverse, and a uniform azimuth."""
         return lobe.from_square(_read(self.inverse, u.y), u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
@@ -101,7 +102,7 @@ class Measured(NamedTuple):
 
 
 def measured(base: BSDF) -> Measured:
-    """The lost energy of a bound base that only reflects, measured on the base and its lossless variant."""
+    """The energy lost by a bound base that only reflects, from the albedos of the base and its lossless variant."""
     base = _uniform(base)
     dr = backend.drjit()
     types = _types(base)
@@ -120,8 +121,8 @@ def measured(base: BSDF) -> Measured:
 
 
 def _uniform(base: BSDF) -> BSDF:
-    """The bound base with one entry per value. Raises an error if it cannot be measured: while it or a Dr.Jit loop is
-    being recorded, or if its values vary from ray to ray."""
+    """The bound base with one entry per value. Raises an error if its albedo cannot be computed: while it or a Dr.Jit
+    loop is being recorded, or if its values vary from ray to ray."""
     _check_computed(*binding.values(base))
     dr = backend.drjit()
     name = type(base).__name__
@@ -157,7 +158,7 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
     """E of the lossless base and of the base itself at each node, averaged over azimuth: spectra with NODES entries.
 
     Directions come from `sample` with the same POINTS of a lattice at every node, so the error is smooth in mu.
-    Directions and densities are held fixed when the values are differentiated.
+    Directions and densities are held constant when the values are differentiated.
     """
     dr = backend.drjit()
     UInt = kind.module.UInt32
@@ -184,7 +185,8 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
 
 
 def _averaging() -> np.ndarray:
-    """Weights w_j: sum w_j E_j = 2 int E mu dmu = pi int E sin^2(pi x / 2) sin(pi x) dx, E linear between nodes."""
+    """Weights w_j such that sum w_j E_j = 2 int E mu dmu = pi int E sin^2(pi x / 2) sin(pi x) dx, with E linear between
+    the nodes."""
     place, w = gauss(4)
     step = 1.0 / (NODES - 1)
     weights = np.zeros(NODES)
@@ -206,7 +208,7 @@ def _inverse(lost: np.ndarray) -> np.ndarray:
 
 
 def _read(table: Array, x: Array) -> Array:
-    """A value interpolated linearly in a derived array with nodes at both ends of [0, 1]."""
+    """The value at x of an array with nodes at both ends of [0, 1], interpolated linearly."""
     dr = backend.drjit()
     kind = backend.types_like(type(x))
     last = dr.width(table) - 1

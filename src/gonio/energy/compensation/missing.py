@@ -1,4 +1,4 @@
-"""The missing energy of a base, and the check of whether a base can be compensated."""
+"""The energy lost by a base, and the check of whether a base can be compensated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from .reflecting import reflecting
 
 
 def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
-    """The energy lost by single scattering in a bound base; `average` as for `BSDF.mean_reflectance`."""
+    """The energy lost by single scattering in a bound base.
+
+    average  "exact" or the name of a fit, as in `BSDF.mean_reflectance`
+    """
     surface = base.microsurface
     if surface is None:
         return measured(base)
@@ -21,8 +24,9 @@ def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
 def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = False) -> None:
     """Raise InputError if a base cannot be compensated.
 
+    location      the place of the base, for errors
     transmitting  whether a microsurface may transmit
-    any_base      whether any base that reflects by a finite lobe is accepted, not only microsurfaces
+    any_base      whether any base that reflects by a finite lobe is accepted, not only a microsurface
     """
     name = type(base).__name__
     if base.microsurface is not None:

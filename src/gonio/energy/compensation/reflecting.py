@@ -20,15 +20,15 @@ APART = 0.05  # relative difference of two widths above which only their own fit
 class Reflecting(NamedTuple):
     """M as one Bernstein polynomial per width; see `curves`.
 
-    c             coefficients of the polynomial; with two widths, at their mean width
-    bend          the cosine at which masking sets in
-    scale         1 / (pi M_avg) of that polynomial, i.e. of the sampled lobe
-    true_scale         1 / (pi M_avg) of M itself; equal to `scale` with one width
+    c             coefficients of the polynomial; for two widths, at their mean
+    bend          the cosine below which masking is strong
+    scale         1 / (pi M_avg) of this polynomial, that is, of the sampled lobe
+    true_scale    1 / (pi M_avg) of M itself; equal to `scale` for one width
     average       M_avg
     F_avg         mean reflectance
-    factor        the base's albedo
-    row           coordinate in the table of the lobe's inverse
-    two           `TwoWidths` if the widths differ
+    factor        albedo of the base
+    row           coordinate in the table of the inverse of the lobe
+    two           `TwoWidths`, if the widths differ
     ndf, masking  names of the distribution and the masking term
     """
 
@@ -52,7 +52,7 @@ class Reflecting(NamedTuple):
         return even + self.two.apart * (self.two.at(w, self.ndf, self.masking) - even)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M at the mean width, by which the lobe is sampled, at a direction above the surface."""
+        """M at the mean width, by which the lobe is sampled, for a direction above the surface."""
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
@@ -68,11 +68,11 @@ class Reflecting(NamedTuple):
         return where((self.scale > 0.0) & (wo.z > 0.0), self.of_mean_width(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg), at the mean of the two widths."""
+        """The density of the lobe, M(mu_i) mu_i / (pi M_avg) at the mean of the two widths, 1/sr."""
         return self.of_mean_width(wi) * maximum(wi.z, 0.0) * self.scale
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with that density: mu^2 from the table of its inverse, any azimuth."""
+        """A direction with the density `pdf`: mu^2 from the table of its inverse, and a uniform azimuth."""
         (mu2,) = lookup(curves.lobe(self.ndf, self.masking), self.row, inset(u.y, curves.LOBE_NODES))
         return lobe.from_square(mu2, u.z)
 
@@ -83,11 +83,11 @@ class Reflecting(NamedTuple):
 class TwoWidths(NamedTuple):
     """M for two widths, which depends on azimuth; see `curves.anisotropic`.
 
-    c_phi     coefficients in azimuth of each coefficient of M
-    alpha     the widths
+    c_phi     for each coefficient of M, its coefficients in azimuth
+    alpha     the two widths
     rotation  rotation of the base
-    apart     weight of this M relative to that of the mean width: 0 for equal widths, where the two fits differ by up
-              to 2 % of a dark value
+    apart     weight of this M relative to that of the mean width; 0 for equal widths, where the two fits differ by up
+              to 2 % of a small value
     """
 
     c_phi: tuple[Scalar, ...]
@@ -104,7 +104,11 @@ class TwoWidths(NamedTuple):
 
 
 def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
-    """The lost energy of a bound base; `average` as for `BSDF.mean_reflectance`."""
+    """The energy lost by single scattering in a bound base that only reflects.
+
+    surface  microsurface of the base
+    average  "exact" or the name of a fit, as in `BSDF.mean_reflectance`
+    """
     names = surface.ndf, surface.masking
     alpha, _ = widths(surface.alpha)
     two = has_two_widths(base.plain)
@@ -136,7 +140,7 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
 
 
 def has_two_widths(base: BSDF) -> bool:
-    """Whether an unbound base has or may have two different widths, on which the code depends."""
+    """Whether an unbound base has, or may have, two different widths, on which the code depends."""
     surface = base.microsurface
     if surface is None:
         return False
@@ -147,7 +151,7 @@ def has_two_widths(base: BSDF) -> bool:
 
 
 class Azimuth(NamedTuple):
-    """The position of a direction between the axes of the larger and smaller width, and the width along it."""
+    """The azimuth of a direction between the axes of the larger and the smaller width, and the width along it."""
 
     along: Scalar
     across: Scalar
@@ -156,7 +160,7 @@ class Azimuth(NamedTuple):
 
 @function
 def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
-    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; at the normal, the azimuth is arbitrary."""
+    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; for the normal, the azimuth is arbitrary."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
     width = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))

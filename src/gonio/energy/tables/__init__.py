@@ -1,1 +1,1 @@
-"""Baked tables: E, E_avg, the split sum, rough glass; their axes and files."""
+"""Baked tables of E, E_avg, the split sum and rough glass, and their axes and files."""

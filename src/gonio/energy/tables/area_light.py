@@ -1,7 +1,8 @@
 """Light from polygons by linearly transformed cosines (Heitz2016a), in the operations from which shaders are written.
 
-A lobe is approximated by E(o) D(i), D the cosine lobe transformed by a matrix W: D(i) = cos+(W i) |det W| / (pi
-|W i|^3). The integral of D over a polygon P is that of the cosine lobe over the polygon W P, which is known (Lambert).
+A lobe is approximated by E(o) D(i), where D is the cosine lobe transformed by a matrix W: D(i) = cos+(W i) |det W| /
+(pi |W i|^3). The integral of D over a polygon P is that of the cosine lobe over the polygon W P, which is known
+(Lambert).
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ Corners = tuple[Direction, Direction, Direction, Direction]
 
 @function
 def edge(a: Direction, b: Direction) -> Scalar:
-    """Integral along an edge of a polygon, times 2 pi: its angle times the height of the unit normal of its plane."""
+    """The contribution of an edge of a polygon to the integral of the cosine lobe, times 2 pi: the angle of the edge
+    times the z of the unit normal of its plane."""
     across = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
     sine = norm(across)
     return across.z * safe_div(ops.atan2(sine, where(sine > 0.0, dot(a, b), 1.0)), sine)
@@ -36,7 +38,7 @@ def edge(a: Direction, b: Direction) -> Scalar:
 
 @function
 def visible_edge(a: Direction, b: Direction) -> Scalar:
-    """`edge` for the part above the horizon z = 0."""
+    """`edge` for the part of an edge above the horizon, z = 0."""
     cut = horizon(a, b)
     value = edge(where(a.z > 0.0, a, cut), where(b.z > 0.0, b, cut))
     return where(maximum(a.z, b.z) > 0.0, value, 0.0)
@@ -44,21 +46,21 @@ def visible_edge(a: Direction, b: Direction) -> Scalar:
 
 @function
 def horizon(a: Direction, b: Direction) -> Direction:
-    """A vector toward the point of an edge at the horizon, if its ends lie on different sides."""
+    """A vector toward the point at which an edge crosses the horizon, if its ends lie on different sides."""
     return a * ops.abs(b.z) + b * ops.abs(a.z)
 
 
 @function
 def leaving(a: Direction, b: Direction) -> Direction:
-    """`horizon` for an edge that leads below the horizon, else 0."""
+    """`horizon` for an edge that crosses the horizon downward, else 0."""
     return where((a.z > 0.0) & (b.z <= 0.0), horizon(a, b), 0.0 * a)
 
 
 @function
 def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scalar:
-    """Fraction of a cosine lobe around +z that a convex quadrilateral covers: 1 for the hemisphere.
+    """The fraction of the cosine lobe about +z that a convex quadrilateral covers; 1 for the hemisphere.
 
-    a, b, c, d  vectors to its corners, in order; the part below z = 0 is cut off
+    a, b, c, d  vectors to the corners, in order; the part below z = 0 is cut off
     """
     total = visible_edge(a, b) + visible_edge(b, c) + visible_edge(c, d) + visible_edge(d, a)
     out = leaving(a, b) + leaving(b, c) + leaving(c, d) + leaving(d, a)
@@ -68,7 +70,8 @@ def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scala
 
 @function
 def to_cosine(first: Scalar, second: Scalar, third: Scalar, fourth: Scalar, wo: Direction, p: Direction) -> Direction:
-    """W p, normalized; the rows of W are (first, 0, second), (0, 1, 0), (third, 0, fourth), in axes with wo.y = 0."""
+    """W p, normalized. The rows of W are (first, 0, second), (0, 1, 0), (third, 0, fourth), in axes in which
+    wo.y = 0."""
     size = sqrt(maximum(wo.x * wo.x + wo.y * wo.y, 1e-20))
     along = where(size > 1e-8, (p.x * wo.x + p.y * wo.y) / size, p.x)
     aside = where(size > 1e-8, (p.y * wo.x - p.x * wo.y) / size, p.y)
@@ -76,10 +79,10 @@ def to_cosine(first: Scalar, second: Scalar, third: Scalar, fourth: Scalar, wo: 
 
 
 def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
-    """Fraction of the lobe of W that a quadrilateral covers.
+    """The fraction of the lobe of W that a quadrilateral covers.
 
     inverse  the four numbers of W, as stored in the table
-    corners  see `cosine_quad`
+    corners  vectors to the corners, as in `cosine_quad`
     """
     first, second, third, fourth = inverse
     a, b, c, d = (to_cosine(first, second, third, fourth, wo, p) for p in corners)
@@ -90,7 +93,7 @@ def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar
 def in_view(wo: Direction, p: Direction) -> Direction:
     """p in the frame whose x axis lies below wo, for a surface whose own axes are planes of symmetry.
 
-    wo and p are mirrored first, so that wo lies between +x and +y.
+    First, wo and p are mirrored so that wo lies between +x and +y.
     """
     size = sqrt(maximum(wo.x * wo.x + wo.y * wo.y, 1e-20))
     c = where(size > 1e-8, ops.abs(wo.x) / size, 1.0)
@@ -102,7 +105,7 @@ def in_view(wo: Direction, p: Direction) -> Direction:
 def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
     """`quad` for an anisotropic lobe.
 
-    inverse  the numbers of W by rows, without the middle one, which is 1; W acts in the frame of `in_view`
+    inverse  the numbers of W by rows, without the middle one, which is 1. W acts in the frame of `in_view`
     """
     a, b, c, d, e, f, g, h = inverse
 
@@ -115,7 +118,7 @@ def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) ->
 
 
 def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """`coordinates` for a table that has an axis for the azimuth before that for the angle."""
+    """`coordinates` for a table with an axis for the azimuth before that for the angle."""
     size = wo.x * wo.x + wo.y * wo.y
     azimuth = ops.atan2(ops.abs(wo.y), where(size > 1e-16, ops.abs(wo.x), 1.0)) * (2.0 / ops.pi)
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
@@ -124,6 +127,6 @@ def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[
 
 
 def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """The coordinates at which a table is read; if it has a single row, only that of the angle."""
+    """The coordinates at which a table is read for a roughness and wo; only that of the angle for a single row."""
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
     return (inset(minimum(roughness, 1.0), table.shape[0]), column) if len(table.shape) == 2 else (column,)

@@ -1,12 +1,12 @@
-"""The axes of baked tables: the position of each node in each layout.
+"""The axes of baked tables: the positions of the nodes in each layout.
 
-    linear     nodes at texel centers, (j + 1/2) / N of roughness, mu and, with two widths, phi over a quarter turn:
+    linear     nodes at texel centers, (j + 1/2) / N, of roughness, mu and, for two widths, phi within a quarter turn:
                the layout of shaders and the homework
-    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), see `stretch`, in which E is
-               smooth: the error of bilinear interpolation is a hundredth of that on a linear axis
+    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), in which E is smooth (see `stretch`):
+               the error of bilinear interpolation is a hundredth of that on a linear axis
 
-With two widths, the larger is roughness^2, and their ratio is that of the table. E is even in phi about both axes of
-the surface, so a quarter turn suffices, and mirroring at its ends is exact.
+For two widths, the larger is roughness^2, and the table defines their ratio. E is even in phi about both axes of the
+surface, so a quarter turn suffices, and mirroring at its ends is exact.
 """
 
 from __future__ import annotations
@@ -27,11 +27,13 @@ LAYOUTS = ("linear", "stretched")
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a table over ([phi,] roughness, mu).
+    """The axes of a table over ([phi,] roughness, mu).
 
-    size      nodes of roughness and of mu
+    layout    "linear" or "stretched"
+    ndf, masking  names of the distribution and the masking term
+    size      number of nodes of roughness, and of mu
     aspect    alpha_y / alpha_x
-    azimuths  nodes of phi; 0 for one width, without such an axis
+    azimuths  number of nodes of phi; 0 for one width, whose tables have no such axis
     """
 
     layout: str
@@ -43,16 +45,19 @@ class Axes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The axes, slowest first."""
+        """The names of the axes, slowest first."""
         return ("phi", "roughness", "mu") if self.azimuths else ("roughness", "mu")
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of nodes along each axis."""
+        """The number of nodes along each axis."""
         return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
 
     def at(self, *index: Any) -> Points:
-        """The points at given indices, integers or between nodes, with one array per axis; they broadcast."""
+        """The points at given indices.
+
+        index  one array per axis, which broadcast; integers are nodes, other values lie between them
+        """
         roughness = self.roughness(index[-2])
         if not self.azimuths:
             mu, alpha = np.broadcast_arrays(self.mu(index[-1], roughness), roughness**2)
@@ -69,12 +74,13 @@ class Axes:
         return self._unit(index, self.size)
 
     def phi(self, index: Any) -> np.ndarray:
-        """Azimuth at an index; stretched: equal steps of the azimuth of slopes divided by their widths."""
+        """Azimuth at an index. In the stretched layout, the azimuth of slopes divided by their widths increases in
+        equal steps."""
         turn = self._unit(index, self.azimuths) * (0.5 * np.pi)
         return turn if self.layout == "linear" else np.arctan2(np.sin(turn), self.aspect * np.cos(turn))
 
     def mu(self, index: Any, roughness: Any, phi: Any = 0.0) -> np.ndarray:
-        """Cosine at an index, for given roughness and azimuth."""
+        """Cosine at an index, for a given roughness and azimuth."""
         x = self._unit(index, self.size)
         if self.layout == "linear":
             return x + 0.0 * roughness + 0.0 * phi
@@ -87,7 +93,7 @@ class Axes:
         return alpha * min(1.0, 1.0 / self.aspect), alpha * min(1.0, self.aspect)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The nodes of each axis by name; mu per row (and slice) in the stretched layout."""
+        """The nodes of each axis by name. In the stretched layout, those of mu are given per row (and slice)."""
         index = np.ix_(*map(np.arange, self.shape))
         nodes = self.at(*index)
         mu = nodes.mu if self.layout == "stretched" else nodes.mu[(0,) * (len(self.shape) - 1)]
@@ -113,7 +119,7 @@ class Axes:
 
 
 def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
-    """The transform of mu into s on the stretched axis, and its description."""
+    """The transform of mu to the s of the stretched axis, and its description."""
     if not term(masking).smith:
         return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
     if distribution(ndf).falls_slowly:

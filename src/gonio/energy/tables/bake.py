@@ -1,4 +1,4 @@
-"""Tables of E, E_avg, the split sum and rough glass as arrays with a manifest, as written by `gonio bake`.
+"""Bake tables of E, E_avg, the split sum and rough glass: arrays with a manifest, as written by `gonio bake`.
 
     baked = bake("ggx", masking="smith-separable", size=128)
     baked.arrays["E"]            # [roughness, mu]
@@ -59,16 +59,20 @@ def bake(
     azimuths: int = AZIMUTHS,
     sampling: Sampling = QUADRATURE,
 ) -> Baked:
-    """Tables of a distribution by name (F = 1), or of a material.
+    """Bake tables of a distribution (at F = 1) or of a material.
 
-    target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis; a Dielectric from outside.
-             For any other material, E[mu] and E_avg with its own parameters
-    lut      the tables; if None, E and Eavg, and for a distribution also dfg
-    masking  for a distribution, by default smith-correlated; a material has its own
-    aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1, it adds the axis phi, a
-             quarter turn from x. A material has its own, the ratio of its two widths; its rotation is ignored
-    sampling by quadrature, or from samples; E_avg of a sampled table is integrated from its rows
-    Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and tables that the target does not have.
+    target    the name of a distribution, a Conductor or a Dielectric, for tables with alpha = roughness^2 along an
+              axis; those of a Dielectric are for light from outside. For any other material, E[mu] and E_avg are
+              computed with its own parameters
+    lut       names of the tables: "E", "Eavg", "dfg", "glass"; None selects E and Eavg, and for a distribution also dfg
+    size      number of nodes of roughness and of mu, 1 to 4096
+    masking   masking term for a distribution, by default smith-correlated; a material has its own
+    layout    layout of the axes, "linear" or "stretched" (see `axes`)
+    aspect    alpha_y / alpha_x of a distribution, whose larger width is roughness^2; a value other than 1 adds the axis
+              phi, a quarter turn from x. The aspect of a material is the ratio of its widths; its rotation is ignored
+    azimuths  number of nodes of phi
+    sampling  the method: quadrature, or random samples; E_avg of a sampled table is integrated from its rows
+    Raises InputError for unknown names, for numbers out of range, and for tables that the target does not have.
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
@@ -131,7 +135,9 @@ def _described(asked: Target, axes: Axes, sampling: Sampling) -> dict[str, objec
 def cached(target: str | BSDF, **options: Any) -> Baked:
     """`bake`, cached in the user's cache folder (`gonio.energy.cache`).
 
-    Only distributions and microsurfaces of Gonio are cached: the formulas of other materials may be in any file.
+    options  arguments of `bake`
+    Only tables of distributions and of Gonio's microsurfaces are cached, since the formulas of other materials may be
+    in any file.
     """
     if isinstance(target, BSDF) and not tabulated(target):
         return bake(target, **options)
@@ -221,7 +227,7 @@ def _check_target(asked: Target, axes: Axes, lut: tuple[str, ...] | list[str], m
 
 
 def _aspect(model: Any, given: float) -> float:
-    """alpha_y / alpha_x as given, or from a material's widths."""
+    """alpha_y / alpha_x: the given value, or that of a material's widths."""
     if model is not None:
         check_uniform(model)
         x, y = map(float, pair_of(model.microsurface.alpha))
@@ -254,7 +260,7 @@ def _directional(
 
 
 def _averaged(asked: Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np.ndarray, dict[str, float]]:
-    """E_avg and its error: the quadrature compared with a finer one, or sampled values compared with the quadrature."""
+    """E_avg and its error, from comparing the quadrature with a finer one, or sampled values with the quadrature."""
     rows = np.arange(axes.size)
     exact = asked.average(axes, rows)
     if sampled is not None:
@@ -264,7 +270,7 @@ def _averaged(asked: Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np
 
 
 def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
-    """E_avg of a table from its nodes: each represents the interval halfway to its neighbors."""
+    """E_avg of a table from its nodes, each of which represents the interval halfway to its neighbors."""
     nodes = axes.nodes()
     weight = 2.0 * nodes.mu * (np.gradient(nodes.mu, axis=-1) if axes.size > 1 else 1.0)
     if axes.azimuths > 1:
@@ -274,10 +280,10 @@ def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
 
 
 def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> float:
-    """Largest error of linear interpolation for roughness >= 0.1: at the midpoints of cells and of their edges.
+    """Largest error of linear interpolation for roughness >= 0.1, at the midpoints of cells and of their edges.
 
-    value  E at indices, integers or halves
-    extra  nodes of an axis before those of `axes`
+    value  function that returns E at indices, which are integers or halves
+    extra  number of nodes of an additional axis before those of `axes`; 0 if there is none
     """
     shape = (*([extra] if extra else []), *axes.shape)
     rows = np.flatnonzero(axes.roughness(np.arange(axes.size))[:-1] >= 0.1)
@@ -309,7 +315,8 @@ def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> fl
 
 
 def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
-    """Tables for both sides over (sqrt_f0, roughness, mu): reflected and transmitted power, whose sum is E."""
+    """Tables of the reflected and transmitted power, whose sum is E, over (sqrt_f0, roughness, mu), for both sides; and
+    their errors."""
 
     def root(index: Any) -> Any:
         return (index + 0.5) / GLASS_STEPS * MAX_ROOT
@@ -340,7 +347,7 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
 
 
 def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, method: str, layout: str) -> Baked:
-    """E[mu] and E_avg of a material without a roughness axis, from above, by `gonio.energy.albedo`."""
+    """E[mu] and E_avg of a material without a roughness axis, for light from above, by `gonio.energy.albedo`."""
     kind = type(model).__name__
     if set(lut) - {"E", "Eavg"}:
         wrong = next(name for name in lut if name not in ("E", "Eavg"))
@@ -370,6 +377,6 @@ def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, meth
 
 
 def tabulated(model: BSDF) -> bool:
-    """Whether tables of a material are cached between runs: only those of Gonio's microsurfaces, since the formulas of
-    others may be in any file."""
+    """Whether tables of a material are cached between runs. Only those of Gonio's microsurfaces are, since the formulas
+    of others may be in any file."""
     return model.microsurface is not None and type(model).__module__.startswith("gonio.")

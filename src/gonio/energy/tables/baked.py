@@ -1,4 +1,4 @@
-"""Baked tables: arrays with a manifest that describes them, their file, and the homework's pictures."""
+"""Baked tables: arrays with a manifest that describes them, their file format, and the homework's pictures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..cache import content_hash
 
 @dataclass(frozen=True)
 class Baked:
-    """Arrays by name, the axes among them, and the manifest that describes them."""
+    """Arrays by name, including the axes, and the manifest that describes them."""
 
     arrays: dict[str, NDArray[np.float64]]
     manifest: dict[str, Any]
@@ -30,7 +30,7 @@ class Baked:
         return _html.table(rows(self.manifest), headings(self.manifest), title(self.manifest))
 
     def npz(self) -> bytes:
-        """tables.npz, with the manifest and its hash inside; equal content gives equal bytes."""
+        """The bytes of tables.npz, which includes the manifest and its hash. Equal content gives equal bytes."""
         text = json.dumps(self.manifest)
         texts = {"manifest": np.array(text), "seal": np.array(_seal(text))}
         stream = io.BytesIO()
@@ -48,7 +48,7 @@ def headings(manifest: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _more(manifest: Mapping[str, Any]) -> list[str]:
-    """Errors that only some tables have."""
+    """The names of errors that only some tables have."""
     return [name for name in ("mean", "split sum") if any(name in error for error in manifest["error"].values())]
 
 
@@ -60,7 +60,7 @@ def title(manifest: Mapping[str, Any]) -> str:
 
 
 def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """For each table its name, its shape along named axes and its errors, in the columns of `headings`."""
+    """For each table: its name, its shape along named axes and its errors, in the columns of `headings`."""
     tables, more = [], _more(manifest)
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
@@ -93,7 +93,7 @@ def read(path: Path) -> Baked:
 
 
 def load(path: str | Path) -> Baked:
-    """The tables in a folder, or in a tables.npz. Raises InputError if there are none, or if they are damaged or
+    """The tables in a folder, or in a file tables.npz. Raises InputError if there are none, or if they are damaged or
     altered."""
     path = Path(path)
     file_path = path / "tables.npz" if path.is_dir() else path
@@ -109,12 +109,12 @@ def load(path: str | Path) -> Baked:
 
 
 def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: bool = False) -> dict[str, np.ndarray]:
-    """E, E_avg and dfg in the homework's form: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels, and
-    E_avg is constant along a row; dfg has A in red and B in green.
+    """E, E_avg and dfg as pictures in the homework's form: (N, N, 3), 8 bits, with n.v along x. E and E_avg have three
+    equal channels, and E_avg is constant along a row; dfg has A in red and B in green.
 
-    store  "E" or "1-E", for E and E_avg
-    flip   True: the lowest roughness is the bottom row; False: the top row
-    wrap   convert to bytes as the homework's program does: rounded down, and 256 becomes 0
+    store  the stored values of E and E_avg: "E" or "1-E"
+    flip   whether the lowest roughness is the bottom row; else it is the top row
+    wrap   whether to convert to bytes as the homework's program does: rounded down, with 256 wrapped to 0
     """
     if store not in ("E", "1-E"):
         raise InputError(f"unknown form '{store}'", "--store", "give E or 1-E")
@@ -134,7 +134,7 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True, wrap: b
 
 
 def _bytes(value: np.ndarray, wrap: bool) -> np.ndarray:
-    """Values of 0 to 1 in 8 bits; with `wrap`, modulo 256 instead of clipped."""
+    """Values from 0 to 1 as 8 bits; with `wrap`, they are rounded down and taken modulo 256 instead of clipped."""
     if wrap:
         return (np.floor(value * 255.0).astype(np.int64) % 256).astype(np.uint8)
     return np.round(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)

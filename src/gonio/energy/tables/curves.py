@@ -1,13 +1,13 @@
 """Albedos as short formulas for shaders: rational functions of roughness and cosine, fitted to minimize the maximum
 error.
 
-    P(x, y) / Q(x, y),  P and Q polynomials of a given total degree, Q(0, 0) = 1
+    P(x, y) / Q(x, y),  with polynomials P and Q of a given total degree, Q(0, 0) = 1
 
-    x is the roughness or alpha, its square; y the cosine, its root, or sqrt(mu / (mu + 4 alpha)) or
-    sqrt(mu^2 + alpha^2), in which E and B / E of microfacet models are smooth: whichever fits best.
+    x is the roughness or its square, alpha; y is the cosine, its root, sqrt(mu / (mu + 4 alpha)) or
+    sqrt(mu^2 + alpha^2), in which E and B / E of microfacet models are smooth. The variables that fit best are used.
 
-Each step solves a linear problem weighted by the last denominator (Sanathanan and Koerner), and weights grow where the
-error is large (Lawson), so that the maximum error approaches the smallest possible.
+Each step solves a linear problem weighted by the last denominator (Sanathanan and Koerner), and the weights increase
+where the error is large (Lawson), so that the maximum error approaches the smallest possible.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ SAMPLES = 1 << 14  # for an albedo that only sampling gives at each roughness
 class Rational(NamedTuple):
     """P / Q, a rational function of one or two variables.
 
-    above, below  coefficients of P and Q by powers of x (rows) and y (columns)
-    forms         "roughness" or "alpha" for x, and "mu", "root", "bent" or "soft" for y
+    above, below  coefficients of P and Q, for powers of x (rows) and y (columns)
+    forms         the variables: "roughness" or "alpha" for x, and "mu", "root", "bent" or "soft" for y
     error, mean   the largest and the mean error on the grid of the fit
     """
 
@@ -52,18 +52,19 @@ class Rational(NamedTuple):
     mean: float
 
     def __call__(self, x: Scalar, y: Scalar) -> Scalar:
-        """The value at the variables x and y of roughness and cosine (`variables`)."""
+        """The value at x and y, which `variables` computes from roughness and cosine."""
         value = _horner(self.above, x, y)
         return value / _horner(self.below, x, y) if np.count_nonzero(self.below) > 1 else value
 
 
 class Curve(NamedTuple):
-    """A quantity of a material as code: a rational function per channel, or a single one.
+    """A quantity of a material as code: one rational function per channel, or a single one.
 
     name, doc  name and description of the function
     angle      whether it depends on the cosine
     swept      whether it depends on the roughness
-    parts      the functions of its components; for "dfg" those of A + B and B / (A + B), which are both at most 1
+    parts      the rational functions of its components; for "dfg", those of A + B and B / (A + B), which are both at
+               most 1
     """
 
     name: str
@@ -74,12 +75,12 @@ class Curve(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Largest error on the grid, over all components; for A and B a bound, the sum of both errors."""
+        """The largest error on the grid, over all components; for A and B, a bound, the sum of the two errors."""
         return self._all([part.error for part in self.parts])
 
     @property
     def mean(self) -> float:
-        """Mean error on the grid, of the worst component; for A and B a bound."""
+        """The mean error on the grid, for the worst component; for A and B, a bound."""
         return self._all([part.mean for part in self.parts])
 
     def _all(self, errors: list[float]) -> float:
@@ -87,7 +88,11 @@ class Curve(NamedTuple):
 
 
 def degrees(order: str | int) -> tuple[int, int]:
-    """The degrees of numerator and denominator: "4" means 4 / 4, "4/2" gives both, "5/0" is a polynomial."""
+    """The degrees of numerator and denominator.
+
+    order  "4" for degrees 4 and 4, "4/2" for 4 and 2, "5/0" for a polynomial
+    Raises InputError for anything else.
+    """
     match = re.fullmatch(r"(\d)(?:/(\d))?", str(order).strip())
     above, below = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not match or not 1 <= above <= LARGEST_ORDER or below > LARGEST_ORDER:
@@ -97,7 +102,12 @@ def degrees(order: str | int) -> tuple[int, int]:
 
 
 class Samples(NamedTuple):
-    """Values on the grid of a fit: name -> (rows, columns, channels), with one row if nothing is swept."""
+    """Values on the grid of a fit.
+
+    roughness, mu  the grid; roughness has a single entry if the material has no such parameter
+    swept          whether the material has a parameter that the roughness sets
+    values         name -> values (rows, columns, channels)
+    """
 
     roughness: Array
     mu: Array
@@ -106,7 +116,10 @@ class Samples(NamedTuple):
 
 
 def sample(model: BSDF, names: tuple[str, ...] = ("albedo", "average_albedo", "dfg")) -> Samples:
-    """E, its average and, for a microsurface, A and B of the split sum, over roughness and cosine."""
+    """Sample a material on the grid of roughness and cosine.
+
+    names  quantities: "albedo" (E), "average_albedo" (E_avg), and for a microsurface "dfg" (A and B of the split sum)
+    """
     path = next(ltc.roughness_paths(model), "")
     roughness = np.maximum(np.linspace(0.0, 1.0, ROWS), LEAST_ROUGHNESS) if path else np.zeros(1)
     mu = np.maximum(np.linspace(0.0, 1.0, COLUMNS) ** 2, LEAST_COSINE)
@@ -142,7 +155,11 @@ DOCS = {
 
 
 def fit(samples: Samples, order: str | int, names: tuple[str, ...] = ()) -> list[Curve]:
-    """The curves of a material, all or those named, with their errors; `order` as in `degrees`."""
+    """Fit the curves of a material.
+
+    order  degrees of the rational functions, as in `degrees`
+    names  names of the curves to fit; if empty, all
+    """
     above, below = degrees(order)
     curves = []
     for name, values in samples.values.items():
@@ -158,7 +175,7 @@ def fit(samples: Samples, order: str | int, names: tuple[str, ...] = ()) -> list
 
 
 def variables(form: tuple[str, str], roughness: Any, mu: Any) -> tuple[Any, Any]:
-    """The variables x and y of a form."""
+    """The variables x and y of a form, for a roughness and a cosine."""
     alpha = roughness * roughness
     x = alpha if form[0] == "alpha" else roughness
     if form[1] == "bent":
@@ -169,7 +186,7 @@ def variables(form: tuple[str, str], roughness: Any, mu: Any) -> tuple[Any, Any]
 
 
 def _best(roughness: Array, mu: Array, values: Array, above: int, below: int) -> Rational:
-    """The fit in the variables that suit it best."""
+    """The rational function in the variables that fit best."""
     forms = product(
         ("roughness", "alpha")[: len(roughness)],
         ("mu", "root", "bent", "soft")[: 4 if len(roughness) > 1 < len(mu) else len(mu)],
@@ -224,7 +241,7 @@ def _array(powers: list[tuple[int, int]], numbers: Array) -> Array:
 
 
 def _horner(coefficients: Array, x: Any, y: Any) -> Any:
-    """A polynomial in y, whose coefficients are polynomials in x."""
+    """The value of a polynomial in y whose coefficients are polynomials in x."""
     value: Any = None
     for column in coefficients.T[::-1]:
         inner: Any = None

@@ -3,12 +3,13 @@
     D(i) = cos+(W i) |det W| / (pi |W i|^3),   W = [[a, 0, b], [0, 1, 0], [c, 0, d]]  in the plane of o and n
 
 W minimizes int |f |cos| / E - D|^p di over the whole sphere, including directions below the horizon, where f is 0 and D
-may not be. The fit uses p = 3, as in the paper, then p = 1.5 starting from its result, then p = 1.1: integrals over
-lights miss at most the fraction of the light that D misplaces, which is p = 1, whereas p = 3 fits the peak of a lobe at
-the cost of its tail. Where the horizon cuts a lobe in half, p = 1.5 misplaces up to an eighth more of the light. The
-integral is a sum over fixed points: directions that the material samples, the same mirrored at the horizon, and evenly
-spread directions. The steps are those of Gauss and Newton, damped (Levenberg and Marquardt), for all cosines of a
-roughness at once, from two starts: the fit of the rougher row, and the covariance of the lobe.
+may not be. The fit uses p = 3, as in the paper, then p = 1.5, starting from the previous result, then p = 1.1: the
+error of an integral over a light is at most the fraction of the light that D misplaces, which p = 1 minimizes, whereas
+p = 3 fits the peak of a lobe at the cost of its tail. Where the horizon cuts a lobe in half, p = 1.5 misplaces up to an
+eighth more of the light than p = 1.1. The integral is a sum over fixed points: directions that the material samples,
+their mirror images at the horizon, and evenly spread directions. All cosines of a roughness are fitted at once by
+damped Gauss-Newton steps (Levenberg and Marquardt) from two starts: the fit of the rougher row, and the covariance of
+the lobe.
 """
 
 from __future__ import annotations
@@ -48,10 +49,10 @@ POLYGONS = 1024
 class Row(NamedTuple):
     """A row of the table: the numbers of W, E in color, and the errors of each cell.
 
-    inverse   (size, 5): a, b, the middle entry, c, d
-    norm      (size, channels): E; for a distribution (E, B), so that E = F0 (E - B) + B for Schlick's Fresnel
-    misplaced (size,): half of int |f cos / E - D|, the fraction of the light that is misplaced
-    cubed     (size,): int |f cos - E D|^3, which the paper minimizes
+    inverse    the numbers a, b, the middle entry, c, d of W, (size, 5)
+    norm       E, (size, channels); for a distribution (E, B), so that the albedo is F0 (E - B) + B by Schlick's F
+    misplaced  half of int |f cos / E - D|, the fraction of the light that is misplaced, (size,)
+    cubed      int |f cos - E D|^3, which the paper minimizes, (size,)
     """
 
     inverse: Array
@@ -61,10 +62,10 @@ class Row(NamedTuple):
 
 
 class Form(NamedTuple):
-    """How numbers describe W, with one row of them per cell, and D as a function of them.
+    """A parametrization of W: functions of the numbers that describe W, which are given in one row per cell.
 
     density   (numbers, wi) -> D (cells, K)
-    slopes    (numbers, wi) -> D, and its derivatives (cells, numbers, K)
+    slopes    (numbers, wi) -> D (cells, K), and its derivatives (cells, numbers, K)
     mirrored  numbers -> whether W contains a reflection, (cells,)
     """
 
@@ -74,9 +75,11 @@ class Form(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Integration directions per cell, their weights and the values there.
+    """The points of the integrals, per cell.
 
-    wi (cells, K, 3); weight (cells, K); value (cells, K, channels): f |cos theta_i|
+    wi      directions, (cells, K, 3)
+    weight  their weights, (cells, K)
+    value   f |cos theta_i| at the directions, (cells, K, channels)
     """
 
     wi: Array
@@ -85,12 +88,14 @@ class Points(NamedTuple):
 
 
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
-    """Tables of an isotropic material over (roughness, sqrt(1 - mu)), nodes at both ends.
+    """Bake tables of an isotropic material over (roughness, sqrt(1 - mu)), with nodes at both ends.
 
-    schlick  store E and B instead of E in color, for a material with F = 1
+    size     number of nodes along each axis, 2 to 256
+    schlick  whether to store E and B instead of E in color, for a material with F = 1
     Returns arrays ltc_inverse (..., 4), ltc_norm (..., 2 or 3), ltc_error (..., 1); the manifest states the mean and
-    the largest error of the lobe and of integrals over random quadrilaterals. A material without a roughness has one
-    row. Raises InputError if the material has a mirror lobe, is estimated by sampling or absorbs everything.
+    the largest error of the lobe and of integrals over random quadrilaterals. Tables of a material without a roughness
+    have one row. Raises InputError if the material has a mirror lobe, is evaluated by random estimates or absorbs all
+    light.
     """
     path = check(model, size)
     roughness = np.linspace(0.0, 1.0, size) if path else np.zeros(1)
@@ -126,7 +131,8 @@ def cosines(size: int) -> Array:
 
 
 def check(model: BSDF, size: int) -> str:
-    """The path of the parameter that the roughness sets; "" if there is none."""
+    """The path of the parameter that the roughness sets; "" if there is none. Raises InputError if the material or the
+    size is not supported."""
     check_uniform(model)
     kind = type(model).__name__
     if not 2 <= size <= 256:
@@ -139,7 +145,7 @@ def check(model: BSDF, size: int) -> str:
 
 
 def roughness_paths(model: BSDF) -> Iterator[str]:
-    """Paths of the parameters that a roughness may set: widths first."""
+    """Paths of the parameters that a roughness can set, widths first."""
     leaves = list(tree.leaves(model))
     yield from (leaf.path for leaf in leaves if leaf.parameter.kind == "alpha")
     for name in ("roughness", "specular_roughness"):
@@ -147,7 +153,10 @@ def roughness_paths(model: BSDF) -> Iterator[str]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material at a roughness; a width is its square."""
+    """The material at a roughness, of which a width is the square.
+
+    path  path of the parameter to set, from `check`; "" changes nothing
+    """
     if not path:
         return model
     value = max(roughness, MIN_ROUGHNESS)
@@ -159,7 +168,11 @@ def at(model: BSDF, path: str, roughness: float) -> BSDF:
 
 
 def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, phi: Array | None = None) -> Points:
-    """Points for the integrals over a lobe and its surroundings, for each cosine, at azimuths phi or 0."""
+    """The points of the integrals over a lobe and its surroundings, for each cosine of wo.
+
+    lobe, sphere  numbers of directions that the material samples, and of evenly spread ones
+    phi           azimuths of wo; None for 0
+    """
     kind = backend.types("float64")
     bound, cells = model.bind(kind), len(mu)
     wo = direction(mu, np.zeros_like(mu) if phi is None else phi)
@@ -186,7 +199,7 @@ def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, ph
 
 
 def _norm(model: BSDF, mu: Array, schlick: bool) -> Array:
-    """E in color at each cosine, for the reflected light; or E and B of a distribution, F = 1."""
+    """E of the reflected light in color at each cosine; with `schlick`, E at F = 1 and B."""
     surface = model.microsurface
     if schlick and surface is not None:
         x, _ = pair_of(surface.alpha)
@@ -220,7 +233,7 @@ def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
 
 
 def _fit(given: tuple[Array, Array, Array], starts: list[Array], power: float) -> Array:
-    """W of each cell for a power p, from the best of its starts, and from the fits of its neighbors if better."""
+    """W of each cell for a power p: the best result from any of the starts or from the fits of neighboring cells."""
     losses = [loss_of(PLANE, start, *given, power) for start in starts]
     chosen = np.argmin(losses, axis=0)
     best, loss = fitted(PLANE, *given, np.array(starts)[chosen, np.arange(len(chosen))], power)
@@ -236,14 +249,17 @@ def _fit(given: tuple[Array, Array, Array], starts: list[Array], power: float) -
 def lobe_errors(
     points: Points, lobe: Array, total: Array, inverse: Array, form: Form | None = None
 ) -> tuple[Array, Array]:
-    """(int |f cos - E D|^3, half of int |f cos / E - D|) for each cell; total (cells, 1) is E."""
+    """int |f cos - E D|^3, and half of int |f cos / E - D|, for each cell.
+
+    total  E, (cells, 1)
+    """
     difference = np.abs(lobe - total * (form or PLANE).density(inverse, points.wi))
     shares = 0.5 * np.sum(points.weight * difference, axis=1) / total[:, 0]
     return np.sum(points.weight * difference**3, axis=1), shares
 
 
 def _first(points: Points, lobe: Array) -> Array:
-    """W from the mean and the covariance of a lobe."""
+    """An initial W for each cell, from the mean and the covariance of its lobe."""
     weight = points.weight * lobe
     z = np.einsum("ck,ckx->cx", weight, points.wi) * (1.0, 0.0, 1.0)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -256,7 +272,7 @@ def _first(points: Points, lobe: Array) -> Array:
 
 
 def _density(inverse: Array, wi: Array) -> Array:
-    """D at directions of each cell."""
+    """D at the directions of each cell."""
     a, b, c, d, e = (inverse[:, i, None] for i in range(5))
     x, y, z = wi[..., 0], wi[..., 1], wi[..., 2]
     height = d * x + e * z
@@ -305,9 +321,11 @@ def loss_of(form: Form, inverse: Array, wi: Array, weight: Array, lobe: Array, p
 
 
 def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array, power: float = 3.0) -> tuple[Array, Array]:
-    """(W, loss) of each cell from a start, by damped steps of Newton's method without second derivatives of D.
+    """W and the loss of each cell after damped Gauss-Newton steps from a start.
 
-    power  of |f - D| in the integral; below 2, the steps give small differences more weight, up to a bound (`SMALL`)
+    lobe   values of the normalized lobe, f |cos| / E
+    power  power of |f - D| in the integral; below 2, the steps give small differences more weight, up to a bound
+           (`SMALL`)
     """
     inverse, damping = start.copy(), np.full(len(start), 1e-2)
     loss = loss_of(form, inverse, wi, weight, lobe, power)
@@ -339,7 +357,8 @@ def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array, powe
 
 
 def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse: Array) -> Array:
-    """|integral by the tables - by summing f| / E, over random quadrilaterals, at up to 8 x 8 cells: one per pair."""
+    """The errors of integrals over random quadrilaterals, computed by the tables instead of by summing f, divided by E,
+    at up to 8 x 8 cells."""
     rows, columns = (np.unique(np.linspace(0, n - 1, 8).round().astype(int)) for n in (len(roughness), len(mu)))
     each = max(POLYGONS // (len(rows) * len(columns)), 1)
     corners = random_quads(np.random.default_rng(1), each * len(rows) * len(columns))
@@ -356,7 +375,8 @@ def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse:
 
 
 def random_quads(rng: np.random.Generator, count: int) -> Array:
-    """Corners (count, 4, 3) of randomly rotated rectangles above the surface, with sides of 0.2 to 2, at distance 1."""
+    """The corners (count, 4, 3) of randomly rotated rectangles above the surface, with sides of 0.2 to 2, at
+    distance 1."""
     z, phi = rng.random(count), 2.0 * np.pi * rng.random(count)
     center = spherical_array(np.sqrt(1.0 - z**2), z, phi)
     turn, _ = np.linalg.qr(rng.normal(size=(count, 3, 3)))
@@ -366,14 +386,14 @@ def random_quads(rng: np.random.Generator, count: int) -> Array:
 
 
 def inside(quad: Array, wi: Array) -> NDArray[np.bool_]:
-    """Whether directions pass through a quadrilateral."""
+    """Whether each direction passes through a quadrilateral."""
     sides = np.cross(quad, np.roll(quad, -1, axis=0)) @ wi.T
     ahead = quad.mean(0) @ np.cross(quad[1] - quad[0], quad[3] - quad[0])
     return np.all(sides * np.sign(ahead) > 0.0, axis=0)
 
 
 def covered(inverse: Array, wo: Array, corners: Array) -> Array:
-    """The fraction of the lobe of each W (N, 5) for wo (N, 3) that a quadrilateral covers, computed as in shaders."""
+    """The fraction of the lobe of each W (N, 5), for wo (N, 3), that a quadrilateral covers, computed as in shaders."""
     kind = backend.types("float64")
     numbers: Any = tuple(kind.float(part) for part in (inverse / inverse[:, 2:3])[:, (0, 1, 3, 4)].T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))

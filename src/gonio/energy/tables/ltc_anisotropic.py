@@ -2,10 +2,10 @@
 
     D(i) = cos+(W i) |det W| / (pi |W i|^3)
 
-The surface's axes are planes of symmetry, so azimuths of one quarter turn suffice. W acts in the frame whose x axis
-lies below o. D is the same for a multiple of W and for W rotated about the axis of the cosine; the table holds the
-matrix whose upper left block is symmetric and whose middle entry is 1, so that neighbors can be interpolated. The fit
-is that of `ltc`, with nine numbers.
+The material is symmetric about the planes of its axes, so azimuths in one quarter turn suffice. W acts in the frame
+whose x axis lies below o. D is the same for a multiple of W and for W rotated about the axis of the cosine; the table
+stores the matrix whose upper left block is symmetric and whose middle entry is 1, so that neighbors can be
+interpolated. The fit is that of `ltc`, with nine numbers.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ PLACES = 64  # points at which `polygon_errors` tests 16 quadrilaterals each
 
 
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
-    """Tables over (roughness, azimuth, sqrt(1 - mu)), nodes at both ends; as `ltc.bake`, with eight numbers of W.
+    """Bake tables over (roughness, azimuth, sqrt(1 - mu)), with nodes at both ends, as `ltc.bake` but with eight
+    numbers of W.
 
-    The roughness is the root of the larger width; the ratio of the widths is the material's.
-    Raises InputError if the x and y axes are not axes of symmetry, and as `ltc.bake`.
+    The roughness is the root of the larger width; the ratio of the widths is that of the material. Raises InputError if
+    the x and y axes are not axes of symmetry, and in the cases of `ltc.bake`.
     """
     path = ltc.check(model, size)
     _check_symmetry(model)
@@ -73,7 +74,7 @@ def _errors(values: Array) -> dict[str, float]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material at a roughness: its widths, in their proportion, or its parameter of that name."""
+    """The material at a roughness, which sets its widths, in their ratio, or the parameter at `path`."""
     leaf = next((leaf for leaf in tree.leaves(model) if leaf.path == path), None)
     if leaf is None or leaf.parameter.kind != "alpha":
         return ltc.at(model, path, roughness)
@@ -83,7 +84,7 @@ def at(model: BSDF, path: str, roughness: float) -> BSDF:
 
 
 def _check_symmetry(model: BSDF) -> None:
-    """Raise InputError unless mirroring both directions at x = 0 and at y = 0 changes nothing."""
+    """Raise InputError unless `eval` is invariant under mirroring both directions at x = 0, and at y = 0."""
     kind = backend.types("float64")
     random = np.random.default_rng(1)
     wo, wi = (v / np.linalg.norm(v, axis=0) for v in np.abs(random.normal(size=(2, 3, 64))))
@@ -101,7 +102,8 @@ def _check_symmetry(model: BSDF) -> None:
 
 
 def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool) -> tuple[Array, Array, Array, Array]:
-    """W (azimuths, cosines, 9), E, the misplaced light and the cubed error of the fit, for one roughness."""
+    """W (azimuths, cosines, 9), E, the misplaced light and the cubed error of the fit, as in `ltc.Row`, for one
+    roughness."""
     shape = len(phi), len(mu)
     across, azimuths = np.tile(mu, len(phi)), np.repeat(phi, len(mu))
     points = ltc.points_of(model, across, phi=azimuths)
@@ -129,7 +131,7 @@ def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool)
 
 
 def _norm(model: BSDF, points: Points, mu: Array, phi: Array, schlick: bool) -> Array:
-    """E in color at each cell; or E and B of a distribution, F = 1."""
+    """E in color at each cell; with `schlick`, E at F = 1 and B."""
     if schlick:
         wo = direction(mu, phi)[:, None]
         half = wo + points.wi
@@ -142,13 +144,14 @@ def _norm(model: BSDF, points: Points, mu: Array, phi: Array, schlick: bool) -> 
 
 
 def _in_view(wi: Array, phi: Array) -> Array:
-    """Directions of each cell in the frame whose x axis lies below o."""
+    """The directions of each cell in the frame whose x axis lies below o."""
     c, s = np.cos(phi)[:, None], np.sin(phi)[:, None]
     return np.stack([c * wi[..., 0] + s * wi[..., 1], c * wi[..., 1] - s * wi[..., 0], wi[..., 2]], axis=-1)
 
 
 def _first(points: Points, lobe: Array) -> Array:
-    """W from the mean and the covariance of a lobe, with its axes perpendicular to the mean."""
+    """An initial W for each cell, from the mean of its lobe and the covariance along its axes perpendicular to the
+    mean."""
     weight = points.weight * lobe
     z = np.einsum("ck,ckx->cx", weight, points.wi)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -164,7 +167,7 @@ def _first(points: Points, lobe: Array) -> Array:
 
 
 def _density(numbers: Array, wi: Array) -> Array:
-    """D at directions of each cell."""
+    """D at the directions of each cell."""
     matrix = numbers.reshape(-1, 3, 3)
     transformed = wi @ np.swapaxes(matrix, 1, 2)
     square = np.sum(transformed**2, axis=-1)
@@ -193,7 +196,7 @@ MATRIX = Form(_density, _slopes, _mirrored)
 
 
 def _gauge(matrix: Array) -> Array:
-    """The same lobes by matrices with a symmetric upper left block and a 1 in the middle."""
+    """Matrices of the same lobes with a symmetric upper left block and a middle entry of 1."""
     turn = np.arctan2(matrix[:, 0, 1] - matrix[:, 1, 0], matrix[:, 0, 0] + matrix[:, 1, 1])
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     upper = np.stack([c * matrix[:, 0] - s * matrix[:, 1], s * matrix[:, 0] + c * matrix[:, 1]], axis=1)
@@ -205,7 +208,8 @@ def _gauge(matrix: Array) -> Array:
 
 
 def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
-    """|integral by the interpolated table - by summing f| / E, over random quadrilaterals at random points of it."""
+    """The errors of integrals over random quadrilaterals, computed by the interpolated table instead of by summing f,
+    divided by E, at random points of the table."""
     random = np.random.default_rng(1)
     each = ltc.POLYGONS // PLACES
     corners = ltc.random_quads(random, each * PLACES)
@@ -224,7 +228,7 @@ def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
 
 
 def covered(inverse: Array, roughness: Array, wo: Array, corners: Array) -> Array:
-    """The fraction of the lobe for wo (N, 3) that a quadrilateral (N, 4, 3) covers, by the table, as in shaders."""
+    """The fraction of the lobe for wo (N, 3) that a quadrilateral (N, 4, 3) covers, by the table as in shaders."""
     kind = backend.types("float64")
     table, outgoing = Table("ltc_inverse", inverse), kind.vec3(wo.T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))

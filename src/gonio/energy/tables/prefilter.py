@@ -1,16 +1,16 @@
-"""An environment prefiltered for rough mirrors: the levels of the split sum (Karis2013).
+"""Prefilter an environment for rough mirrors: the levels of the split sum (Karis2013).
 
     light reflected at o ~ E(o) L_alpha(r),   L_alpha(r) = int L(i) k(r.i) di / int k(r.i) di,   r = o mirrored at n,
     k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe at normal incidence, o = n = r, weighted by i.n.
 
-**The method.** The kernel depends only on the angle between r and i. Between two circles of latitude it is therefore a
-convolution in azimuth, a product of Fourier series; the latitudes are simply summed. Every texel contributes and
-nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide, the map is first
-averaged in blocks; where it is narrower than a few texels, the map is interpolated.
+**The method.** The kernel depends only on the angle between r and i. Between two circles of latitude, the integral is
+therefore a convolution in azimuth, a product of Fourier series; the latitudes are summed directly. Every texel
+contributes and nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide,
+the map is first averaged in blocks; where it is narrower than a few texels, the map is interpolated.
 
-**Two errors.** The error of the blur (each level compared with a sum over every finely divided texel of the map) is
-invisible. The error of the split sum itself is not: it assumes a circular lobe, cut by the horizon, with uniform
-masking. The manifest states both for the environment.
+**Two errors.** The error of the blur (of each level compared with a sum over every finely divided texel of the map) is
+invisible. The error of the split sum itself is visible, since it assumes a circular lobe, cut by the horizon, with
+uniform masking. The manifest states both errors for the environment.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ SCHEMA = 2
 
 
 def roughness_of(level: int, levels: int) -> float:
-    """Level 0 is the map itself, the last is for roughness 1."""
+    """The roughness of a level: 0 for level 0, the map itself, and 1 for the last."""
     return level / (levels - 1)
 
 
@@ -57,7 +57,9 @@ def prefilter(
     """The levels of an environment, each half as large as the previous one; the first is the map itself.
 
     environment  latitude-longitude radiance, (H, 2 H, channels), row 0 toward +z
-    location     the name of the environment in errors
+    ndf          name of the distribution of normals
+    levels       number of levels, 2 or more
+    location     the name of the environment, for errors
     Level l is for roughness l / (levels - 1); its texels are ordered as those of the map.
     Raises InputError for a map of another shape, with negative or non-finite values, or too small for this many levels,
     and for an unknown distribution.
@@ -71,11 +73,11 @@ def bake(
     environment: Environment, ndf: str = "ggx", levels: int = LEVELS, masking: str = "smith-correlated",
     name: str = "environment",
 ) -> Baked:  # fmt: skip
-    """The levels as arrays level_0, level_1 ..., rounded to the precision of a picture; the manifest states their
+    """Bake the levels of `prefilter` as arrays level_0, level_1, ..., rounded to float32. The manifest states their
     errors.
 
-    masking  for the error of the split sum
-    name     name of the environment in the manifest
+    masking  masking term, for the error of the split sum
+    name     name of the environment, for the manifest and errors
     """
     quadrature.known_masking(masking)
     made = prefilter(environment, ndf, levels, name)
@@ -135,12 +137,12 @@ def _checked(environment: Environment, levels: int, location: str) -> Array:
 
 
 def _half_width(alpha: float) -> float:
-    """The angle at which GGX's lobe has fallen to a quarter; other distributions have a similar width."""
+    """The angle at which the lobe of GGX has fallen to a quarter; other distributions have a similar width."""
     return 2.0 * np.arctan(alpha)
 
 
 def _kernel(lobe: NDF, alpha: float, z: Array) -> Array:
-    """k(r.i) for z = r.i of any shape."""
+    """The kernel k(z) for an array z = r.i of any shape."""
     kind = backend.types("float64")
     width = backend.float_of(alpha, kind)
     cosine = kind.float(np.ascontiguousarray(z.ravel()))
@@ -187,13 +189,13 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
 
 
 def _at_centers(series: NDArray[np.complex128], width: int) -> Array:
-    """A Fourier series along axis 1 at `width` equidistant points."""
+    """The values of a Fourier series along axis 1 at `width` equidistant points."""
     fold = max(1, -(-2 * series.shape[1] // width))
     return np.fft.irfft(series, fold * width, axis=1)[:, ::fold] * (fold * width)
 
 
 def _resampled(source: Array, wanted: float) -> Array:
-    """The map on a grid of about `wanted` rows or more: averaged in blocks, or interpolated between its texels."""
+    """The map on a grid of about `wanted` rows or more, averaged in blocks or interpolated between its texels."""
     height = source.shape[0]
     block = max((k for k in range(1, height // 4 + 1) if height % k == 0 and height / k >= wanted), default=1)
     if block > 1:
@@ -216,7 +218,7 @@ def _divided(source: Array, parts: int) -> Array:
 
 
 def _between(values: Array, at: Array, axis: int) -> Array:
-    """Linear interpolation along an axis at positions in units of entries."""
+    """Values interpolated linearly along an axis at positions in units of entries."""
     low = np.minimum(at.astype(int), values.shape[axis] - 2)
     part = np.expand_dims(at - low, tuple(range(1, values.ndim - axis)))
     return np.take(values, low, axis) * (1.0 - part) + np.take(values, low + 1, axis) * part
@@ -253,11 +255,12 @@ def read(level: Array, directions: Array) -> Array:
 
 
 def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, float]]:
-    """Per level: `max` and `rms` error of the blur at texels; `interpolation`, the largest error between texels and
-    halfway to the previous level; `split sum`, the RMS error of the split sum. All are relative to the RMS of the exact
-    values.
+    """The errors of each level: `max` and `rms`, of the blur at texels; `interpolation`, the largest error between
+    texels and halfway to the previous level; `split sum`, the RMS error of the split sum. All are relative to the RMS
+    of the exact values.
 
-    Computed by sums over every texel of the map, in eight evenly spread directions and at the level's brightest texel.
+    They are computed by sums over every texel of the map, in eight evenly spread directions and at the brightest texel
+    of the level.
     """
     lobe, source = distribution(ndf), levels[0]
     spread = _spread(8)
@@ -306,7 +309,10 @@ class EveryTexel:
             self._bands.append((kind.vec3(*[kind.float(np.ascontiguousarray(c)) for c in w.T]), part, solid))
 
     def _sums(self, n: Array, value: Callable[[Direction, Scalar], Scalar]) -> Iterator[tuple[Array, float]]:
-        """sum L value and sum value over all directions, value(i, alpha) in the frame of n."""
+        """The sums of L value and of value over all directions i.
+
+        value  function value(i, alpha) in the frame of n
+        """
         kind = backend.types("float64")
         dr = backend.drjit()
         alpha = backend.float_of(self.alpha, kind)

@@ -1,8 +1,8 @@
-"""The split sum of image-based lighting (Karis2013): E = F0 A + B for Schlick's Fresnel; `prefilter` makes the maps.
+"""The split sum of image-based lighting (Karis2013): E = F0 A + B for Schlick's Fresnel. `prefilter` makes the maps.
 
     light reflected ~ (F0 A(mu, roughness) + B(mu, roughness)) * prefiltered radiance (reflected direction, roughness)
 
-A + B is E at F = 1, and B the albedo at F = (1 - o.m)^5.
+A + B is E at F = 1, and B is the albedo at F = (1 - o.m)^5.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SIZE = 128  # the error of bilinear interpolation is 3e-4 for roughness >= 0.1
 
 @cache.of_members
 def schlick_table(ndf: str, masking: str) -> Table:
-    """B over (roughness, sqrt(mu)), nodes at both ends of each axis."""
+    """The table of B over (roughness, sqrt(mu)), with nodes at both ends of each axis."""
 
     def build() -> np.ndarray:
         ends = np.linspace(0.0, 1.0, SIZE)

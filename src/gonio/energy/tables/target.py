@@ -1,4 +1,4 @@
-"""The target of a baked table: its E at points of the axes, and E_avg, computed in parts."""
+"""The target of a baked table: its E at points of the axes and its E_avg, which are computed in parts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,21 @@ BLOCK = 1024  # points per part: about 0.1 s, and 1 s with the reference quadrat
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A target baked over roughness: a distribution at F = 1 (model None), or a Conductor or Dielectric."""
+    """A target baked over roughness: a distribution at F = 1, or a Conductor or Dielectric.
+
+    model         the material; None for a distribution
+    ndf, masking  names of the distribution and the masking term
+    """
 
     model: Any
     ndf: str
     masking: str
 
     def exact(self, points: Points, fine: bool = False) -> dict[str, np.ndarray]:
-        """E, and dfg of a distribution, by quadrature; `fine` selects the reference. Computed in parts."""
+        """E, and for a distribution also dfg, at points by quadrature, computed in parts.
+
+        fine  whether to use the finer quadrature, which is the reference for errors
+        """
         shape = np.shape(points.mu)
         given = [np.broadcast_to(v, shape).ravel() if v is not None else None for v in points]
         arguments = [(self, *(v if v is None else v[at : at + BLOCK] for v in given), fine) for at in blocks(shape)]
@@ -52,11 +59,12 @@ class Target:
 
     @property
     def conducts(self) -> bool:
-        """Whether it is a metal; other targets have an index that can be swept."""
+        """Whether it is a metal; other targets have an index that can vary along an axis."""
         return self.model is not None and self.model.microsurface.eta is None
 
     def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:
-        """E_avg at rows of roughness: Gauss-Legendre in sqrt(mu), and even steps of azimuth over a quarter turn."""
+        """E_avg at rows of roughness, by a Gauss-Legendre rule in sqrt(mu) and even steps of azimuth in a quarter
+        turn."""
         x, w = quadrature.gauss(48 if fine else 32)
         roughness = axes.roughness(rows)
         if not axes.azimuths:
@@ -73,7 +81,7 @@ class Target:
 
 
 def blocks(shape: tuple[int, ...]) -> range:
-    """Starting indices of the parts of this many points."""
+    """The starting indices of the parts into which points of this shape are divided."""
     return range(0, int(np.prod(shape)), BLOCK)
 
 
@@ -93,7 +101,10 @@ def glass_power(
 
 
 def together(function: executor.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
-    """The concatenated results of all parts."""
+    """The concatenated results of all parts.
+
+    arguments  arguments of the function for each part
+    """
     keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
     done = {index: values for index, values in executor.each(function, arguments, keys) if index >= 0}
     return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
@@ -110,7 +121,7 @@ def _content(value: object) -> object:
 
 
 def describe(target: Any) -> Any:
-    """A target as the manifest names it; a width that is an axis is omitted."""
+    """The entry of the manifest for a target; parameters that vary along an axis are omitted."""
     if isinstance(target, str):
         return target
     surface = target.microsurface

@@ -120,7 +120,7 @@ class KullaConty(_Compensated):
 
     @property
     def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """The allowed loss in a white furnace: the error of the polynomials or of the computed albedo; docs/energy.md."""
+        """The loss allowed in a white furnace: the error of the polynomials or the computed albedo (docs/energy.md)."""
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:

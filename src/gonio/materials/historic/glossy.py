@@ -63,7 +63,7 @@ class _Glossy(BSDF):
         raise NotImplementedError
 
     def _focus(self) -> Scalar | float:
-        """A measure, from 0 to 1, of how much narrower the lobe is than the cosine, which samples a wide lobe better."""
+        """How much narrower the lobe is than the cosine, from 0 to 1; a wide lobe is sampled better by the cosine."""
         return 1.0
 
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:

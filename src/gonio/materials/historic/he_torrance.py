@@ -47,8 +47,8 @@ class HeTorrance(_Glossy):
     unshadowed part of the surface is s = sigma / sqrt(1 + w), where w e^w = x^2 and x is the sum of
     tan theta erfc(cot theta / width) / sqrt(8 pi) over the two directions, with width = 2 sigma / tau. G, the factor of
     the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair: the vectors of eq. 76 are orthonormal, and the other
-    factors cancel. S is Smith masking for Beckmann slopes of this width, times (1 + erf(cot theta / width)) / 2 for each
-    direction, with the exponential that is missing from the printed eq. 25 (Holzschuch2017).
+    factors cancel. S is Smith masking for Beckmann slopes of this width, times (1 + erf(cot theta / width)) / 2 for
+    each direction, with the exponential that is missing from the printed eq. 25 (Holzschuch2017).
 
     As in Ngan2005, F is that of a real index, for unpolarized light, and there is no coherent (mirror) term, since
     measured tables do not contain it. Above g = 18, D is the limit of the series,

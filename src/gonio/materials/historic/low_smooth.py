@@ -99,9 +99,9 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction found on the disk of projected directions by a step from the mirrored wo in a uniform azimuth. The
-        length of the step follows the power law, truncated at the rim or at `RIM`, whichever is farther; a step beyond
-        the rim is a failed sample."""
+        """The direction whose projection is a step away from that of the mirrored wo, in a uniform azimuth. The length
+        of the step follows the power law, truncated at the rim of the disk or at `RIM`, whichever is farther; a step
+        beyond the rim is a failed sample."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c

@@ -40,7 +40,7 @@ class ShiftedGamma(_Glossy):
     """Microfacets with a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
     (Bagher2012).
 
-    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha, for the angle h between half vector and n
+    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha and h the angle of the half vector to n
     G = G1(o) G1(i) with G1 = 1 + Lambda (1 - exp(t^k)), t = (theta - theta0) / reach; G1 = 1 for theta < theta0
     F = f0 + (1 - f0) (1 - cos)^5 - f1 cos, with cos = o.h
 

@@ -1,4 +1,4 @@
-"""Values derived from the parameters of OpenPBR alone: widths, indices, means over the hemisphere."""
+"""Values that depend only on the parameters of OpenPBR: widths, indices, means over the hemisphere."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], str
 
 class Other(NamedTuple):
     """Energy lost by glass facets whose reflectance differs from that of bare glass: under a film, or under a coat,
-    where reflection follows the index relative to the coat, and refraction that relative to the outside. The loss is
-    M + sum of less D, where M is that of bare glass and D is `spared`.
+    where reflection depends on the index relative to the coat, and refraction on that relative to the outside. The loss
+    is M + sum_j less_j D_j, where M is the loss of bare glass, D_j is `spared`, and j counts `FEW_PLACES`.
 
     less         difference of F from that of bare glass, at `FEW_PLACES`
     thin, dense  mean of the loss, from outside and from inside
@@ -41,7 +41,7 @@ class Other(NamedTuple):
 
 
 class Between(NamedTuple):
-    """Values that follow from the parameters alone.
+    """Values that depend only on the parameters.
 
     alpha        widths of the base, roughened by the coat, along x and y
     rough        roughness of the base; the square root of alpha if it is isotropic
@@ -49,11 +49,12 @@ class Between(NamedTuple):
     ratio        index for the base's reflection, relative to the medium above it, at least 1
     eta          index for the base's refraction, relative to the outside
     medium       index of the medium above the base, relative to the outside
-    sheer        fraction of diffuse light that the base's surface transmits: 1 minus its albedo, averaged
-    joint        the same for the surfaces of base and coat together
-    bent         deviations from these two means, at nodes of the cosine
+    sheer        fraction of diffuse light that the base's surface transmits: the mean of 1 minus its albedo
+    joint        fraction of such light that the surfaces of base and coat transmit together, divided by `sheer`
+    bent         relative deviations from the means of 1 minus the albedo, for the base and for base and coat together,
+                 at nodes of the cosine, each times the weight of the node
     filmed       change of F by the film at `PLACES`; empty without a film
-    extra        the mean of `filmed`
+    extra        mean of `filmed` over cosines and channels
     facets       factor on facets under the coat, at nodes of the cosine; empty without a coat
     returned     mean loss of a dielectric's facets relative to white ones, which the body below receives
     metal        energy lost by single scattering at F = 1
@@ -142,7 +143,7 @@ def derive(model: _OpenPBR) -> Between:
 
 
 def mean_of_metal(model: _OpenPBR, eta: Scalar, medium: Scalar, filmed: bool) -> Spectrum:
-    """Mean over the hemisphere of the metal's F, under its film if there is one; 1 without a metal."""
+    """Mean over the hemisphere of the metal's F, including its film if there is one; 1 without a metal."""
     if not model.has("base_metalness"):
         return ones_like(model.base_color)
     f_metal = averaged([model.bare_metal(x + zeros_like(eta)) for x in PLACES])
@@ -218,10 +219,12 @@ def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[S
 
 
 def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple[Scalar, ...]:
-    """w at nodes of the cosine, from w(o) int w(i) P(o, i) di = 1 - E_coat(o), with P the scattering by white facets.
+    """The solution w of w(o) int w(i) P(o, i) di = 1 - E_coat(o) at nodes of the cosine, where P is the scattering by
+    white facets.
 
-    Computed by damped steps of Sinkhorn's iteration. It starts from the solution for facets that scatter a fraction b
-    of the light uniformly and mirror the rest, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing angles.
+    It is computed by damped steps of Sinkhorn's iteration. The initial w is that of facets that scatter a fraction b of
+    the light uniformly and mirror the rest, w [(1 - b) w + b q] = 1 - E_coat, with a b that increases toward grazing
+    angles and q the w of most of the light.
 
     transmitted  1 - E_coat at the nodes
     """
@@ -240,7 +243,7 @@ def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple
 def returned_less(
     model: _OpenPBR, rough: Scalar, ratio: Scalar, transmitted: list[Scalar], facets: tuple[Scalar, ...]
 ) -> Scalar:
-    """The mean of E (1 - E_coat - w <w>), see `layers.under`."""
+    """The cosine-weighted mean of E (1 - E_coat - w <w>), with <w> from `seen_by`: see `returned` of `Between`."""
     E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[:HATS]
     rows = tables.scattered_at_nodes(rough, model.masking)
     less = []

@@ -39,7 +39,7 @@ def mix(a: Array, b: Array, share: Scalar) -> Array:
 
 @function
 def modulated(ratio: Scalar, weight: Scalar) -> Scalar:
-    """The index whose F0 is that of `ratio` times a weight, limited to 5."""
+    """The index whose F0 is `weight` times that of the index `ratio`, limited to 5."""
     root = (ratio - 1.0) / (ratio + 1.0)
     epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), MAX_ROOT_F0), root)
     return (1.0 + epsilon) / (1.0 - epsilon)
@@ -53,8 +53,13 @@ def total_of(terms: list[Array]) -> Array:
 
 
 def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
-    """<w>: the mean of w over the light that a dielectric's facets scatter to a direction with the given cosine. They
-    reflect most at grazing angles, so the weights are those of white facets times F of the facet half way between."""
+    """<w>, the mean of w over the light that a dielectric's facets scatter to a direction with the given cosine. The
+    facets reflect most at grazing angles, so the weights are those of white facets times F of the facet whose normal is
+    half way between the two directions.
+
+    row     weights of white facets, from `scattered`
+    facets  w at the same nodes of the cosine
+    """
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
     weighted, total = ops.zeros_like(cos), ops.zeros_like(cos)
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
@@ -77,7 +82,12 @@ def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
 
 
 def covered_less(transmitted: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
-    """Transmittance of a coat for the body below, which also receives the loss of facets relative to white ones."""
+    """Transmittance of a coat for light of the body below, which also receives the loss `less` of facets relative to
+    white ones.
+
+    transmitted  transmittance of the coat's surface
+    let_in       transmittance of the base's surface
+    """
     return transmitted + less * (1.0 - let_in) / maximum(let_in, 1e-3)
 
 
@@ -96,18 +106,22 @@ def averaged(values: list[Array]) -> Array:
 
 @function
 def over_pi(scale: Scalar) -> Scalar:
-    """The mean m for which `scale` is 1 / (pi m); 0 for a scale of 0."""
+    """The mean m for which 1 / (pi m) equals `scale`; 0 for a scale of 0."""
     return safe_div(inv_pi, scale)
 
 
 def colour_again(f: Spectrum, lost: Scalar) -> Spectrum:
-    """Color of light scattered twice or more by facets: F^2 E_avg / (1 - F (1 - E_avg))."""
+    """The color of light scattered twice or more by facets: F^2 E_avg / (1 - F (1 - E_avg)).
+
+    f     F, averaged over the hemisphere
+    lost  1 - E_avg
+    """
     return sqr(f) * (1.0 - lost) / (1.0 - f * lost)
 
 
 @function
 def power(colour: Spectrum, exponent: Scalar) -> Spectrum:
-    """A color to a power; 0 remains 0."""
+    """A color raised to a power; 0 remains 0."""
     return ops.exp(log(maximum(colour, 1e-6)) * exponent)
 
 
@@ -118,7 +132,12 @@ def direction_at(cos: Scalar) -> Direction:
 
 
 def lobe_value(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
-    """A lobe's value, 0 for smooth facets; for ideal pairs, `mirror` for smooth facets and 0 for others."""
+    """The value of a lobe, which is 0 if its facets are smooth. For pairs connected by a delta lobe, `mirror` if the
+    facets are smooth, else 0.
+
+    smooth  rays for which the facets are smooth; None if there are none
+    ideal   rays whose pair of directions is connected by a delta lobe; None if there are none
+    """
     if ideal is None:
         return value if smooth is None else where(smooth, 0.0, value)
     rough = where(ideal, 0.0, value)

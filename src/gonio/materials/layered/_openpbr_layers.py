@@ -1,4 +1,4 @@
-"""Attenuation of the light of the layers below by OpenPBR's coat and fuzz."""
+"""Attenuation of light by OpenPBR's coat and fuzz."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Sides(NamedTuple):
 
 
 def let_in(model: _OpenPBR, w: Direction) -> Spectrum:
-    """1 - E of the base's dielectric surface; if anisotropic, at the equivalent roughness along w."""
+    """1 - E of the base's dielectric surface for w; if it is anisotropic, at the equivalent roughness along w."""
     b = model.derived
     rough = b.rough
     if model.anisotropic:
@@ -71,10 +71,10 @@ def fuzz_lobe(model: _OpenPBR) -> Sheen:
 
 
 def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
-    """Factor on the rough diffuse lobe for a direction, under the base's surface or, if `coated`, the coat's too.
+    """Factor on the rough diffuse lobe for a direction, under the base's surface and, if `coated`, also the coat's.
 
-    The lobe scatters more light to some cosines than Lambert's, where those surfaces may transmit less. Its mean over
-    azimuth is known, and the factor makes a white base lossless to second order.
+    To some cosines, the lobe scatters more light than Lambert's lobe, and the surfaces may transmit less there than on
+    average. The lobe's mean over azimuth is known, and the factor makes a white base lossless to second order.
     """
     rough = model.base_diffuse_roughness
     lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
@@ -88,7 +88,7 @@ def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
 
 
 def coat_kept(model: _OpenPBR, w: Direction) -> Scalar:
-    """1 - E of the coat's surface; if anisotropic, as in `let_in`."""
+    """1 - E of the coat's surface for w; if it is anisotropic, as in `let_in`."""
     rough = model.coat_roughness
     if model.may_be_anisotropic("coat_roughness_anisotropy"):
         rough = rough_along(w, model.derived.coat_alpha, model.coat_ior)
@@ -103,7 +103,8 @@ def inside(model: _OpenPBR, cos: Scalar) -> Scalar:
 
 @function
 def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
-    """(1 - K) / (1 - E_b K), with K the fraction that the coat reflects back down, E_b the base's albedo from above."""
+    """The darkening under the coat, (1 - K) / (1 - E_b K): K is the fraction of the light from below that the coat
+    reflects back down, E_b the albedo of the base in the coat."""
     b = model.derived
     outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, model.coat_ior), model.coat_ior)
     broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(model.coat_ior)) / sqr(model.coat_ior)
@@ -118,11 +119,12 @@ def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
 
 
 def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
-    """(transmittance of the coat's surface, the coat's color for one crossing times the square root of the darkening,
-    factor on a lobe of facets, loss of a dielectric's facets relative to white ones), for a direction outside. The loss
-    arises because the facets reflect most at grazing angles, where the coat transmits least.
+    """Four values for a direction outside the coat: the transmittance of the coat's surface; the coat's color for one
+    crossing times the square root of the darkening; the factor on a lobe of facets; and the loss of a dielectric's
+    facets relative to white ones, which is due to their reflecting most at grazing angles, where the coat transmits
+    least.
 
-    The factor includes a last step of the iteration in `balanced`: for a mirror, it is exactly the square root of
+    The factor includes a last step of the iteration in `balanced`. For a mirror, it is exactly the square root of
     1 - E.
     """
     b, cos = model.derived, w.z
@@ -137,8 +139,10 @@ def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scal
 
 
 def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
-    """Factors on the base's facets and on its diffuse lobe, given the transmittances along the two directions; 1 where
-    no coat is on that side."""
+    """Factors of the coat on the lobe of the base's facets and on its diffuse lobe; 1 on a side without a coat.
+
+    let_in  transmittances of the base's surface along wo and wi
+    """
     C = model.coat_weight
     kept_o, tint_o, facet_o, less_o = under(model, pair.wo)
     if model.layering == "albedo":

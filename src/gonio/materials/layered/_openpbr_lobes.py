@@ -37,7 +37,7 @@ class Facets(NamedTuple):
 def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Mask | None = None) -> Spectrum:
     """The sum of all lobes of the covered part of the surface, times |cos theta_i|.
 
-    ideal  rays whose two directions are joined by smooth facets: their value is the weight of the delta lobe
+    ideal  rays whose two directions are connected by smooth facets; their value is the weight of the delta lobe
     """
     b = model.derived
     pair = sides(model, wo, wi)
@@ -111,7 +111,7 @@ def glass_lobes(
     mode: Mode,
     ideal: Mask | None,
 ) -> tuple[Spectrum, Spectrum, Spectrum]:
-    """(F, light reflected by glass, light transmitted by it) for a pair of directions, from either side."""
+    """F, the light reflected by glass, and the light transmitted by it, for a pair of directions, from either side."""
     cos, b, glass, T = facets.cos, model.derived, interface(model), model.transmission_weight
     white, above = ops.ones_like(model.base_color), wo.z > 0.0
     eta = glass._relative_eta(wo)
@@ -148,7 +148,7 @@ def interface(model: _OpenPBR) -> Dielectric:
 
 
 def sides(model: _OpenPBR, wo: Direction, wi: Direction) -> Sides:
-    """Both directions on the upper side; a thin wall is the same from both sides."""
+    """The pair mapped to the upper side. A thin wall is the same from both sides."""
     near = wo.z * wi.z > 0.0
     above = wo.z > 0.0
     valid = (wo.z != 0.0) & (wi.z != 0.0)
@@ -204,7 +204,7 @@ def scattered_twice(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode) -
 
 
 def missed(model: _OpenPBR, w: Direction) -> Spectrum:
-    """Energy lost by glass for a direction on either side."""
+    """The energy lost by single scattering in glass, for a direction on either side."""
     b = model.derived
     assert b.glass is not None and b.other is not None, "derived if light is transmitted"
     shares = tables.spared(abs(w.z), b.rough, b.eta, model.masking)

@@ -36,7 +36,8 @@ from ._openpbr_slabs import _OpenPBR
 
 
 class Shares(NamedTuple):
-    """Probabilities of the lobes: fuzz, coat, reflecting and refracting facets, and the cosine on each side."""
+    """Probabilities of the lobes: fuzz, coat, reflecting and refracting facets, and the cosine on wo's side (`near`)
+    and on the opposite side (`far`)."""
 
     fuzz: Scalar
     coat: Scalar
@@ -47,7 +48,7 @@ class Shares(NamedTuple):
 
 
 def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
-    """Probabilities by the approximate albedo of each lobe, plus a small constant, which bounds the weights."""
+    """Probabilities proportional to each lobe's approximate albedo plus a small constant, which bounds the weights."""
     b = model.derived
     o = upper(wo)
     cos = maximum(o.z, 1e-4)
@@ -191,7 +192,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
 def _transmitted(
     model: _OpenPBR, wo: Direction, o: Direction, m: Direction, mirrored: Direction
 ) -> tuple[Direction, Mask]:
-    """The direction refracted by a facet of normal m, and whether there is one."""
+    """The direction refracted by a facet with normal m, and whether there is one."""
     if model.geometry_thin_walled:
         return vec3(mirrored.x, mirrored.y, -mirrored.z), mirrored.z > 0.0
     b = model.derived

@@ -1,4 +1,4 @@
-"""The parameters of OpenPBR, the presence of its lobes, and the reflectances of its slabs."""
+"""The parameters of OpenPBR, tests for the presence of its lobes, and the reflectances of its slabs."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ LAYERINGS = {
 
 
 class _OpenPBR(BSDF):
-    """The parameters of OpenPBR and facts that do not depend on directions; `OpenPBR` adds the lobes."""
+    """The parameters of OpenPBR and facts that do not depend on directions. `OpenPBR` adds the lobes."""
 
     masking: ClassVar[str] = "smith-correlated"
 
@@ -62,7 +62,9 @@ class _OpenPBR(BSDF):
     base_metalness: Number = number(
         default=0.0, doc="fraction of the surface that is metal", low=0.0, high=1.0, off=0.0
     )
-    specular_weight: Number = number(default=1.0, doc="factor on F0 of the dielectric, F of metal", low=0.0, high=4.0)
+    specular_weight: Number = number(
+        default=1.0, doc="factor on F0 of the dielectric and on F of metal", low=0.0, high=4.0
+    )
     specular_color: Colour = spectrum(
         default=1.0, doc="tint of the outer reflection; for metal, the tint at the edge", low=0.0, high=1.0
     )
@@ -81,7 +83,7 @@ class _OpenPBR(BSDF):
         default=0.0, doc="distance after which light has `transmission_color`; 0 tints the surface", low=0.0, high=1e6
     )
     transmission_scatter: Colour = spectrum(
-        default=0.0, doc="volume scattering; must be 0, since no surface has it", low=0.0, inside=True
+        default=0.0, doc="volume scattering; must be 0, since surfaces have none", low=0.0, inside=True
     )
     transmission_scatter_anisotropy: Number = number(
         default=0.0, doc="anisotropy of the volume scattering", low=-1.0, high=1.0, inside=True
@@ -97,7 +99,7 @@ class _OpenPBR(BSDF):
     )
     subsurface_color: Colour = spectrum(default=0.8, doc="color of the subsurface scattering", low=0.0, high=1.0)
     subsurface_radius: Number = number(
-        default=1.0, doc="mean free path; other values than 0 are treated as 0, with a warning", low=0.0, inside=True
+        default=1.0, doc="mean free path; values other than 0 are treated as 0, with a warning", low=0.0, inside=True
     )
     subsurface_radius_scale: Colour = spectrum(
         default=(1.0, 0.5, 0.25), doc="factor on `subsurface_radius`, per channel", low=0.0, inside=True
@@ -172,8 +174,8 @@ class _OpenPBR(BSDF):
             warnings.warn(f"OpenPBR: {text}", GonioWarning, stacklevel=3)
 
     def has(self, name: str) -> bool:
-        """Whether a weight may differ from 0, as known statically: if so, the component's code is included. A recording
-        includes all components, since their weights are unknown."""
+        """Whether a weight may differ from 0, as known statically, so that the code of its component is included. A
+        recording includes all components, since their weights are unknown."""
         value = getattr(self.plain, name)
         if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
             return True
@@ -226,7 +228,7 @@ class _OpenPBR(BSDF):
 
     @function
     def widths(self, roughness: Scalar, anisotropy: Scalar) -> Pair:
-        """alpha along x and y, with squares that add up to twice roughness^4, limited to 1, where the tables end."""
+        """alpha along x and y. Their squares sum to 2 roughness^4; they are limited to 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
         # in a rough lobe, neither width may be tiny: a strip of 1e-4 is narrower than samples can resolve
@@ -234,7 +236,10 @@ class _OpenPBR(BSDF):
         return vec2(clamp(along, SMOOTH, 1.0), clamp(across, SMOOTH, 1.0))
 
     def smooth(self, alpha: Pair, name: str) -> Mask | None:
-        """Rays for which facets of these widths are a mirror; None if there are no such rays."""
+        """A mask of the rays for which facets of these widths are a mirror; None if there are no such rays.
+
+        name  the parameter from which the widths were computed
+        """
         return (alpha.x <= SMOOTH) & (alpha.y <= SMOOTH) if self.may_be_smooth(name) else None
 
     @function
@@ -246,10 +251,10 @@ class _OpenPBR(BSDF):
 
     @function
     def indices(self) -> tuple[Scalar, Scalar, Scalar]:
-        """(index for the base's reflection, index for its refraction, index of the medium above it).
+        """The index for the base's reflection, that for its refraction, and that of the medium above it.
 
-        The coat refracts light before it reaches the base, so a coat of higher index causes no total reflection; as
-        specified, the ratio is then inverted.
+        The coat refracts light before it reaches the base, so a coat with a higher index than the base causes no total
+        reflection; as specified, the ratio is then inverted.
         """
         base, coat = self.specular_ior, self.coat_ior
         ratio = base / coat
@@ -264,9 +269,9 @@ class _OpenPBR(BSDF):
     def film_change(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
         """Change of R by the film on a base of index eta + i k, relative to the medium, at a cosine outside.
 
-        It is R with the film minus R with a film of thickness 0 by the same formula. The base without the film has its
-        own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to Fresnel's
-        equations: with this difference, a film of thickness 0, or of the medium's index, changes nothing.
+        It is R with the film minus R with a film of thickness 0, both by the same formula. The base without the film
+        has its own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to
+        Fresnel's equations; due to the difference, a film of thickness 0, or of the medium's index, changes nothing.
         """
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
         thickness = 1000.0 * self.thin_film_thickness
@@ -313,7 +318,10 @@ class _OpenPBR(BSDF):
         return clamp(bare + added * self.thin_film_weight, 0.0, 1.0)
 
     def sheet(self, cos: Scalar, f: Spectrum, eta: Scalar) -> tuple[Spectrum, Spectrum]:
-        """Light that a thin sheet with face reflectance f reflects and transmits, all bounces included."""
+        """Fractions of the light that a thin sheet reflects and transmits, all bounces included.
+
+        f  reflectance of one face
+        """
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(eta))
         t = power(self.transmission_color, 1.0 / maximum(inner, 0.05))
         rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)

@@ -37,7 +37,8 @@ def _row(roughness: Scalar) -> Scalar:
 
 
 def _root_of(eta: Scalar) -> Scalar:
-    """The coordinate of an index in the tables: nodes are denser toward 1, where F varies fastest at grazing angles."""
+    """The coordinate of an index in the tables, whose nodes are denser toward 1, where F varies fastest at grazing
+    angles."""
     return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * MAX_ROOT_F0))
 
 
@@ -115,7 +116,7 @@ def _at_nodes(masking: str) -> _AtNodes:
 
 
 def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Fractions of the light that white facets scatter, by all bounces, to the neighborhoods of `HATS` cosines."""
+    """Fractions of the light that white facets scatter, by all bounces, to the neighborhoods of the `HATS` cosines."""
     table = _scattering(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -144,8 +145,8 @@ def _scattering(masking: str) -> Table:
 
 
 def _hats(x: np.ndarray) -> np.ndarray:
-    """Weights of the nodes at positions between them, (N, HATS): cubic (Catmull-Rom), since linear interpolation would
-    underestimate the mean of a concave transmittance; extrapolated linearly beyond the ends."""
+    """Weights of the nodes for interpolation at positions between them, (N, HATS). They are cubic (Catmull-Rom), since
+    linear interpolation would underestimate the mean of a concave transmittance, and linear beyond the ends."""
     d = np.abs(x[:, None] * (HATS - 1) - np.arange(-1, HATS + 1))
     near, far = 1.0 + d * d * (1.5 * d - 2.5), 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
     weights: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
@@ -157,7 +158,7 @@ def _hats(x: np.ndarray) -> np.ndarray:
 
 @lru_cache
 def means() -> list[float]:
-    """Weights of the `HATS` nodes in a cosine-weighted mean."""
+    """Weights of the `HATS` nodes for a cosine-weighted mean."""
     return _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
 
@@ -176,7 +177,7 @@ def prepare(masking: str) -> None:
 
 
 def shares_of(x: Array, places: list[float]) -> list[Array]:
-    """Lagrange polynomials: the weight at x of the value at each place."""
+    """Lagrange polynomials: the weights, for interpolation at x, of the values at `places`."""
     shares = []
     for n, here in enumerate(places):
         others = [one for m, one in enumerate(places) if m != n]
@@ -193,7 +194,7 @@ FROM_PLACES: list[list[float]] = np.array(
 
 
 def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Weight of the reflectance at each of `PLACES` in the albedo of facets at a cosine."""
+    """The weights with which the reflectance at each of `PLACES` contributes to the albedo of facets for a cosine."""
     table = _faced(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -217,8 +218,8 @@ def _faced(masking: str) -> Table:
 
 
 def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Transmitted minus reflected energy of glass facets per unit of reflectance at each of `FEW_PLACES` (cosines
-    outside): for light from outside, then from inside."""
+    """The derivative of the energy lost by glass facets with respect to the reflectance at each of `FEW_PLACES`
+    (cosines outside), which is transmitted minus reflected energy: for light from outside, then from inside."""
     table = _spared(masking)[0]
     at = [
         inset(x, count)

@@ -275,7 +275,7 @@ class Coat(BSDF):
 
     @property
     def fixed(self) -> frozenset[str]:
-        """The parameters on which the tables depend: all except the base's colors and the coat's absorption and depth."""
+        """The parameters on which the tables depend: all but colors of the base and the coat's absorption and depth."""
         numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
         return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
 

@@ -43,9 +43,9 @@ COAT_WIDTH = 0.25  # alpha of the coat's masking term, for any gloss (Burley2012
 class Pieces(NamedTuple):
     """The terms of the model, times cos theta_i.
 
-    diffuse   with retro-reflection at grazing angles, blended toward subsurface scattering
+    diffuse   diffuse lobe with retro-reflection at grazing angles, blended with the subsurface lobe
     specular  GTR2 lobe
-    sheen     Schlick's (1 - cos)^5 at the half vector
+    sheen     lobe proportional to Schlick's (1 - cos)^5 at the half vector
     coat      GTR1 lobe
     """
 
@@ -61,10 +61,11 @@ class Disney(BSDF):
     f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
     f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
 
-    D is GTR2 (GGX) with alpha = roughness^2, stretched by 1 / aspect with aspect^2 = 1 - 0.9 anisotropic. G is Smith's,
-    and F is Schlick's with F0 = 0.08 specular, tinted, or with the base color for metal. f_r is a second lobe, GTR1
-    with a width from 0.1 to 0.001 and F0 = 0.04. Tints are the base color divided by the mean of its channels (in the
-    paper, by its luminance).
+    base is `base_color`, and mix(a, b, x) = (1 - x) a + x b. f_d is the diffuse lobe, f_ss the lobe that approximates
+    subsurface scattering, and f_sheen that of the sheen. D is GTR2 (GGX) with alpha = roughness^2, stretched by
+    1 / aspect with aspect^2 = 1 - 0.9 anisotropic. G is Smith's, and F is Schlick's with F0 = 0.08 specular, tinted, or
+    with the base color for metal. f_r is a second lobe, GTR1 with a width from 0.1 to 0.001 and F0 = 0.04. Tints are
+    the base color divided by the mean of its channels (in the paper, by its luminance).
 
     The lobes are simply added, as artists preferred: at grazing angles, or if several parameters are large, the model
     reflects more light than it receives, while rough metal loses multiply scattered light. Reciprocal.
@@ -109,7 +110,7 @@ class Disney(BSDF):
         return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
 
     def lossless(self) -> Self:
-        """Itself: no values of the added lobes return all light."""
+        """The material itself: no parameter values make the sum of the lobes reflect exactly all light."""
         return self
 
     @function
@@ -210,7 +211,7 @@ class Disney(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the lobe."""
+        """A sample of the lobe that u.x selects."""
         o = where(wo.z > 0.0, wo, frame.normal_like(wo))
         shares = self._shares(o)
         wo_local = frame.rotate(o, self.rotation)

@@ -25,7 +25,7 @@ STRETCH = 0.9  # amount of stretch at `anisotropic` = 1
 
 
 class _Slabs(OpenPBR):
-    """OpenPBR with a coat that does not change the index or width of its base: the base appears unchanged."""
+    """OpenPBR with a coat that changes neither the index nor the width of its base."""
 
     name: ClassVar[str] = ""
 
@@ -54,18 +54,18 @@ class _Slabs(OpenPBR):
 class DisneyBSDF(BSDF):
     """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls by one parameter set.
 
-    The parameters are those of Burley2015, which has those of `disney` with the index in place of `specular`, and
-    `spec_trans` for glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the
-    lobes of the paper: GGX with alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic). F follows from the index;
-    for metal, it is Schlick's approximation with the base color. Glass is tinted by the square root of the base color
-    at each crossing. Terms that the paper adds are layered here, so no energy is gained, and multiple scattering
-    between facets is included. The slabs are those of `openpbr` and obey the same laws.
+    The parameters are those of Burley2015: those of `disney` with the index in place of `specular`, `spec_trans` for
+    glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the lobes of the paper:
+    GGX with alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic). F follows from the index; for metal, it is
+    Schlick's approximation with the base color. Glass is tinted by the square root of the base color at each crossing.
+    Terms that the paper adds are layered here, so no energy is gained, and multiple scattering between facets is
+    included. The slabs are those of `openpbr` and obey the same laws.
 
-    Differences from the paper: the diffuse lobe is `eon` of the same roughness under the dielectric (the lobe of the
-    paper has its own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert); sheen is the `sheen` of
-    fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are the base color
-    divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection. docs/openpbr.md
-    states how large these differences are.
+    The differences from the paper are: the diffuse lobe is `eon` of the same roughness under the dielectric (the lobe
+    of the paper has its own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert); sheen is the
+    `sheen` of fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are the
+    base color divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection.
+    docs/openpbr.md states how large these differences are.
     """
 
     name: ClassVar[str] = "disney2015"
@@ -246,5 +246,5 @@ class DisneyBSDF(BSDF):
 
 
 def _some(value: object) -> bool:
-    """Whether a parameter may differ from 0."""
+    """Whether the value of a parameter may differ from 0."""
     return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))

@@ -1,4 +1,4 @@
-"""Light between a coat and the material below: the interreflections of base and coat.
+"""Interreflections between a coat and the base below it.
 
 When the base scatters light along w, the fraction T(w) t(w) of it leaves the coat, and the fraction
 k(w) = (1 - T(w)) t(w)^2 returns to the base, mirrored. T is the transmittance of the interface from inside, and t is
@@ -17,8 +17,9 @@ for any color by which the rest of the base varies.
 
 The light that leaves toward o is then divided into two terms whose sum is exact:
 
-    lobe         the base's own, refracted, times the largest factor for which it does not exceed this light at any o.
-                 Over Lambert it is all of the light (Saunderson1942), for a narrow lobe under a smooth coat nearly all
+    lobe         the base's own lobe, refracted, times the largest factor for which it does not exceed this light at any
+                 o. This is all of the light for a Lambertian base (Saunderson1942), and nearly all of it for a narrow
+                 lobe under a smooth coat
     rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, which is reciprocal like Kulla-Conty's
 
 Both terms are tables over the color a and over u, the transmittance of one crossing at normal incidence.
@@ -62,11 +63,13 @@ EPSILON = 1e-9
 class LayerTables(NamedTuple):
     """The coat's interior as tables.
 
-    coat     over the square root of the cosine outside, 0 to 1: the albedo R of the interface, the fraction of the
+    coat     as a function of the square root of the cosine outside: the albedo R of the interface, the fraction of the
              base's samples to be replaced by a cosine, the transmittance of a rough interface for the base's lobe, and
              `_Interface.beyond`
-    rest     over that root, `colour_place` and `left_place`: the separable lobe divided by a u^2; None if there is none
-    bounced  over the latter two: 1 / factor of the lobe, and the norm of the separable lobe divided by a u^2
+    rest     as a function of that root, `colour_place` and `left_place`: the separable lobe divided by a u^2; None if
+             there is none
+    bounced  as a function of the latter two: 1 / factor of the lobe, and the norm of the separable lobe divided by
+             a u^2
     """
 
     coat: Table
@@ -87,7 +90,7 @@ def left_place(u: Array) -> Array:
 
 
 class Coated(Protocol):
-    """The attributes of a coat that this module reads: plain values."""
+    """The attributes of a coat that this module reads, as plain values."""
 
     base: BSDF
     index: object
@@ -127,8 +130,8 @@ def _bright(coat: BSDF) -> BSDF:
 
 
 def colour_of(base: BSDF, up: Direction) -> Spectrum:
-    """a: the tint of a bound base at normal incidence, divided by that of its lossless variant; for a base that is its
-    own lossless variant, divided by its brightest channel."""
+    """a, the tint of a bound base at normal incidence, divided by that of its lossless variant or, for a base that is
+    its own lossless variant, by its brightest channel."""
     tint = base.tint(up)
     white = base.lossless()
     if white is base:
@@ -144,7 +147,7 @@ def _colors(base: BSDF) -> Floats:
 
 
 def find(coat: Coated) -> LayerTables:
-    """The tables of a coat with uniform values, all albedos of which are 1."""
+    """Compute the tables of a coat with uniform values, all of whose albedos are 1."""
     index = float(coat.index)  # type: ignore[arg-type]
     outside = np.linspace(0.0, 1.0, NODES) ** 2
     face = _interface(coat, index)
@@ -175,11 +178,11 @@ class _Curve(Protocol):
 class _Interface(NamedTuple):
     """The coat's surface.
 
-    reflected  R from outside, by the cosine outside
-    out        T from inside, by the position (`_places`)
+    reflected  R from outside, as a function of the cosine outside
+    out        T from inside, as a function of the position (`_places`)
     beyond     R without the facets' first reflection, scaled so that beyond(o) beyond(i) is the lobe of this light
     entering   for `ROUGH` positions outside, weights, cosines and positions of samples inside; None if it is smooth
-    returning  the same for the positions inside, of light that is reflected back
+    returning  the same for positions inside, for the light that is reflected back
     """
 
     reflected: _Curve
@@ -189,7 +192,7 @@ class _Interface(NamedTuple):
     returning: tuple[Floats, Floats, Floats] | None
 
     def lobe(self, x: Floats) -> Floats:
-        """The transmittance for the base's lobe for each direction: the geometric mean of those inward and outward."""
+        """The transmittance for the base's lobe, per direction: the geometric mean of those inward and outward."""
         crossing: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, EPSILON))))
         return crossing
 
@@ -241,14 +244,15 @@ def _interface(coat: Coated, index: float) -> _Interface:
 
 
 def _directions(mu: Floats, lattice: Floats) -> Floats:
-    """Directions of each cosine at the lattice's azimuths, (len(mu) * len(lattice), 3)."""
+    """Directions with each cosine at each azimuth of the lattice, (len(mu) * len(lattice), 3)."""
     phi, sin = np.tile(2.0 * np.pi * lattice[:, 3], len(mu)), np.repeat(np.sqrt(1.0 - mu**2), len(lattice))
     return frame.spherical_array(sin, np.repeat(mu, len(lattice)), phi)
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
-    """(positions, cosines inside) of the nodes. Positions from 0 to 1 are the square root of the cosine outside, for
-    light that can leave, whose amount varies fast at grazing angles; those from -1 to 0 are for total reflection."""
+    """The positions of the nodes, and their cosines inside. Positions from 0 to 1 are the square root of the cosine
+    outside, for light that can leave, whose amount varies fast at grazing angles; those from -1 to 0 are for light that
+    is totally reflected."""
     place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
@@ -265,12 +269,13 @@ def _place_of(cosine: Floats, index: float) -> Floats:
 
 
 class _Draws(NamedTuple):
-    """Samples of the lossless base for light inside.
+    """Samples of the lossless base for light inside the coat.
 
     place, mu           positions and cosines of the nodes
-    weight              of each sample at each node (nodes, POINTS)
-    cosine, position    of the sampled directions
-    colors, share       black, the base's channels and white, ascending; the factor on each sample's weight for each
+    weight              weight of each sample at each node, (nodes, POINTS)
+    cosine, position    cosines and positions of the sampled directions
+    colors              black, the base's channels and white, in ascending order
+    share               factor on each sample's weight, for each of these colors
     """
 
     place: Floats
@@ -283,8 +288,8 @@ class _Draws(NamedTuple):
 
 
 def _drawn(base: BSDF, index: float) -> _Draws:
-    """Samples of the lossless base from the nodes, over all azimuths. A base that is its own lossless variant is
-    normalized to its brightest channel."""
+    """Samples of the lossless base for light from the nodes' directions, over all azimuths. A base that is its own
+    lossless variant is normalized to its brightest channel."""
     white = base.lossless()
     place, mu = _places(index)
     lattice = r_sequence(POINTS, 4)
@@ -319,7 +324,7 @@ class _Sum(NamedTuple):
 
 
 def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: float) -> _Sum:
-    """The sum of the series, divided into lobe and rest."""
+    """The sum of the series at one u, divided into lobe and rest, for each color."""
     n = len(draws.place)
     out, t = face.out(draws.position), u ** (1.0 / draws.cosine)
     out = np.where((draws.position <= 0.0) & (face.entering is None), 0.0, out)
@@ -372,7 +377,7 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: fl
 
 
 def _continued(values: list[Floats]) -> Floats:
-    """The values at each u, along the last axis, extended linearly by one node."""
+    """The values at each u, stacked along the last axis and extrapolated linearly by one node."""
     return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
 
 

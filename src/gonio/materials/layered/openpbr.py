@@ -23,16 +23,19 @@ class OpenPBR(_OpenPBR):
     f = opacity {F f_fuzz + (1 - F E_fuzz) [C f_coat + (1 - C + C T W D) f_base]} + the light passing straight through
     f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse}, where opaque
 
-    F, C and M are the weights of fuzz, coat and metal, E is the albedo of a rough dielectric, T the color of the coat
-    for the two crossings, and D the darkening by interreflection under the coat. W is the transmittance of the coat's
-    surface: depending on `layering`, 1 - E_coat(wo), as in the specification's reduction of layers to lobes, or a
-    product of one factor per direction that conserves all light of a white base (docs/openpbr.md). f_diffuse is `eon`,
-    f_fuzz is `sheen`, metal is F82 with multiple scattering, and glass is `dielectric` with multiple scattering.
+    F, C and M are the weights of fuzz, coat and metal, `opacity` is `geometry_opacity`, and f_X is the lobe of X. E is
+    an albedo: E_fuzz is that of the fuzz for wo, E_coat that of the coat's surface, E_o and E_i are those of the base's
+    rough dielectric surface for wo and wi, and E_avg is its cosine-weighted mean. T is the color of the coat for the
+    two crossings, along wo and wi, and D is the darkening by interreflection under the coat. W is the transmittance of
+    the coat's surface for both crossings: depending on `layering`, 1 - E_coat(wo), as in the specification's reduction
+    of layers to lobes, or a product of one factor per direction that conserves all light of a white base
+    (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82 with multiple scattering, and glass is
+    `dielectric` with multiple scattering.
 
     The parameters are those of the specification. Below a roughness of 0.01, base and coat are mirrors. Indices range
     from 1 to 5. Subsurface scattering is local: with `geometry_thin_walled` it is as specified; otherwise it is a
     diffuse lobe of its color, the limit of radius 0, with a warning. Volume scattering, dispersion and emission raise
-    an InputError, since they are not properties of a surface. transmission_depth > 0 causes absorption inside, which
+    InputError, since they are not properties of a surface. transmission_depth > 0 causes absorption inside, which
     Gonio's integrators apply.
     """
 
@@ -44,7 +47,8 @@ class OpenPBR(_OpenPBR):
         return derived.derive(self)
 
     def _with_derived(self) -> Self:
-        """A copy that stores its derived values if they differ from ray to ray, since they are used in many places."""
+        """A copy that stores its derived values even if they differ from ray to ray, since they are used in many
+        places."""
         if self._derived is not None:
             return self
         derived = binding.evaluate_derived(self, MAX_RAYS) if self.wavelengths is None else None
@@ -67,7 +71,7 @@ class OpenPBR(_OpenPBR):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects the lobe."""
+        """A sample of the lobe that u.x selects."""
         return sampling.drawn(self._with_derived(), wo, u, mode)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {

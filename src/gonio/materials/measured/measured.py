@@ -16,15 +16,15 @@ from ...ops import Direction, Mode, Scalar, Spectrum, where
 class Measured(BSDF):
     """A table of measured values, interpolated in its own coordinates (course notes, part B).
 
-    Reads MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), networks (.npz, as
-    FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not corrected: negative values
-    remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal is not made so. Reflection
+    Reads MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), neural networks (.npz,
+    as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not corrected: negative
+    values remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal remains so. Reflection
     only; black from below. A table is sampled by its own densities (RGL) or by a density computed from its values.
     """
 
     file: str = file(
         default=SAMPLE,
-        doc="file of measured values; `FILE:ITEM` selects one of several in a file; `sample` is included in Gonio",
+        doc="file of measured values; `FILE:ITEM` selects one of several in a file; `sample` is part of Gonio",
     )
     only_rgb: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -65,7 +65,7 @@ class Measured(BSDF):
 
     @property
     def table(self) -> Measurement:
-        """The table that `file` contains."""
+        """The table read from `file`."""
         table: Measurement = vars(self)["_table"]
         return table
 

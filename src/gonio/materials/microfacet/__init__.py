@@ -1,1 +1,1 @@
-"""Metals and glass as microfacets with a distribution, a masking term and a Fresnel reflectance."""
+"""Metals and glass: microfacet models with a distribution of normals, a masking term and a Fresnel reflectance."""

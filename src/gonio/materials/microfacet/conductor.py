@@ -19,8 +19,8 @@ from .reflector import _Reflector
 class Conductor(_Reflector):
     """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
 
-    D, G and F are chosen by name. With alpha below 1e-4, the surface is a perfect mirror. Light that would be scattered
-    more than once is lost: more than half of the light at alpha = 1.
+    D, G and F are chosen by name (`ndf`, `masking`, `fresnel`). For alpha below 1e-4, the surface is a perfect mirror.
+    Light that would be scattered more than once is lost: more than half of the light at alpha = 1.
     """
 
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, relative to the outside", low=0.0)
@@ -43,7 +43,7 @@ class Conductor(_Reflector):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """albedo times F, by the name of its formula, at the cosine of incidence on a facet."""
+        """`albedo` times F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
         return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
     def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:
@@ -51,14 +51,14 @@ class Conductor(_Reflector):
         return reflected_by_metal(cos_theta, self.eta, self.k)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All light, polarized by the exact equations; the chosen Fresnel kind affects only its amount."""
+        """All light, polarized according to the exact equations; the chosen Fresnel kind affects only its amount."""
         m = frame.half_vector(wo, wi)
         cos = abs(dot(wo, m))
         value = where(delta, self.reflectance(cos), self.eval(wo, wi, mode))
         return (Polarized(value, m, self._polarization(cos)),)
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """F_avg of the chosen Fresnel kind, or by the fit `artist.imageworks`."""
+        """F_avg of the chosen Fresnel kind, or of the fit `artist.imageworks`."""
         kind = fresnel.kind(self.fresnel)
         if average == "imageworks" and not kind.white:
             return imageworks(*edge_tint(self.eta, self.k))

@@ -24,15 +24,15 @@ from .microfacet import Terms
 
 
 class _Facet(NamedTuple):
-    """The facet that joins a pair of directions by reflection or refraction.
+    """The facet that reflects or refracts one direction of a pair into the other.
 
     wo, wi        the pair, in the frame of the anisotropy
     m             normal of the facet, m.z >= 0
     dot_o, dot_i  o.m and i.m
     reflects      whether wi lies on wo's side
-    lit           whether the pair lies in a rough lobe
+    lit           whether a rough lobe has light for the pair
     alpha         widths along x and y
-    spread        |o.m| dm/dwi (Walter2007, eq. 14); for refraction (eq. 17) divided by eta^2
+    spread        |o.m| dm/dwi (Walter2007, eq. 14); for refraction (eq. 17), divided by eta^2
     """
 
     wo: Direction
@@ -49,17 +49,19 @@ class _Facet(NamedTuple):
 class Dielectric(microfacet._Microfacet):
     """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
 
-    With eta = eta_i / eta_o (the indices on the sides of wi and wo) and the facet's normal m along +-(wo + eta wi):
+    With eta = eta_i / eta_o (the indices on the sides of wi and wo) and the facet's normal m along +-(wo + eta wi),
     f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2). This is the form for radiance, with the
-    factor 1 / eta^2 for the change of radiance on refraction; the mode "importance" omits this factor. With alpha below
-    1e-4, the glass is smooth; with eta = 1, there is no surface. `transmission=False` keeps only the reflection.
+    factor 1 / eta^2 for the change of radiance on refraction; the mode "importance" omits this factor. For alpha below
+    1e-4, the glass is smooth; for eta = 1, there is no surface. With `transmission=False`, light is only reflected.
 
     Absorption inside (`absorption`, by the Beer-Lambert law exp(-absorption length)) and the choice among overlapping
     media (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
     depends on them.
     """
 
-    eta: Index = index(default=1.5, doc="index inside divided by index outside, or a substance", low=0.2, high=5.0)
+    eta: Index = index(
+        default=1.5, doc="index inside divided by index outside, or the name of a substance", low=0.2, high=5.0
+    )
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
     ndf: Member = microfacet.ndf_choice()
@@ -72,7 +74,7 @@ class Dielectric(microfacet._Microfacet):
         default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
-        default=0.0, doc="where media overlap, the highest counts", low=-1e6, high=1e6, inside=True
+        default=0.0, doc="where media overlap, that of highest priority is present", low=-1e6, high=1e6, inside=True
     )
 
     preset_kind: ClassVar[str] = "medium"
@@ -85,7 +87,8 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """F, by the name of its formula, at cosines of incidence cos_o and transmission cos_t (0: total reflection)."""
+        """F by the formula that `fresnel` names, at the cosines of incidence, cos_o, and of transmission, cos_t (0 for
+        total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
@@ -102,8 +105,8 @@ class Dielectric(microfacet._Microfacet):
         return where(h.z < 0.0, -h, h)
 
     def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
-        """The facet that joins a pair of directions, in the frame of the anisotropy; rotated last, see
-        `_Reflector._facet`."""
+        """The facet that reflects or refracts one direction into the other, in the frame of the anisotropy. The
+        rotation is applied last, as in `_Reflector._facet`."""
         m = self._normal(wo, wi, eta)
         wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
         alpha, smooth = self._widths()
@@ -136,7 +139,7 @@ class Dielectric(microfacet._Microfacet):
         return g
 
     def _value(self, facet: _Facet) -> Scalar:
-        """`eval` for radiance, without albedo and F."""
+        """`eval` for radiance, without the albedo and F."""
         d_g = distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet)
         facets = safe_div(d_g, abs(facet.wo.z))
         return where(facet.lit, facets * facet.spread, 0.0)
@@ -155,7 +158,7 @@ class Dielectric(microfacet._Microfacet):
         return f if self.transmission else ones_like(f)
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
-        """albedo times F or 1 - F of the chosen lobe, divided by the probability of choosing it, which cancels F."""
+        """`albedo` times F or 1 - F of the chosen lobe, divided by the probability of that lobe, which cancels F."""
         return self.albedo if self.transmission else self.albedo * self._reflectance_at(facet, eta)
 
     @method
@@ -178,8 +181,8 @@ class Dielectric(microfacet._Microfacet):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A normal first, then u1 selects reflection with probability F; a direction on the wrong side is a failed
-        sample."""
+        """A normal is sampled first, then u.x selects reflection with probability F. A direction on the wrong side is a
+        failed sample."""
         wo_local = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
@@ -207,7 +210,7 @@ class Dielectric(microfacet._Microfacet):
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All light, polarized by the exact equations; the chosen Fresnel kind affects only its amount."""
+        """All light, polarized according to the exact equations; the chosen Fresnel kind affects only its amount."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
         m = where(delta, frame.normal_like(wo), m)  # equal indices: light goes straight on, no normal
@@ -236,7 +239,8 @@ class Dielectric(microfacet._Microfacet):
         return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Pair, Mask]:
-        """(widths, whether the surface is smooth); with equal indices it is, as light passes straight through."""
+        """The widths, and whether the surface is smooth. It is also smooth for equal indices, since light then passes
+        straight through."""
         alpha, smooth = widths(self.alpha)
         if self.transmission:
             smooth = smooth | (abs(self.eta - 1.0) < MATCHED)
@@ -278,7 +282,8 @@ class Dielectric(microfacet._Microfacet):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """That of smooth glass: `albedo`, since nothing else is absorbed; without transmission, `albedo` times F."""
+        """The albedo of smooth glass: `albedo`, since nothing else is absorbed, or without transmission `albedo` times
+        F; None for rough glass."""
         if self.delta != "always":
             return None
         albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))

@@ -60,7 +60,7 @@ class FilmConductor(Conductor):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """albedo times F of the film, at the cosine of incidence on a facet."""
+        """`albedo` times F of the film at the cosine of incidence on a facet."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * film.reflectance(cos_theta, self._film())
@@ -72,7 +72,7 @@ class FilmConductor(Conductor):
         return film.polarization(cos_theta, self._film())[0]
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """F_avg by quadrature, whatever `average` is; its ten angles resolve films up to about 1 um."""
+        """F_avg by quadrature, for any `average`; its ten angles resolve films up to about 1 um."""
         if self.fresnel == "one":
             return ones_like(self.eta)
         one = ones_like(self.film_eta)

@@ -51,7 +51,7 @@ class FilmDielectric(Dielectric):
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
-        """F of the film at the cosine of incidence cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F of the film at the cosines of incidence, cos_o, and of transmission, cos_t (0 for total reflection)."""
         white = ones_like(self.albedo)
         if self.fresnel == "one":
             return white * ones_like(cos_o)
@@ -59,7 +59,8 @@ class FilmDielectric(Dielectric):
         return where(cos_t > 0.0, filmed, white)
 
     def _inside(self, eta: Scalar) -> Mask:
-        """Whether light comes from inside the glass; eta is the index on the far side divided by the near side's."""
+        """Whether light comes from inside the glass, by eta, the index on the far side divided by that on the near
+        side."""
         return (eta - 1.0) * (self.eta - 1.0) < 0.0
 
     def _film(self) -> film.Film:
@@ -84,7 +85,8 @@ class FilmDielectric(Dielectric):
     def _polarization(  # type: ignore[override]
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-        """As in `Dielectric`; from inside by the Stokes relations: equal amounts, with the phases of time reversal."""
+        """As in `Dielectric`; from inside, by the Stokes relations, with equal amounts and the phases of time
+        reversal."""
         inside = self._inside(eta)
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         back, _ = film.polarization(where(inside, cos_t, cos_o), self._film())
@@ -115,5 +117,5 @@ class FilmDielectric(Dielectric):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """That of smooth glass; None without transmission."""
+        """The albedo of smooth glass; None without transmission."""
         return super().known_albedo(mu, phi, inner, nodes) if self.transmission else None

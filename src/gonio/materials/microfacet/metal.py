@@ -21,9 +21,9 @@ class Metal(_Reflector):
     """Rough metal with artist-friendly parameters: a color at normal incidence, and a tint at the edge (F82-tint,
     Kutz2021).
 
-    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times the value of Schlick's curve there,
-    so an edge of 1 gives Schlick's curve; at 90 degrees, F = 1. This is the metal of OpenPBR. It has no refractive
-    index: thin films and polarization require a `conductor`.
+    f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence, F = `edge` times the value of Schlick's curve at
+    82 degrees, so that an edge of 1 gives Schlick's curve, and F = 1 at 90 degrees. This is the metal of OpenPBR. It
+    has no refractive index: thin films and polarization require a `conductor`.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -45,7 +45,7 @@ class Metal(_Reflector):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """albedo times F, at the cosine of incidence on a facet."""
+        """`albedo` times F at the cosine of incidence on a facet."""
         if self.fresnel == "one":
             return self.albedo * ones_like(cos_theta)
         return self.albedo * self._curve(cos_theta)
@@ -54,7 +54,7 @@ class Metal(_Reflector):
         return f82(cos_theta, self.r0, self.edge * schlick(GRAZING, self.r0))
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
-        """F_avg, the integral of the curve, whatever `average` is."""
+        """F_avg, the integral of the curve, for any `average`."""
         if self.fresnel == "one":
             return ones_like(self.r0)
         return mean_over_angles(self._curve)

@@ -41,8 +41,8 @@ def alpha_width() -> Width:
 
 
 def rotation_angle() -> Angle:
-    """Declare the rotation of the anisotropy's axes."""
-    return angle(default=0.0, doc="rotation of the anisotropy's axes about the normal, from dp/du")
+    """Declare the rotation of the axes of anisotropy."""
+    return angle(default=0.0, doc="rotation of the axes of anisotropy about the normal, from dp/du")
 
 
 def ndf_choice() -> Member:
@@ -64,12 +64,12 @@ def fresnel_choice() -> Member:
 
 
 def sampling_choice() -> str:
-    """Declare which normals are sampled."""
+    """Declare the choice of the normals to be sampled."""
     return choice("visible", "which normals are sampled", SAMPLINGS)
 
 
 def albedo_factor(doc: str) -> Colour:
-    """Declare the factor on all scattered light."""
+    """Declare the factor on all scattered light, with a given documentation."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
 
@@ -94,7 +94,7 @@ class _Microfacet(BSDF):
         return delta_of(self.plain.alpha)
 
     def _roughness(self) -> tuple[Pair, Mask]:
-        """Widths of the distribution, and where the surface is smooth."""
+        """Widths of the distribution, and a mask of the rays for which the surface is smooth."""
         return widths(self.alpha)
 
     def _one(self) -> Scalar:
@@ -103,7 +103,7 @@ class _Microfacet(BSDF):
 
     @property
     def _turn(self) -> Pair | None:
-        """The rotation of the anisotropy's axes, as `frame.rotate` takes it."""
+        """The rotation of the axes of anisotropy, as an argument of `frame.rotate`."""
         return self.rotation
 
     @property
@@ -118,7 +118,7 @@ class _Microfacet(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """That of a smooth surface: the weight of its only sample; None for a rough surface."""
+        """The albedo of a smooth surface, the weight of its only sample; None for a rough surface."""
         if self.delta != "always":
             return None
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
@@ -138,18 +138,20 @@ def delta_of(alpha: object) -> Delta:
 
 @function
 def upper(w: Direction) -> Direction:
-    """w if above the surface, else -w: a facet seen from behind along -w looks the same as from the front along w."""
+    """w if it lies above the surface, else -w, from which the front of a facet looks like its back from w."""
     return where(w.z < 0.0, -w, w)
 
 
 def _bounded(model: _Microfacet) -> bool:
-    """Whether the bound on reflections may be used: an excluded facet could still transmit."""
+    """Whether `sample_bounded` may be used: not if the material transmits, since the facets that it excludes could
+    still transmit."""
     return model.sampling == "bounded" and not model.transmits
 
 
 @function
 def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-    """A normal (m.z > 0) by the model's `sampling`; a wo below the surface sees its facet from behind."""
+    """A normal (m.z > 0) sampled by the method that the model's `sampling` names; from a wo below the surface, facets
+    are seen from behind."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return ndf.sample(u1, u2, alpha)

@@ -15,12 +15,13 @@ class _Reflector(microfacet._Microfacet):
     """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass defines `reflectance` and `mean_reflectance`."""
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """albedo times F, at the cosine of incidence on a facet."""
+        """`albedo` times F at the cosine of incidence on a facet."""
         raise NotImplementedError(f"{type(self).__name__} has no reflectance")
 
     def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
-        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether the pair lies in a rough
-        lobe), in the frame of the anisotropy; rotated last, as wo + wi would magnify rounding errors of the rotation.
+        """wo, wi, the normal m of the facet that mirrors one into the other, the widths, and whether a rough lobe has
+        light for the pair. The directions are in the frame of the anisotropy; m is computed before the rotation, whose
+        rounding errors wo + wi would magnify.
         """
         m = frame.half_vector(wo, wi)
         alpha, smooth = self._roughness()

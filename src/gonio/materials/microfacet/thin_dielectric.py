@@ -28,9 +28,9 @@ BOUNCES = {
 class _Sheet(NamedTuple):
     """Reflection and transmission by a sheet, all bounces included.
 
-    s, p    reflectance of each polarization
-    cross   product of the two reflected fields
-    passed  product of the two transmitted fields
+    s, p    reflectances of the two polarizations
+    cross   product of the two reflected amplitudes
+    passed  product of the two transmitted amplitudes
     """
 
     s: Scalar
@@ -43,10 +43,11 @@ class ThinDielectric(BSDF):
     """A thin sheet of clear glass, such as a window pane. Light that is not reflected passes straight through (PBRT4,
     sec. 9.5).
 
-    Light bounces between the two faces: R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and T' = 1 - R'. The sheet is
-    thicker than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its values
-    for the two polarizations, 0.152 at 60 degrees for an index of 1.5. `bounces="mean"` computes R' from the mean R
-    instead, 0.164, as do renderers without polarization.
+    With R the reflectance of one face and T = 1 - R, light that bounces between the two faces gives the sheet the
+    reflectance R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R) and the transmittance T' = 1 - R'. The sheet is thicker
+    than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its values for the
+    two polarizations, 0.152 at 60 degrees for an index of 1.5. `bounces="mean"` computes R' from the mean R instead,
+    0.164, as do renderers without polarization.
     """
 
     eta: Number = number(default=1.5, doc="index of the sheet, relative to its surroundings", low=0.2, high=5.0)
@@ -63,7 +64,7 @@ class ThinDielectric(BSDF):
 
     @function
     def reflectance(self, cos: Scalar) -> Scalar:
-        """R' at a cosine, from either side."""
+        """R' at a cosine of incidence, from either side."""
         cos_t = fresnel.cos_transmitted(cos, self.eta)
         if self.fresnel == "exact" and self.bounces == "polarized":
             sheet = self._sheet(cos, cos_t)
@@ -90,7 +91,7 @@ class ThinDielectric(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 selects reflection with probability R'; otherwise the direction is -wo."""
+        """u.x selects reflection with probability R'; otherwise the direction is -wo."""
         share = self.reflectance(abs(wo.z))
         reflects = u.x < share
         one = ones_like(wo.z)
@@ -99,7 +100,7 @@ class ThinDielectric(BSDF):
         return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All light; none for `bounces="mean"`, where polarization is lost between the bounces."""
+        """All light; for `bounces="mean"` none, since polarization is lost between the bounces."""
         if self.bounces == "mean":
             return ()
         cos = abs(wo.z)

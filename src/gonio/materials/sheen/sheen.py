@@ -23,9 +23,9 @@ from ...optics.warp import square_to_cosine_hemisphere
 
 
 class Layer(NamedTuple):
-    """The transformed cosine for a wo: M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) maps it back to the cosine.
+    """The transformed cosine for one wo, which M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) maps back to the cosine.
 
-    A, B  entries of the matrix
+    A, B  entries of M^-1
     R     albedo of the layer for wo
     """
 
@@ -74,7 +74,7 @@ class Sheen(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """albedo R D, the lobe times its albedo."""
+        """albedo R D, the density of the lobe times its albedo."""
         lobe = self._lobe(wo)
         return self.albedo * (lobe.R * self._density(lobe, wo, wi))
 
@@ -85,7 +85,7 @@ class Sheen(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """M applied to a direction of the cosine: every weight is albedo R."""
+        """M applied to a cosine-weighted direction; every weight is albedo R."""
         lobe = self._lobe(wo)
         h = square_to_cosine_hemisphere(u.y, u.z)
         wi = vec3(h.x - lobe.B * h.z, h.y, lobe.A * h.z)
@@ -110,6 +110,6 @@ class Sheen(BSDF):
 
 @lru_cache(maxsize=1)
 def _table() -> ops.Table:
-    """A, B and R, over roughness and mu."""
+    """The table of A, B and R as functions of roughness and mu."""
     text = Path(__file__).with_name("zeltner2022.json").read_text()
     return ops.Table("sheen", np.array(json.loads(text)["coefficients"]))

@@ -25,12 +25,12 @@ class SheenCharlie(BSDF):
     """Cloth of upright fibers: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
 
     D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), which has its peak at the horizon instead of the normal
-    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with Lambda = exp L by the fit of the paper
+    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with mu = cos theta and Lambda = exp L(mu), where the paper fits L
 
     The softened terminator of the paper is omitted, because it is not reciprocal. There is no Fresnel term, and only
     single scattering: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a thousandth at
     alpha = 0.1. The rest passes to the cloth below, which this model does not include. This is the sheen of glTF, with
-    alpha the square of glTF's roughness. Below alpha = 0.07, the fit reflects more light than it receives near the
+    alpha the square of glTF's roughness. For alpha below 0.07, the model reflects more light than it receives near the
     horizon. Sampled by a guide.
     """
 
@@ -56,7 +56,7 @@ class SheenCharlie(BSDF):
 
     @function
     def _lambda(self, mu: Scalar) -> Scalar:
-        """exp L(mu) below mu = 1/2, exp(2 L(1/2) - L(1 - mu)) above."""
+        """Lambda: exp L(mu) for mu < 1/2, else exp(2 L(1/2) - L(1 - mu))."""
         low = mu < 0.5
         at = self._exponent(where(low, mu, 1.0 - mu))
         return exp(where(low, at, 2.0 * self._exponent(0.5 + ops.zeros_like(mu)) - at))
@@ -88,7 +88,7 @@ class SheenCharlie(BSDF):
 
 
 def _gain(model: SheenCharlie) -> float:
-    """The excess of the albedo above 1 at the worst angle, measured at 40 widths and 60 angles, plus a tenth."""
+    """The largest excess of the albedo above 1, measured at 40 widths and 60 angles, plus a tenth of it."""
     alpha = float(np.min(np.asarray(model.alpha)))
     return float(np.interp(alpha, GAINS[0], GAINS[1])) * float(np.max(np.asarray(model.albedo)))
 

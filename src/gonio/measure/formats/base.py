@@ -31,7 +31,7 @@ class Format:
     several: ClassVar[bool] = False  # whether a file holds several materials
 
     def fits(self, data: bytes) -> bool:
-        """Whether a file with a suffix of this format is of this format, for formats that share a suffix."""
+        """Whether a file's contents are of this format; called if several formats share the file's suffix."""
         return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:

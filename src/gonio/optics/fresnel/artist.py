@@ -1,4 +1,4 @@
-"""Artist-friendly parameters of metals, reflectivity and edge tint, and a fit of F_avg as a function of them."""
+"""Artist-friendly parameters of metals, reflectivity and edge tint, and a fit of F_avg to these parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AVERAGES = {
 
 
 def edge_tint(eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
-    """(r, g): reflectivity at normal incidence and edge tint of a metal (Gulbrandsen2014, eq. 3 solved for g)."""
+    """The reflectivity r at normal incidence and the edge tint g of a metal (Gulbrandsen2014, eq. 3 solved for g)."""
     r = clamp(r0_conductor(eta, k), 1e-4, 0.9999)
     root = sqrt(r)
     largest, smallest = (1.0 + root) / (1.0 - root), (1.0 - r) / (1.0 + r)
@@ -37,7 +37,7 @@ def index_of(r: Reals, g: Reals) -> tuple[Reals, Reals]:
 
 @function
 def imageworks(r: Spectrum, g: Spectrum) -> Spectrum:
-    """Fit of F_avg in reflectivity r and edge tint g (Kulla2017, p. 26), clamped to [0, 1]."""
+    """F_avg by a fit in reflectivity r and edge tint g (Kulla2017, p. 26), clamped to [0, 1]."""
     fit = (
         0.087237
         + g * (0.0230685 + g * (-0.0864902 + g * 0.0774594))

@@ -1,7 +1,7 @@
-"""The base of all Fresnel kinds; a member must define `curve`, or `conductor` and `dielectric`.
+"""The base class of all Fresnel kinds. A subclass must define `curve`, or `conductor` and `dielectric`.
 
-`eta` is the index on the far side divided by the index on the incident side; for conductors eta and k are those of the
-metal divided by the index of the outer dielectric. Cosines, >= 0, are relative to the facet's normal.
+`eta` is the index on the far side divided by the index on the incident side; for conductors, eta and k are those of the
+metal divided by the index of the outer dielectric. Cosines are >= 0 and relative to the facet's normal.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ NODES = 10
 
 
 class Fresnel(Part):
-    """Reflectance of unpolarized light at a smooth interface, per angle and on average.
+    """Reflectance of unpolarized light at a smooth interface, as a function of the angle and on average.
 
-    The first line of a member's docstring is its title in the manual.
+    The first line of a subclass's docstring is its title in the manual.
 
     white  whether it reflects all light at any angle and index, as furnace tests and tables require
     """
@@ -48,24 +48,25 @@ class Fresnel(Part):
         raise self.lacks("neither `curve` nor `conductor` and `dielectric`", "curve(self, cos_i, r0)")
 
     def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """Reflectance of a metal with complex index eta + i k; by default the curve from R0."""
+        """Reflectance of a metal with complex index eta + i k; by default, `curve` for its R0."""
         return self.curve(cos_i, r0_conductor(eta, k))
 
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """Reflectance of a dielectric with transmitted cosine cos_t (0: total reflection); default: the curve from R0.
+        """Reflectance of a dielectric; by default, `curve` for its R0.
 
-        From the denser side the curve is evaluated at the transmitted angle, so it is 1 at the critical angle.
+        cos_i, cos_t  cosines of incidence and transmission; cos_t is 0 for total reflection
+        From the denser side, the curve is evaluated at the transmitted angle, so it is 1 at the critical angle.
         """
         return where(cos_t > 0.0, self.curve(where(eta < 1.0, cos_t, cos_i), r0_dielectric(eta)), 1.0)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """F_avg = 2 int F mu dmu of a metal by Gauss-Legendre quadrature in sqrt(mu); error 2e-7."""
+        """F_avg = 2 int F mu dmu of a metal, by Gauss-Legendre quadrature in sqrt(mu) with an error of 2e-7."""
         return average(lambda mu: self.conductor(mu, eta, k))
 
     def dielectric_average(self, eta: Scalar) -> Scalar:
         """F_avg of a dielectric of index eta or 1 / eta from its less dense side, by the same rule; error 4e-8.
 
-        From the denser side it is 1 - (1 - F_avg) / eta^2, eta > 1, by reciprocity.
+        From the denser side, it is 1 - (1 - F_avg) / eta^2 for eta > 1, by reciprocity.
         """
         eta = maximum(eta, 1.0 / eta)
 
@@ -80,12 +81,12 @@ Fresnel.family = Family("Fresnel kind", "gonio.fresnels", (__package__,), instan
 
 
 def kind(name: str) -> Fresnel:
-    """The Fresnel kind of that name; raises InputError if there is none."""
+    """The Fresnel kind of this name. Raises InputError if there is none."""
     return Fresnel.family.get(name)
 
 
 def average(reflectance: Callable[[float], R]) -> R:
-    """2 int F(mu) mu dmu of a function of the cosine, as a sum of fixed length, which can be recorded."""
+    """2 int F(mu) mu dmu for a function F of the cosine, as a sum of fixed length, which can be recorded."""
     rule = [(float(x), float(w)) for x, w in zip(*gauss(NODES), strict=True)]  # NumPy floats would absorb Dr.Jit values
     (x, w), *others = rule
     total = reflectance(x * x) * (4.0 * w * x**3)
@@ -98,7 +99,7 @@ def average(reflectance: Callable[[float], R]) -> R:
 def cos_transmitted(cos_i: Scalar, eta: Scalar) -> Scalar:
     """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
 
-    sqrt(1 - (1 - cos^2) / eta^2), with eta^2 - 1 as a product, so that it cancels only at the critical angle.
+    It is sqrt(1 - (1 - cos^2) / eta^2), with eta^2 - 1 as a product, so that it cancels only at the critical angle.
     """
     return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
 

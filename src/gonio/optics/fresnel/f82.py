@@ -1,4 +1,4 @@
-"""Schlick's curve with a second given value near grazing: the F82 model of Adobe Standard Material."""
+"""Schlick's curve with a second given value near grazing incidence: the F82 model of Adobe Standard Material."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ def _edge(eta: Scalar) -> Scalar:
 
 @function
 def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
-    """Schlick's curve from r0 minus c x (1 - x)^6, x = cos_i, with c such that the value at 1/7 is `edge` (Kutz2021).
+    """Schlick's curve for r0, minus c x (1 - x)^6 with x = cos_i; c makes the value at x = 1/7 equal to `edge`
+    (Kutz2021).
 
-    Clamped to >= 0, since a dark edge with a dark r0 would make it negative.
+    It is clamped to >= 0, since a dark edge with a dark r0 would make it negative.
     """
     x = minimum(maximum(cos_i, 0.0), 1.0)
     dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)

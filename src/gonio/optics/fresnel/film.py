@@ -1,7 +1,7 @@
 """Reflection by a thin film on a surface: interference of the waves from its two faces, and the resulting colors.
 
-`film_amplitudes` computes the amplitudes at one wavelength, as spectral variants need them. RGB colors follow from
-these by one of the methods in `FORMS`. All indices are relative to the outer medium.
+`film_amplitudes` computes the amplitudes at one wavelength, as spectral variants need them. RGB colors are computed
+from these by one of the methods in `FORMS`. All indices are relative to the outer medium.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ WEIGHTS = colour.weights(NODES)
 
 
 class Film(NamedTuple):
-    """A film on a base, as a material describes it.
+    """A film on a base, with the values of a material's parameters.
 
-    eta, k      index of the base, per channel; k is None for a clear base without total reflection (eta > sin)
-    film_eta    index of the film
-    thickness   nm
-    form        a name of `FORMS`
-    wavelengths those of the rays, nm, one per channel, in spectral variants; else None
+    eta, k       index of the base, per channel; k is None for a clear base without total reflection (eta > sin)
+    film_eta     index of the film
+    thickness    thickness of the film, nm
+    form         name of a method in `FORMS`
+    wavelengths  wavelengths of the rays in spectral variants, nm, one per channel; else None
     """
 
     eta: Spectrum
@@ -48,7 +48,7 @@ class Film(NamedTuple):
 
 
 def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
-    """R for unpolarized light at cos_i: at the rays' wavelengths if given, else as a color by the film's form."""
+    """R for unpolarized light at cos_i: at the rays' wavelengths if they are given, else as a color by `film.form`."""
     index = film.eta, film.k, film.film_eta, film.thickness
     if film.wavelengths is not None:
         return _spectrum_of(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
@@ -59,7 +59,7 @@ def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
 
 @function
 def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
-    """The color of R under daylight, summed over `NODES`."""
+    """The color of R under daylight, as a sum over the wavelengths `NODES`."""
     mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
     total = zeros_like(eta)
     for nm, (red, green, blue) in zip(NODES.tolist(), mixing.tolist(), strict=True):
@@ -69,7 +69,8 @@ def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: 
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-    """Diattenuation by reflection and by refraction from outside; for every form of the film a sum over wavelengths."""
+    """Diattenuation by reflection and by refraction for light from outside. Colors are sums over wavelengths, whatever
+    the film's form."""
 
     def summed(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
         def at(eta: Scalar, k: Scalar | None, nm: Scalar | float) -> Scalar:
@@ -81,7 +82,7 @@ def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Di
         return waves.s.times(waves.p.conjugate)
 
     def transmitted(waves: Amplitudes) -> Complex:
-        """t_s times the conjugate of t_p, whose phases differ only by those of their denominators."""
+        """t_s times the conjugate of t_p. Their phases differ only by those of their denominators."""
         phase = waves.under_s.conjugate.times(waves.under_p)
         size = maximum(1.0 - waves.s.square, 0.0) * maximum(1.0 - waves.p.square, 0.0)
         return phase.scaled(sqrt(size / maximum(phase.square, 1e-30)))
@@ -124,7 +125,8 @@ def _node(
 
 
 def _spectrum_of(film: Film, at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar]) -> Spectrum:
-    """`at(eta, k, wavelength)` at each channel's wavelength in spectral variants, else its color under daylight."""
+    """The values of `at(eta, k, wavelength)` at each channel's wavelength in spectral variants, else its color under
+    daylight."""
     if film.wavelengths is None:
         return _sum(film.eta, film.k, range(len(NODES)), at)
     triples = zip(channels(film.eta), channels_of_k(film.k, film.eta), channels(film.wavelengths), strict=True)
@@ -139,8 +141,8 @@ def _sum(
 ) -> Spectrum:
     """The contribution of some of the nodes to the color of `at`.
 
-    The red, green and blue indices hold at `RGB_WAVELENGTHS`; between these they are interpolated linearly, beyond they
-    are constant.
+    The red, green and blue indices are those at `RGB_WAVELENGTHS`; they are interpolated linearly between these
+    wavelengths and constant beyond.
     """
     etas, ks = channels(eta), channels_of_k(k, eta)
     mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]
@@ -158,7 +160,7 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar: ...
 @overload
 def _between(values: Sequence[Scalar | None], nm: float) -> Scalar | None: ...
 def _between(values: Sequence[Value], nm: float) -> Value:
-    """The value at a wavelength, interpolated between its values at `RGB_WAVELENGTHS`."""
+    """The value at a wavelength, interpolated between the given values at `RGB_WAVELENGTHS`."""
     if values[0] is None:
         return None
     if len(values) != 3:

@@ -1,7 +1,8 @@
 """The amplitudes of a thin film: its faces, and the sum of all waves that they reflect.
 
-With the amplitudes r12 of the film's upper face and r23 of the surface below it, and the round-trip phase
-delta = 4 pi d w2 / lambda, w2 = sqrt(eta2^2 - sin^2), the sum is (Airy; Born1999, sec. 7.6)
+Let r12 be the amplitude of the film's upper face, r23 that of the surface below the film, and
+delta = 4 pi d w2 / lambda with w2 = sqrt(eta2^2 - sin^2) the phase of a round trip, for a film of thickness d and index
+eta2. The sum is (Airy; Born1999, sec. 7.6)
 
     r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)).
 """
@@ -77,10 +78,10 @@ Amplitude: TypeAlias = Complex | Real
 class Faces(NamedTuple):
     """The amplitudes (r_s, r_p) of a film's faces, and half the optical path of a round trip through it.
 
-    top    of the upper face; real
-    base   of the surface below the film
-    bare   of the surface without the film
-    way    d w2, in the unit of d
+    top    amplitudes of the upper face, which are real
+    base   amplitudes of the surface below the film
+    bare   amplitudes of that surface without the film
+    way    d w2, in the unit of the thickness d
     """
 
     top: tuple[Scalar, Scalar]
@@ -100,7 +101,8 @@ class ClearFaces(NamedTuple):
 
 @function
 def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
-    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, clear without k; see `Film`."""
+    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, or of index eta if k is None; see
+    `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
     contrast = (1.0 - film_eta) * (1.0 + film_eta)
@@ -123,7 +125,7 @@ def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickn
 
 
 def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tuple[Complex, Complex]:
-    """(r_s, r_p) of the face between medium a above and b below: with w = sqrt(n^2 - sin^2),
+    """(r_s, r_p) of the face between the medium a above and b below. With w = sqrt(n^2 - sin^2),
     r_s = (n_a^2 - n_b^2) / (w_a + w_b)^2 and r_p = -r_s (w_a w_b - sin^2) / (w_a w_b + sin^2), in which nothing cancels
     for close indices."""
     both = Complex(above + below.re, below.im)
@@ -149,7 +151,11 @@ def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
 
 
 class Amplitudes(NamedTuple):
-    """The sums of all waves at one wavelength: reflected amplitudes s, p and their denominators."""
+    """The sums of all reflected waves at one wavelength.
+
+    s, p              amplitudes of the two polarizations
+    under_s, under_p  their denominators, 1 + r12 r23 e^(i delta)
+    """
 
     s: Complex
     p: Complex
@@ -159,10 +165,10 @@ class Amplitudes(NamedTuple):
 
 @function
 def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
-    """The sum of all waves at a wavelength in the unit of the thickness.
+    """The sums of all reflected waves at a wavelength, which is in the unit of the thickness.
 
-    With E = e^(i delta) the numerator is r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), where r13 is that of the bare
-    surface: it cancels only where the waves do.
+    With E = e^(i delta), the numerator is r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), where r13 is the amplitude of
+    the bare surface. In this form, it cancels only where the waves do.
     """
     turns = 2.0 * film.way / wavelength
     half_angle = (turns - floor(turns)) * math.pi  # sine in shaders is accurate near 0 only
@@ -180,5 +186,5 @@ def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
 
 
 def channels_of_k(k: Spectrum | None, eta: Spectrum) -> Sequence[Scalar | None]:
-    """The channels of k, as many as eta has; None for each if k is None."""
+    """The channels of k, as many as eta has; None for each channel if k is None."""
     return [None] * len(channels(eta)) if k is None else channels(k)

@@ -46,7 +46,8 @@ WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted for an equ
 def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
     """The color of R by Belcour2017, eq. 6 to 10.
 
-    The mean term is computed per RGB channel; the harmonics of x, y and z use the red, green and blue indices.
+    The mean term is computed per RGB channel; the harmonics of x, y and z use the red, green and blue indices,
+    respectively.
     """
     etas, ks = channels(eta), channels_of_k(k, eta)
     if len(etas) != 3:
@@ -63,7 +64,8 @@ def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta:
 
 
 class Band(NamedTuple):
-    """The response of one color-matching function: the mean of R over wavelengths, and the remaining interference."""
+    """The response of one color-matching function: the mean of R over wavelengths, and the contribution of
+    interference."""
 
     mean: Scalar
     wave: Scalar
@@ -80,7 +82,7 @@ def _band(
     place: float,
     variance: float,
 ) -> Band:
-    """Mean of the two polarizations for a color-matching function fitted by one Gaussian."""
+    """The response, averaged over the two polarizations, of a color-matching function fitted by one Gaussian."""
     return _through([(height, place, variance)], cos_i, eta, k, film_eta, thickness)
 
 
@@ -98,7 +100,7 @@ def _band_of_two(
     other_place: float,
     other_variance: float,
 ) -> Band:
-    """Mean of the two polarizations for a color-matching function fitted by two Gaussians."""
+    """The response, averaged over the two polarizations, of a color-matching function fitted by two Gaussians."""
     fits = [(height, place, variance), (other_height, other_place, other_variance)]
     return _through(fits, cos_i, eta, k, film_eta, thickness)
 
@@ -111,7 +113,10 @@ def _through(
     film_eta: Scalar,
     thickness: Scalar,
 ) -> Band:
-    """Mean of the two polarizations for a sum of Gaussians, each given by height, center and variance."""
+    """The response, averaged over the two polarizations, of a sum of Gaussians.
+
+    fits  height, center and variance of each Gaussian
+    """
     film = faces(cos_i, eta, k, film_eta, thickness)
     mean, wave = zeros_like(cos_i), zeros_like(cos_i)
     trips: list[Amplitude] = []  # one round trip through the film, without its phase
@@ -156,7 +161,10 @@ class Bell(NamedTuple):
 
 @function
 def _bell(path: Scalar, place: float, variance: float) -> Bell:
-    """The transform at an optical path in meters."""
+    """The Fourier transform at an optical path in meters.
+
+    place, variance  center and variance of the Gaussian
+    """
     turns = path * place
     angle = (turns - floor(turns)) * (2.0 * math.pi)
     sin, cos = sincos(angle)

@@ -1,7 +1,7 @@
 """The effect of a smooth interface on polarization, in real numbers: its Mueller matrix divided by its first entry.
 
 In the frame of the plane of incidence, with Q = s minus p, it is ((1, d, 0, 0), (d, 1, 0, 0), (0, 0, c, -s),
-(0, 0, s, c)), d^2 + c^2 + s^2 = 1: `gonio.optics.fresnel.waves` has the underlying amplitudes.
+(0, 0, s, c)) with d^2 + c^2 + s^2 = 1. `gonio.optics.fresnel.waves` computes the underlying amplitudes.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ V = TypeVar("V", Scalar, Spectrum)
 
 
 class Diattenuation(NamedTuple, Generic[V]):
-    """The relation of s to p after an interface.
+    """The effect of an interface on the two polarizations, s and p.
 
-    d  (R_s - R_p) / (R_s + R_p); for refracted light, T in place of R
+    d  (R_s - R_p) / (R_s + R_p); for refracted light, with T in place of R
     c  cosine of the phase between s and p, times 2 sqrt(R_s R_p) / (R_s + R_p)
     s  sine of this phase, times the same factor
     """
@@ -28,7 +28,7 @@ class Diattenuation(NamedTuple, Generic[V]):
 
 @function
 def reflected_by_metal(cos_i: Scalar, eta: Spectrum, k: Spectrum) -> Diattenuation[Spectrum]:
-    """Reflection at an index n = eta + i k, with w = sqrt(n^2 - sin^2) = a + i b, by
+    """Reflection at a metal of index n = eta + i k: with w = sqrt(n^2 - sin^2) = a + i b,
     r_p / r_s = -(cos w - sin^2) / (cos w + sin^2)."""
     sin2 = 1.0 - sqr(cos_i)
     t, product = sqr(eta) - sqr(k) - sin2, eta * k  # a^2 - b^2 and a b
@@ -40,7 +40,7 @@ def reflected_by_metal(cos_i: Scalar, eta: Spectrum, k: Spectrum) -> Diattenuati
 
 @function
 def reflected_by_glass(cos_i: Scalar, eta: Scalar) -> Diattenuation[Scalar]:
-    """Reflection at a real index, from either side; beyond the critical angle only the phases differ."""
+    """Reflection at a real index, from either side; beyond the critical angle, only the phases differ."""
     t = fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))
     return _reflected(cos_i, abs(t), safe_sqrt(t), safe_sqrt(-t))
 

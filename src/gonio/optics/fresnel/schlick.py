@@ -16,11 +16,11 @@ class Schlick(Fresnel):
         return schlick(cos_i, r0)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """The curve's integral."""
+        """F_avg, the integral of the curve."""
         return schlick_average(r0_conductor(eta, k))
 
     def dielectric_average(self, eta: Scalar) -> Scalar:
-        """The curve's integral."""
+        """F_avg, the integral of the curve."""
         return schlick_average(r0_dielectric(eta))
 
 
@@ -33,5 +33,5 @@ def schlick(cos_i: Scalar | float, r0: R) -> R:
 
 
 def schlick_average(r0: R) -> R:
-    """R0 + (1 - R0) / 21: 2 int F mu dmu of Schlick's curve."""
+    """R0 + (1 - R0) / 21, which is 2 int F mu dmu of Schlick's curve."""
     return r0 + (1.0 - r0) * (1.0 / 21.0)

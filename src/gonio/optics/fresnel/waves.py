@@ -6,7 +6,8 @@ sqrt(n^2 - sin^2), the root that decays into the surface (Born1999, sec. 1.5 and
     r_s = (cos - w) / (cos + w)              t_s = 2 cos / (cos + w)
     r_p = (n^2 cos - w) / (n^2 cos + w)      t_p = 2 n cos / (n^2 cos + w)
 
-On either ray s points along normal x direction, and p is s rotated toward the surface: at normal incidence r_p = -r_s.
+For both rays, s points along the cross product of normal and direction, and p is s rotated toward the surface: at
+normal incidence, r_p = -r_s.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ class Interface(NamedTuple):
     """The response of a smooth interface to a plane wave, as arrays of the broadcast shape of angle, eta and k.
 
     r_s, r_p      complex amplitudes of the reflected field relative to the incident one
-    t_s, t_p      those of the refracted field, in a metal just below the surface
-    R_s, R_p, R   reflectances: fractions of the power; R, their mean, is that of unpolarized light
-    T_s, T_p, T   transmittances, R + T = 1; for a metal the absorbed fractions
-    phase_s, phase_p  phase lag of the reflected field, radians in (-pi, pi]: the angle of r_s and r_p
-    brewster      angle of the smallest R_p, radians: arctan(eta) where k = 0, with R_p = 0; for a metal the
+    t_s, t_p      complex amplitudes of the refracted field; in a metal, just below the surface
+    R_s, R_p, R   reflectances, fractions of the power; R, the mean of R_s and R_p, is that for unpolarized light
+    T_s, T_p, T   transmittances, R + T = 1; for a metal, the absorbed fractions
+    phase_s, phase_p  phase lag of the reflected field, radians in (-pi, pi]: the angles of r_s and r_p
+    brewster      angle of the smallest R_p, radians: arctan(eta) for k = 0, where R_p = 0; for a metal, the
                   pseudo-Brewster angle
-    critical      critical angle of total reflection, radians: arcsin(eta) where eta < 1 and k = 0, else NaN
+    critical      critical angle of total reflection, radians: arcsin(eta) for eta < 1 and k = 0, else NaN
     """
 
     r_s: Waves
@@ -54,7 +55,8 @@ class Interface(NamedTuple):
     def reflection(self) -> Reals:
         """Mueller matrix of the reflection, (..., 4, 4), for Stokes vectors (I, Q, U, V) with Q = s minus p.
 
-        Same convention as `mi.mueller.specular_reflection`: U is the difference between the diagonals, seen toward
+        The convention is that of `mi.mueller.specular_reflection`: U is the difference between the two diagonals, as
+        seen by an observer who looks toward the source.
         """
         return mueller(self.R_s, self.R_p, self.r_s * np.conj(self.r_p))
 
@@ -77,9 +79,9 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
 
     theta   angle of incidence from the normal, radians, 0 to pi/2
     eta     real part of the index on the far side divided by that on the near side, > 0; 1 / 1.5 from inside glass
-    k       imaginary part, >= 0; sign convention n = eta + i k, exp(-i omega t)
+    k       imaginary part of this ratio, >= 0; sign convention n = eta + i k, exp(-i omega t)
     The three are numbers or arrays that broadcast. Returns an `Interface`. Raises InputError for values out of range.
-    Not for thin films, nor for light that arrives through an absorbing medium.
+    Not valid for thin films, nor for light that arrives through an absorbing medium.
     """
     angle, eta, k = (_real(x, name) for x, name in ((theta, "theta"), (eta, "eta"), (k, "k")))
     if np.any((angle < 0.0) | (angle > np.pi / 2 * (1.0 + 1e-15))):
@@ -114,8 +116,8 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
 def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
     """The angle of the smallest R_p, radians: arctan(eta) for k = 0; for a metal, from a cubic equation in sin^2.
 
-    With e = n^2 and u = sin^2: 2 (|e|^2 + Re e) u^3 + |e|^2 (|e|^2 - 3) u^2 - 2 |e|^4 u + |e|^4 = 0
-    (HumphreysOwen1961).
+    With e = n^2 and u = sin^2, the equation is
+    2 (|e|^2 + Re e) u^3 + |e|^2 (|e|^2 - 3) u^2 - 2 |e|^4 u + |e|^4 = 0 (HumphreysOwen1961).
     """
     eta, k = np.broadcast_arrays(_real(eta, "eta"), _real(k, "k"))
     check_index(eta, k, "brewster_angle")
@@ -138,7 +140,7 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
 def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
     """The Mueller matrix, (..., 4, 4), of an interface that does not mix s and p.
 
-    along_s, along_p  fractions of the power
+    along_s, along_p  fractions of the power in s and p
     cross             amplitude of s times the conjugate of that of p
     """
     half_sum, half_difference, zero = 0.5 * (along_s + along_p), 0.5 * (along_s - along_p), 0.0 * along_s

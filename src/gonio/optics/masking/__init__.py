@@ -1,4 +1,4 @@
-"""Masking and shadowing: the fraction G of facets visible from both wo and wi. Each term is one file in this folder."""
+"""Masking and shadowing, the fraction G of facets visible from both wo and wi. Each term is one file in this folder."""
 
 from __future__ import annotations
 

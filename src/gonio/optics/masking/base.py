@@ -1,4 +1,4 @@
-"""The base of all masking terms; a member must define `reflected`, everything else has a default."""
+"""The base class of all masking terms. A subclass must define `reflected`; everything else has a default."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..part import Part
 class Masking(Part):
     """Masking and shadowing G of a pair of directions, for a distribution of normals and its widths.
 
-    The first line of a member's docstring is its title in the manual.
+    The first line of a subclass's docstring is its title in the manual.
 
-    smith  whether G follows from the distribution's slopes, as Smith's does; if not, it falls off as slowly as a
-           rational function of the cosine. The axes of energy-compensation tables depend on it
+    smith  whether G follows from the distribution of slopes, as Smith's G does; if not, it falls off as slowly as a
+           rational function of the cosine. The axes of energy-compensation tables depend on this
     """
 
     name: ClassVar[str] = ""
@@ -35,15 +35,17 @@ class Masking(Part):
         return distribution("ggx")
 
     def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G of two directions on the same side of the surface, m the normal that mirrors one into the other."""
+        """G for two directions on the same side of the surface; m is the normal of the facet that mirrors one into the
+        other."""
         raise self.lacks("no `reflected`", "reflected(self, ndf, wo, wi, m, alpha)")
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G of directions on opposite sides, m the refracting normal; by default `reflected`."""
+        """G for two directions on opposite sides; m is the normal of the facet that refracts one into the other. By
+        default, it is `reflected`."""
         return self.reflected(ndf, wo, wi, m, alpha)
 
     def onset(self, alpha: Scalar) -> Scalar:
-        """The cosine at which masking sets in for an isotropic width; alpha for Smith's terms."""
+        """The cosine below which masking is strong, for an isotropic width; alpha for Smith's terms."""
         return alpha
 
 
@@ -51,7 +53,7 @@ Masking.family = Family("masking term", "gonio.maskings", (__package__,), instan
 
 
 def term(name: str) -> Masking:
-    """The masking term of that name; raises InputError if there is none."""
+    """The masking term of this name. Raises InputError if there is none."""
     return Masking.family.get(name)
 
 
@@ -59,9 +61,10 @@ def term(name: str) -> Masking:
 def masking_shadowing(
     kind: str, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair, transmits: bool = False
 ) -> Scalar:
-    """Masking and shadowing G, by name; 0 if wo or wi sees the facet's back side.
+    """Masking and shadowing G by the term of a given name; 0 if wo or wi sees the facet from behind.
 
-    m          the facet's normal, m.z > 0
+    kind       name of the masking term
+    m          normal of the facet, m.z > 0
     transmits  whether wi and wo lie on opposite sides of the surface
     """
     chosen = term(kind)

@@ -9,11 +9,11 @@ from .schlick_ibl import SchlickIBL
 class SchlickDirect(SchlickIBL):
     """Schlick-Smith, k = (roughness + 1)^2 / 8 (Karis2013).
 
-    G does not tend to 1 as alpha -> 0: intended for point lights and plain shading, not for compensation.
+    G does not tend to 1 as alpha -> 0: the term is intended for point lights and simple shading, not for compensation.
     """
 
     name = "schlick-direct"
 
     def k(self, alpha: Scalar) -> Scalar:
-        """(roughness + 1)^2 / 8, roughness = sqrt(alpha) (Karis2013, analytic lights)."""
+        """(roughness + 1)^2 / 8 with roughness = sqrt(alpha) (Karis2013, analytic lights)."""
         return sqr(sqrt(alpha) + 1.0) * 0.125

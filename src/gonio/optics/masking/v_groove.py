@@ -10,7 +10,8 @@ from .base import Masking
 class VGroove(Masking):
     """V-grooves (Torrance1967): every facet masks the opposite one.
 
-    G1 = min(1, 2 (n.m) (n.v) / (v.m)) does not depend on the width: the masking facet has the visible one's slope.
+    G1 = min(1, 2 (n.m) (n.v) / (v.m)) does not depend on the width, since the masking facet has the same slope as the
+    visible one.
     """
 
     name = "v-groove"

@@ -8,10 +8,10 @@ __all__ = ["NDF", "Stretched", "distribution", "distributions"]
 
 
 def distributions() -> dict[str, NDF]:
-    """Every distribution by name."""
+    """All distributions, by name."""
     return NDF.family.all()
 
 
 def distribution(name: str) -> NDF:
-    """The distribution of that name; raises InputError if there is none."""
+    """The distribution of this name. Raises InputError if there is none."""
     return NDF.family.get(name)

@@ -1,4 +1,4 @@
-"""The base of all distributions of normals, `NDF`, and `Stretched` for stretch-invariant ones."""
+"""The base class of all distributions of normals, `NDF`, and that of stretch-invariant ones, `Stretched`."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ from . import tabulated
 class NDF(Part):
     """Distribution of microfacet normals with widths alpha = (alpha_x, alpha_y).
 
-    A member must define `D`; a member that is one surface, stretched by alpha, derives from `Stretched`. Without closed
-    forms, `Lambda`, `sample` and visible normals come from tables computed once from D (`tabulated`), with 1 + Lambda
-    within 1e-4. The tables require a D that is isotropic at equal widths and, at unequal widths, either is the
-    stretched surface or ignores alpha.y. All methods take unit vectors of the local frame. m lies above the surface
-    (m.z > 0); a direction v may lie on either side, since Smith's terms depend on |v.z|. The first line of a member's
-    docstring is its title in the manual.
+    A subclass must define `D`; one that is stretch-invariant derives from `Stretched`. Without closed forms, `Lambda`,
+    `sample` and visible normals are read from tables computed once from D (`tabulated`), with 1 + Lambda accurate to
+    1e-4. The tables require a D that is isotropic at equal widths and, at unequal widths, is either stretch-invariant
+    or independent of alpha.y. All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a
+    direction v may lie on either side, since Smith's terms depend on |v.z|. The first line of a subclass's docstring is
+    its title in the manual.
 
     long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that masking is noticeable at all
-                 angles (GGX); if not, it is confined to within a few alpha of grazing. The axes of energy-compensation
-                 tables depend on it: their error is 1e-4, but 2e-3 if it is wrongly True and 8e-3 if wrongly False
+                 angles (GGX); if not, masking is confined to cosines below a few alpha. The axes of energy-compensation
+                 tables depend on this: their error is 1e-4, but 2e-3 if it is wrongly True and 8e-3 if wrongly False
     """
 
     name: ClassVar[str] = ""
@@ -61,9 +61,11 @@ class NDF(Part):
         return "" if type(self).D is not NDF.D else "D(self, m, alpha)"
 
     def check_widths(self, alpha: object, where: str = "alpha") -> None:
-        """Raise InputError for user-given widths, (alpha_x, alpha_y), that Lambda or `sample` does not support.
+        """Raise InputError for widths given by the user, one or a pair, that `Lambda` or `sample` does not support.
 
         If these are tabulated, the tables are computed here, before Dr.Jit records a loop.
+
+        where  the place of the widths, for errors
         """
         if not (self.tabulated or self._tabulates_area):
             return
@@ -77,12 +79,12 @@ class NDF(Part):
             raise InputError(what, where, hint)
 
     def D(self, m: Direction, alpha: Pair) -> Scalar:
-        """Density of normals, 1/sr: the integral of D(m) m.z is 1."""
+        """Density of normals, 1/sr. The integral of D(m) m.z is 1."""
         raise self.lacks("no `D`", "D(self, m, alpha)")
 
     @function
     def sample(self, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal with density D(m) m.z; from a table of the inverse of its integral if there is no closed form."""
+        """A normal with density D(m) m.z; by default, from a table of the inverse of its integral."""
         s, c = sincos((2.0 * ops.pi) * u2)
         return self._sloped(tabulated.ALL, u1, c, s, alpha)
 
@@ -98,7 +100,7 @@ class NDF(Part):
         return self._visible_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
     def _visible_area(self, v: Direction, alpha: Pair) -> Scalar:
-        """Projected area of the facets that face v, from a table; at least that of the surface."""
+        """Projected area of the facets that face v, from a table; at least that of the surface, |v.z|."""
         tables = tabulated.tables_of(self)
         stretched = stretch(v, tables.pair(alpha))
         length = norm(stretched)
@@ -112,19 +114,19 @@ class NDF(Part):
         return 1.0 / (1.0 + self.Lambda(v, alpha))
 
     def G1_customary(self, v: Direction, alpha: Pair) -> Scalar:
-        """The G1 of `smith-separable`: exact, unless a fit is customary."""
+        """The G1 that `smith-separable` uses: exact, unless a fit is customary."""
         return self.G1(v, alpha)
 
     # ------------------------------------------------------------------ visible normals
 
     @property
     def tabulated(self) -> bool:
-        """Whether normals are sampled by tables computed from D, because there is no `sample`."""
+        """Whether normals are sampled from tables computed from D, because `sample` is not defined."""
         return type(self).sample is NDF.sample
 
     @property
     def falls_slowly(self) -> bool:
-        """`long_tailed`, or the same property of the table if Lambda is tabulated."""
+        """`long_tailed` or, if Lambda is tabulated, the same property of the table."""
         return self.long_tailed or (self._tabulates_area and tabulated.tables_of(self).long_tailed)
 
     @property
@@ -132,15 +134,16 @@ class NDF(Part):
         return type(self).Lambda is NDF.Lambda
 
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal visible from v (v.z >= 0), from tables; any normal if `sample` is defined but not this method."""
+        """A normal visible from v (v.z >= 0), from tables. If `sample` is defined but not this method, a normal from
+        `sample`, visible or not."""
         return self._visible(v, u1, u2, alpha) if self.tabulated else self.sample(u1, u2, alpha)
 
     @function
     def _visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A visible normal, by v.m = v.z m.z + v_h.m_h, with h the component along the surface.
+        """A visible normal, by v.m = v.z m.z + v_h.m_h, where the index h denotes components along the surface.
 
         A fraction of the samples has the density D m.z, the others D max(0, v_h.m_h), the limit for grazing v. Where
-        v_h.m_h < 0 the sum exceeds the visible area, so that up to a sixth of the samples fail.
+        v_h.m_h < 0, the sum exceeds the visible area, so that up to a sixth of the samples fail.
         """
         stretched = stretch(v, tabulated.tables_of(self).pair(alpha))
         level = safe_sqrt(stretched.x * stretched.x + stretched.y * stretched.y)
@@ -155,7 +158,7 @@ class NDF(Part):
         return where(grazing, steep, self._sloped(tabulated.ALL, u1, c, s, alpha))
 
     def _sloped(self, column: int, u: Scalar, c: Scalar, s: Scalar, alpha: Pair) -> Direction:
-        """The normal at the azimuth (c, s) of the unstretched surface whose slope is the quantile u, then stretched."""
+        """The normal of the unstretched surface at the azimuth (c, s) whose slope is the quantile u, then stretched."""
         tables = tabulated.tables_of(self)
         low, high = safe_sqrt(u), safe_sqrt(1.0 - u)
         tau = tables.read(column, alpha, low / (low + high))
@@ -195,16 +198,16 @@ NDF.family = Family("microfacet distribution", "gonio.distributions", (__package
 
 @function
 def stretch(w: Direction, alpha: Pair) -> Direction:
-    """(alpha_x w_x, alpha_y w_y, w_z), not unit."""
+    """The vector (alpha_x w_x, alpha_y w_y, w_z), which is not normalized."""
     return vec3(alpha.x * w.x, alpha.y * w.y, w.z)
 
 
 class Stretched(NDF):
     """A stretch-invariant distribution: a surface of width 1, its slopes scaled by alpha (Heitz2014, sec. 5.3).
 
-    A member describes the surface of width 1 by `density` and, if there are closed forms, `area`, `slope` and
-    `visible_normal`; otherwise tables are used as for any `NDF`. `density` and `area` are called with vectors of any
-    length: as D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm they are homogeneous of degree -4 and 1, so stretching
+    A subclass describes the surface of width 1 by `density` and, if there are closed forms, `area`, `slope` and
+    `visible_normal`; otherwise, tables are used as for any `NDF`. `density` and `area` are called with vectors of any
+    length: as D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm, they are homogeneous of degree -4 and 1, so stretching
     is a linear map without a Jacobian.
     """
 
@@ -263,17 +266,17 @@ class Stretched(NDF):
 
     @function
     def Lambda(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's Lambda: the ratio of masked to visible projected area (Heitz2014); 0 up to rounding at the normal."""
+        """Smith's Lambda, the ratio of masked to visible projected area (Heitz2014); 0 up to rounding at the normal."""
         return self.projected_area(v, alpha) / maximum(abs(v.z), 1e-15) - 1.0
 
     @function
     def G1(self, v: Direction, alpha: Pair) -> Scalar:
-        """Smith's masking of one direction, 1 / (1 + Lambda): the visible fraction of the area that faces v."""
+        """Smith's masking of one direction, 1 / (1 + Lambda), the visible fraction of the area that faces v."""
         return abs(v.z) / self.projected_area(v, alpha)
 
     @function
     def sample(self, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal with density D(m) m.z: a slope in a uniformly distributed direction, stretched."""
+        """A normal with density D(m) m.z: a slope of the surface of width 1 at a uniform azimuth, stretched."""
         if self.tabulated:
             return super().sample(u1, u2, alpha)
         r = self.slope(u1)
@@ -289,7 +292,8 @@ class Stretched(NDF):
 
     @function
     def visible_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of visible normals divided by |v.m|: D / (area that v sees) (Heitz2014b); finite at grazing."""
+        """Density of visible normals divided by |v.m|: D divided by the area visible from v (Heitz2014b). It is finite
+        at grazing angles."""
         if not self._has_visible:
             return super().visible_per_cosine(v, m, alpha)
         return self.D(m, alpha) / self.projected_area(v, alpha)

@@ -48,7 +48,7 @@ class Beckmann(Stretched):
 
     @function
     def area(self, v: Direction) -> Scalar:
-        """|v.z| (1 + erf a) / 2 + sin exp(-a^2) / (2 sqrt(pi)), a = cot (Heitz2014): sin times `gaussian_ramp`."""
+        """|v.z| (1 + erf a) / 2 + sin exp(-a^2) / (2 sqrt(pi)), a = cot, as sin times `gaussian_ramp` (Heitz2014)."""
         sin, a = _sine_and_cotangent(v)
         return sin * gaussian_ramp(a)
 
@@ -61,16 +61,16 @@ class Beckmann(Stretched):
 
     @function
     def slope(self, u: Scalar) -> Scalar:
-        """sqrt(-log(1 - u)): Box-Muller (Walter2007, eq. 28)."""
+        """sqrt(-log(1 - u)), by Box and Muller's method (Walter2007, eq. 28)."""
         return safe_sqrt(-log(1.0 - u))
 
     @function
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """Visible slopes of the unit Gaussian (Heitz2014b, sec. 3 and 5).
 
-        Along v the slope x has the cumulative distribution c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
-        x = cot. Two steps from an initial guess, the first in b = erf x, invert it to 5e-8 (Jakob2014). Across v the
-        slope is Gaussian.
+        Along v, the slope x has the cumulative distribution c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
+        x = cot. Two steps from an initial guess, the first in b = erf x, invert it with an error of 5e-8 (Jakob2014).
+        Across v, the slope is Gaussian.
         """
         sin_v, cos_v = sqrt(sin2(v)), maximum(v.z, 1e-6)
         tan_v = sin_v / cos_v
@@ -105,6 +105,6 @@ class Beckmann(Stretched):
 
 
 def _sine_and_cotangent(v: Direction) -> tuple[Scalar, Scalar]:
-    """(sin times |v|, |cot|) of a vector of any length; the cotangent is limited to 1e9 at the normal."""
+    """sin times |v|, and |cot|, of a vector of any length; the cotangent is limited to 1e9 at the normal."""
     sin = sqrt(maximum(sin2(v), 1e-18))
     return sin, abs(v.z) / sin

@@ -29,7 +29,7 @@ class GGX(Stretched):
     """GGX (Trowbridge-Reitz).
 
     D = 1 / (pi alpha_x alpha_y (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2 + m_z^2)^2) (Heitz2014; isotropic: Walter2007,
-    eq. 33). At width 1 it is a hemisphere: all normals are equally frequent.
+    eq. 33). At width 1, the surface is a hemisphere, on which all normals are equally frequent.
     """
 
     name = "ggx"
@@ -37,12 +37,13 @@ class GGX(Stretched):
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi |n|^4), a hemisphere's density, from all three components: n_z alone would cancel at the peak."""
+        """1 / (pi |n|^4), the density of a hemisphere, from all three components, since n_z alone would cancel at the
+        peak."""
         return ops.inv_pi / sqr(dot(n, n))
 
     @function
     def area(self, v: Direction) -> Scalar:
-        """(|v.z| + |v|) / 2: a hemisphere shows half its base and half a disk (Heitz2014, eq. 72)."""
+        """(|v.z| + |v|) / 2, half the projected base of a hemisphere and half a disk (Heitz2014, eq. 72)."""
         return 0.5 * (abs(v.z) + norm(v))
 
     @function
@@ -79,7 +80,7 @@ class GGX(Stretched):
         return self.D(m, alpha) / (0.5 * (depth + norm(stretched)))
 
     def _bound(self, v: Direction, alpha: Pair) -> Scalar:
-        """k: how far the cap extends downward, relative to its full depth (Eto2023)."""
+        """k, the depth to which the cap extends downward, relative to its full depth (Eto2023)."""
         a2 = sqr(clamp(minimum(alpha.x, alpha.y), 0.0, 1.0))
         reach2 = sqr(1.0 + sqrt(sin2(v)))
         return (1.0 - a2) * reach2 / (reach2 + a2 * sqr(v.z))

@@ -11,15 +11,15 @@ from .base import Stretched
 class StudentT(Stretched):
     """Student-T with gamma = 3: a tail between GGX (gamma = 2) and Beckmann (gamma -> infinity).
 
-    D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017). At
-    gamma = 3 all formulas are algebraic.
+    D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017). For
+    gamma = 3, all formulas are algebraic.
     """
 
     name = "student-t"
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), as a quotient whose denominator does not vanish at grazing."""
+        """1 / (pi n_z^4 (1 + tan^2 / 2)^3), as a quotient whose denominator does not vanish at grazing angles."""
         z2 = sqr(n.z)
         spread = z2 + 0.5 * sin2(n)
         return ops.inv_pi * z2 / (spread * sqr(spread))
@@ -38,5 +38,5 @@ class StudentT(Stretched):
 
     @function
     def slope(self, u: Scalar) -> Scalar:
-        """tan with tan^2 = 2 ((1 - u)^(-1/2) - 1)."""
+        """tan theta with tan^2 theta = 2 ((1 - u)^(-1/2) - 1)."""
         return sqrt(2.0 * (1.0 / sqrt(1.0 - u) - 1.0))

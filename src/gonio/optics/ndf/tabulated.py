@@ -1,15 +1,15 @@
 """Smith's Lambda and samples of normals from D alone, by tables that are computed once.
 
-With the slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with such a slope. A
-direction v sees the area
+With the slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with slopes from s to
+s + ds. A direction v sees the area
 
     int D(m) max(0, v.m) dm = int P(s) a(s) ds,   a(s) = int max(0, |v.z| + s sin theta_v cos phi) dphi / (2 pi),
 
 with a in closed form, so one quadrature over s is enough (trapezoidal in log s; Heitz2014, sec. 3 and 4). Slopes are
 measured in units of w, twice the area that a grazing direction sees; for GGX, w = alpha. The area divided by |v'|, with
-v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes 1 + Lambda is
-within 1e-5 of the closed forms of GGX, Beckmann and Student-T, and within 1e-4 for distributions whose shape depends on
-the width, such as GTR.
+v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes, 1 + Lambda is
+accurate to 1e-5 for GGX, Beckmann and Student-T, which have closed forms, and to 1e-4 for distributions whose shape
+depends on the width, such as GTR.
 
 Normals are sampled from tables of the inverse of int P ds and, for the slopes seen at grazing angles, of int s P ds.
 """
@@ -44,13 +44,13 @@ AREA, ALL, GRAZING = range(3)  # columns
 class Tables(NamedTuple):
     """The tables of a distribution, for all widths.
 
-    values   by (fourth root of the width, node), or by node alone if all widths are one stretched surface: the area
-             divided by |v'|; tau = s / (1 + s), s in units of w, as a function of g(fraction of the normals); and tau
-             as a function of g(fraction of the area that a grazing direction sees). g(u) = sqrt(u) / (sqrt(u) +
-             sqrt(1 - u)) refines both ends
-    scale    w / alpha, at the same widths; a plain number if it is constant
+    values   three columns over (fourth root of the width, node), or over the nodes alone if the distribution is
+             stretch-invariant: the area divided by |v'|; tau = s / (1 + s), with s in units of w, as a function of
+             g(fraction of the normals); and tau as a function of g(fraction of the area that a grazing direction sees).
+             g(u) = sqrt(u) / (sqrt(u) + sqrt(1 - u)) refines both ends
+    scale    w / alpha at the same widths; a plain number if it is constant
     widths   the meaning of two widths: "stretched" along x and y, "first" if alpha_y is ignored, "equal" if neither
-             holds
+             is the case, so that the widths must be equal
     """
 
     values: Table
@@ -79,8 +79,8 @@ class Tables(NamedTuple):
     def long_tailed(self) -> bool:
         """Whether Lambda falls off so slowly that it is noticeable near the normal.
 
-        At the tested angle 0.8 % of the area is masked for GGX, 1e-6 for Gaussian slopes, and 1e-3 for Student-T with
-        gamma = 3.
+        At the tested angle, the masked fraction of the area is 0.8 % for GGX, 1e-6 for Gaussian slopes, and 1e-3 for
+        Student-T with gamma = 3.
         """
         near = self.values.values[..., AREA].reshape(-1, NODES)[:, NODES // 8]
         return bool(np.median(near) - (1.0 - (NODES // 8 / (NODES - 1.0)) ** 2) > 4e-3)
@@ -100,15 +100,15 @@ class HasDensity(Protocol):
         ...
 
     def place(self, formula: str) -> str:
-        """File and line of a formula, for errors."""
+        """FILE:LINE of a formula, for errors."""
         ...
 
 
 def tables_of(ndf: HasDensity) -> Tables:
     """The tables of a distribution, computed on first use.
 
-    They are stored in its class, so that they are discarded when a user's file is run again. Raises InputError if D is
-    not finite or lacks the required symmetry.
+    They are stored in the distribution's class, so that they are discarded when a user's file is run again. Raises
+    InputError if D is not finite or lacks the required symmetry.
     """
     cls = type(ndf)
     if "_tables" not in vars(cls):
@@ -129,11 +129,11 @@ def _hashable(value: object) -> object:
 
 
 class _Row(NamedTuple):
-    """The surface of one width.
+    """The slopes of a surface of one width.
 
     width   alpha
-    w       unit of its slopes
-    shares  fractions of the surface by log(s / w), with sum 1
+    w       unit of the slopes
+    shares  fractions of the surface with slopes s, at nodes of log(s / w); their sum is 1
     area    int D(m) m.z dm, which should be 1
     """
 
@@ -173,13 +173,13 @@ def _build(ndf: HasDensity) -> Tables:
 
 
 def _columns(shares: Floats, log_s: Floats) -> Floats:
-    """AREA, ALL and GRAZING at each node, for rows of fractions of the surface."""
+    """The columns AREA, ALL and GRAZING at each node, from fractions of the surface by slope."""
     return np.stack([_areas(shares, log_s), _inverses(shares, log_s), _inverses(shares * np.exp(log_s), log_s)], -1)
 
 
 def _density(ndf: HasDensity) -> Density:
-    """D on NumPy arrays, (3, N) and (2, N), in float64: evaluated from its recording, so that the tables are available
-    while a Dr.Jit loop or a shader is recorded."""
+    """D as a function of NumPy arrays m (3, N) and alpha (2, N), in float64. It is evaluated from its recording, so
+    that tables can be computed while a Dr.Jit loop or a shader is recorded."""
     try:
         graph = ops.record(lambda m, alpha: ndf.D(m, alpha), m="vec3", alpha="vec2", name="D")
     except Exception as error:
@@ -190,7 +190,7 @@ def _density(ndf: HasDensity) -> Density:
 
 
 def _normals(x: Floats, y: Floats) -> Floats:
-    """The normals of slopes, (3, N)."""
+    """The normals for slopes x and y, (3, N)."""
     return np.stack([x, y, np.ones_like(x)]) / np.sqrt(1.0 + x * x + y * y)
 
 
@@ -203,7 +203,7 @@ def _shares(density: Density, alpha: tuple[float, float], s: Floats, turn: float
 
 
 def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
-    """The surface of one width; None if D cannot be used there."""
+    """The slopes of the surface of one width; None if D cannot be used at that width."""
     w = width
     for last in (False, True):
         shares = _shares(density, (width, width), w * np.exp(log_s), float(AZIMUTHS[0]))
@@ -219,9 +219,9 @@ def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
 
 
 def _clamped(shares: Floats, s: Floats) -> int:
-    """The index of the first normal that is excluded because a cosine is clamped in D, as in
-    tan^2 = (1 - c^2) / max(c^2, 1e-7), so that D diverges at the horizon. Such normals cover a negligible fraction of
-    the surface, but their slopes would dominate the projected area and hence Lambda."""
+    """The index of the first normal to exclude because D clamps a cosine, as in tan^2 = (1 - c^2) / max(c^2, 1e-7), and
+    diverges at the horizon. Such normals cover a negligible fraction of the surface, but their slopes would dominate
+    the projected area and hence Lambda."""
     steep = int(np.argmax(s > STEEP))
     moment = shares[steep:] * s[steep:]
     least = np.minimum.accumulate(moment)
@@ -230,7 +230,7 @@ def _clamped(shares: Floats, s: Floats) -> int:
 
 
 def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
-    """The meaning of two widths for D; see `Tables`."""
+    """The meaning of two widths for D, as in `Tables.widths`."""
     s = np.exp(np.arange(-8.0, 8.0, STEP))
     for width in widths:
         along = np.stack([_shares(density, (width, width), width * s, float(turn)) for turn in AZIMUTHS])

@@ -1,4 +1,4 @@
-"""A report for continuous integration: JUnit, SARIF, GitHub's annotations, a baseline of known failures.
+"""Output for continuous integration: JUnit, SARIF, GitHub's annotations, and a baseline of known failures.
 
     gonio verify glass.py:Glass --junit laws.xml --sarif laws.sarif --baseline laws.json
 

@@ -1,7 +1,7 @@
 """A baseline: the known failures. Only new ones fail a report.
 
-A law of a card is known if it failed when the baseline was written, and its value is at most a tenth worse now. Any
-report.json is a baseline; `text` writes the short form, to be stored with the code.
+A failure is known if the same law of the same card failed when the baseline was written, and its value is now at most a
+tenth worse. Any report.json can serve as a baseline; `text` writes the short form, to be stored with the code.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ Known = Mapping[tuple[str, str], float | None]
 
 
 def read(path: Path) -> Known:
-    """The values of known failures, by title and law; None for failures without a value. Raises InputError for other
-    files."""
+    """The values of the known failures in a baseline, by title and law; None for failures without a value. Raises
+    InputError if the file is not a baseline."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -53,7 +53,7 @@ def _number(value: Any) -> float | None:
 
 
 def text(report: Report) -> str:
-    """The baseline of a report."""
+    """The failures of a report as a baseline, in JSON."""
     failures = [
         {"title": card.title, "law": verdict.law, "figure": verdict.as_dict()["figure"], "why": verdict.why[:1]}
         for card in report.cards
@@ -65,7 +65,7 @@ def text(report: Report) -> str:
 
 
 def apply(report: Report, known: Known) -> list[str]:
-    """Mark known failures in a report, so that they do not fail it; returns those that no longer occur, as text."""
+    """Mark known failures in a report, so that they do not fail it. Returns those that no longer occur, as text."""
     fixed = []
     for card in report.cards:
         for verdict in card.verdicts:

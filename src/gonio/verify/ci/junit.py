@@ -13,7 +13,7 @@ _FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 
 
 def text(report: Report) -> str:
-    """The text of the file."""
+    """The content of the file for a report."""
     counts = {**_counts(report.cards), "errors": str(len(report.unread)), "time": f"{report.seconds:.3f}"}
     counts["tests"] = str(int(counts["tests"]) + len(report.unread))
     root = xml.Element("testsuites", {"name": "gonio verify", **counts})
@@ -32,7 +32,7 @@ def text(report: Report) -> str:
 
 
 def _unread(root: xml.Element, one: Unread) -> None:
-    """A suite with a single case, which could not be run."""
+    """Add a suite with a single case for a target that could not be read."""
     counts = {"tests": "1", "failures": "0", "errors": "1", "skipped": "0", "time": "0.000"}
     suite = xml.SubElement(root, "testsuite", {"name": clean(one.target), **counts})
     case = xml.SubElement(suite, "testcase", classname=clean(one.target), name="read", time="0.000")

@@ -1,4 +1,4 @@
-"""The files that a trial writes, and the baseline to which it is compared."""
+"""The files that a trial writes, and the baseline with which it is compared."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Outputs:
     """The files to write, and the baseline; None for files that are not requested.
 
     report          folder for report.html and report.json
-    junit, sarif    files for these formats
+    junit, sarif    files in these formats
     baseline        file of known failures, which may be a report.json
-    write_baseline  file for the present failures, which are known from then on
+    write_baseline  file for the present failures, for use as a baseline
     tolerate        the severest grade that does not fail a report: "invisible", "small" or "visible"; "" for none
     """
 
@@ -36,7 +36,8 @@ class Outputs:
     tolerate: str = ""
 
     def check(self) -> Known:
-        """The known failures. Raises InputError if a file cannot be read or written, before anything is computed."""
+        """The known failures of the baseline. Called before anything is computed; raises InputError if a file cannot be
+        read or written."""
         if self.tolerate not in ("", *GRADES):
             hint = f"give one of {', '.join(GRADES)}"
             raise InputError(f"'{self.tolerate}' is not a grade that can be tolerated", "--tolerate", hint)
@@ -52,7 +53,10 @@ class Outputs:
         return baseline.read(Path(self.baseline))
 
     def write(self, report: Report, known: Known) -> None:
-        """Mark known failures in the report, and write the files, each complete or not at all."""
+        """Mark known failures in the report, and write the files, each completely or not at all.
+
+        known  the result of `check`
+        """
         from .. import page
         from . import baseline, junit, sarif
 
@@ -71,7 +75,7 @@ class Outputs:
 
 
 def _tolerate(report: Report, most: str) -> None:
-    """Mark the failures of that grade or a less severe one, so that they do not fail the report."""
+    """Mark the failures of the grade `most`, or of a less severe one, so that they do not fail the report."""
     from ..verdict import TOLERATED
 
     tolerated = GRADES[: GRADES.index(most) + 1]

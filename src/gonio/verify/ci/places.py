@@ -1,4 +1,4 @@
-"""The place of a verdict in a source file, and its level, for all formats."""
+"""The place of a verdict in a source file, its level, and its texts, for all formats."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _SLIGHT = ("invisible", "noise", "fitting only")  # grades that bias no picture
 
 
 class Place(NamedTuple):
-    """A file by its path in the repository, such as "materials/glass.py", and a line of it."""
+    """A file, as its path in the repository ("materials/glass.py"), and a line in it."""
 
     file: str
     line: int
 
 
 def of(card: Card, verdict: Verdict | None = None) -> Place | None:
-    """The line that a verdict's reason names, else the first line of the class; None if no file is tested."""
+    """The line that the reasons of a verdict name, else the first line of the class; None if no file is tested."""
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
@@ -44,7 +44,7 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def of_unread(unread: Unread) -> Place | None:
-    """The line that the error names, else the first line of the shader's file."""
+    """The line that an error names, else the first line of the shader's file."""
     file = shaders.file_in(unread.target)
     if file is None:
         return None
@@ -61,17 +61,17 @@ def level(verdict: Verdict) -> str:
 
 
 def grade(verdict: Verdict) -> str:
-    """The severity in one word; "" if it is unknown."""
+    """The severity of a failure in one word; "" if it is unknown."""
     return str(getattr(verdict, "grade", "") or "")
 
 
 def cause(verdict: Verdict) -> str:
-    """The likely mistake; "" if none is known."""
+    """The probable mistake that caused a failure; "" if none is known."""
     return str(getattr(verdict, "cause", "") or "")
 
 
 def words(verdict: Verdict) -> list[str]:
-    """The failure, its meaning, and the command that repeats it, one line each."""
+    """The failure, its meaning and the command that repeats it, one line each."""
     lines = list(verdict.why) or ([verdict.notes[0]] if verdict.notes else [])
     for name, text in (
         ("likely cause", cause(verdict)),
@@ -90,7 +90,8 @@ def _settings(card: Card) -> list[str]:
 
 
 def _relative(file: Path) -> str:
-    """The path relative to the repository's root, given by CI or the current folder; else the absolute path."""
+    """The path relative to the root of the repository, which CI defines, or else to the current folder; the absolute
+    path for files outside."""
     path = file.absolute()
     root = Path(os.environ.get("GITHUB_WORKSPACE") or Path.cwd())
     for base in (root, Path.cwd()):
@@ -100,7 +101,7 @@ def _relative(file: Path) -> str:
 
 
 def _function_line(shader: str) -> int:
-    """The line on which a shader's BRDF begins, 1 if that is in another file."""
+    """The line on which the BRDF of a shader begins; 1 if it is in another file."""
     try:
         cls: Any = shaders.class_of(shader)
         name = cls.program.adapter.function

@@ -17,7 +17,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def text(report: Report) -> str:
-    """The text of the file."""
+    """The content of the file for a report."""
     laws = {verdict.law: verdict for card in report.cards for verdict in card.verdicts}
     rules = [_rule(verdict) for verdict in laws.values()]
     if report.unread:

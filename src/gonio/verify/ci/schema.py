@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def text() -> str:
-    """The text of the schema."""
+    """The content of the schema file."""
     return Path(__file__).with_name("report.schema.json").read_text(encoding="utf-8")
 
 

@@ -1,1 +1,1 @@
-"""Explanations of a failed law: ratios, factors, causes, diagnosis and reproduction."""
+"""Explanations of failed laws: ratios, factors, causes, diagnosis and reproduction."""

@@ -1,8 +1,8 @@
-"""The probable cause of a failure: named only if the ratio of two values fits a formula.
+"""The probable cause of a failure, which is stated only if the ratio of two values fits a formula.
 
-Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi shows in this ratio: the first
-factor that fits is named, the simplest first. A ratio that is 1 except in a region, on a side or in a channel is named
-by that region.
+Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi appears in this ratio. The cause is
+the first factor that fits, of those ordered by simplicity; if the ratio is 1 except in a region, on a side of the
+surface or in a channel, the cause names that region.
 
     cause = named(Ratio("weight x pdf", "eval", wo, wi, top, bottom, subject))
 """
@@ -59,7 +59,7 @@ def named(ratio: Ratio) -> Cause | None:
 
 
 def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
-    """A cause if one of the two values is constant wherever they differ, at the end of its range."""
+    """A cause if one of the two values is constant, at the end of its range, wherever they differ."""
     if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST or np.ptp(ratio.wi[bad], axis=0).max() < 0.1:
         return None  # for a single direction, all values are equal
     for values, other, name in ((ratio.above, ratio.below, ratio.top), (ratio.below, ratio.above, ratio.bottom)):
@@ -81,7 +81,7 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
 
 
 def _part(ratio: Ratio) -> Cause | None:
-    """A cause if one of two densities never exceeds the other, as when it includes fewer lobes."""
+    """A cause if one of two densities never exceeds the other, as if it included fewer lobes."""
     if "pdf" not in ratio.top or "pdf" not in ratio.bottom or "weight" in ratio.top:
         return None
     above, below = ratio.above[:, 0], ratio.below[:, 0]
@@ -101,7 +101,7 @@ def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
 
 
 def telling(ratio: Ratio) -> Ratio:
-    """The ratio restricted to pairs at which both values are finite and the denominator is not negligible."""
+    """The ratio restricted to pairs for which both values are finite and the denominator is not negligible."""
     finite = np.isfinite(ratio.above).all(1) & np.isfinite(ratio.below).all(1)
     # within 0.06 degrees of the horizon a ratio of cosines is unreliable
     finite &= np.minimum(np.abs(ratio.wo[:, 2]), np.abs(ratio.wi[:, 2])) > 1e-3
@@ -116,7 +116,12 @@ def telling(ratio: Ratio) -> Ratio:
 def nothing_below(
     top: str, bottom: str, wo: np.ndarray, wi: np.ndarray, above: np.ndarray, below: np.ndarray
 ) -> Cause | None:
-    """The cause if a numerator has no denominator in a region with a name, as samples where eval is 0."""
+    """The cause if, in a region with a name, the denominator is 0 but the numerator is not, as for samples where `eval`
+    is 0.
+
+    top, bottom   names of numerator and denominator
+    above, below  their values
+    """
     dark = np.all(below == 0.0, axis=1)
     lit: np.ndarray = np.any(above > 0.0, axis=1)
     bad = dark & lit
@@ -128,7 +133,7 @@ def nothing_below(
 
 
 def _off(ratio: Ratio) -> np.ndarray:
-    """Whether the two values differ, (N, channels)."""
+    """Whether the two values of a ratio differ, (N, channels)."""
     floor = 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     size = np.maximum(np.maximum(np.abs(ratio.above), np.abs(ratio.below)), floor)
     return np.abs(ratio.above - ratio.below) > tolerance(ratio) * size
@@ -138,7 +143,10 @@ def _off(ratio: Ratio) -> np.ndarray:
 
 
 def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The region outside of which a ratio is 1: as text, and its rows; None if no simple region fits."""
+    """The region outside of which a ratio is 1, as text and as a mask; None if no simple region fits.
+
+    bad  pairs for which the ratio is not 1
+    """
     share = float(bad.mean())
     if not 0.003 < share < 0.97 or bad.sum() < FEWEST:
         return None
@@ -149,14 +157,14 @@ def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 
 def _first(ratio: Ratio) -> np.ndarray:
-    """The ratio in the channel where it is furthest from 1, (N,)."""
+    """The ratio in the channel in which it differs most from 1, (N,)."""
     r = ratio.above / np.where(ratio.below == 0.0, np.nan, ratio.below)
     r = np.nan_to_num(r, nan=1.0)
     return r[np.arange(len(r)), np.argmax(np.abs(r - 1.0), axis=1)]
 
 
 def _places(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Simple regions, with descriptions: sides of the surface, then halves of the sphere, then ranges of an angle."""
+    """Simple regions with their descriptions: sides of the surface, halves of the sphere, then ranges of an angle."""
     o, i = wo[:, 2] > 0.0, wi[:, 2] > 0.0
     through = o != i
     yield "from outside", o
@@ -195,7 +203,7 @@ def _angles(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _place(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The first simple region that contains the bad pairs and no others: as text, and its rows."""
+    """The first simple region that contains the bad pairs and no others, as text and as a mask."""
     for words, rows in _places(wo, wi, bad):
         if (rows & bad).sum() >= 0.995 * bad.sum() and (rows & ~bad).sum() <= 0.005 * rows.sum() + 0.5:
             return words, rows
@@ -203,7 +211,7 @@ def _place(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> tuple[str, np.nda
 
 
 def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """The region of the bad pairs as text, "" if no simple region contains exactly these."""
+    """The region of the bad pairs as text; "" if no simple region contains exactly these."""
     place = _place(wo, wi, bad) if bad.any() and not bad.all() else None
     return place[0] if place else ""
 
@@ -212,7 +220,7 @@ DENSE = 0.3  # fraction of a region's pairs that must be bad
 
 
 def within(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """The tightest simple region that contains all bad pairs, though not only these, as text: opposite azimuths, or an
+    """The tightest simple region, as text, that contains all bad pairs but may contain others: opposite azimuths, or an
     interval of an angle; "" if none is tight."""
     if bad.sum() < 4:
         return ""

@@ -1,4 +1,4 @@
-"""Whether the channels of a color affect one another: a mean, maximum or luminance in place of each channel."""
+"""Detection of colors whose channels affect one another, as if each were replaced by a mean, maximum or luminance."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FIRST, SECOND = (0.6, 0.3, 0.2), (0.6, 0.1, 0.9)  # equal in red only
 
 
 def mixed(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Cause | None:
-    """The color whose green and blue channels affect red values; None if there is none."""
+    """A color whose green and blue channels affect red values; None if there is none."""
     names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high <= 1.0]
     for name in names:
         low = subject.parameters[name].low

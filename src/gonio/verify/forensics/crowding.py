@@ -1,6 +1,6 @@
-"""The difference between samples and pdf: where it is, how large, and the factor that would remove it.
+"""The difference between samples and pdf: its place, its size, and the factor that would remove it.
 
-The samples are the reference: the cells of the chi-square test hold their counts, and the pdf's expectation is
+The samples are the reference: the cells of the chi-square test contain their counts, and the expectation by the pdf is
 multiplied by each factor of the table. The first factor that leaves no difference, in the cells of one wo and in int
 pdf for all others, is the cause.
 """
@@ -35,9 +35,13 @@ BEFORE = 0.08  # smallest difference whose cause is determined
 
 @dataclasses.dataclass(frozen=True)
 class Blocks:
-    """Blocks of cells of one wo: their counts of samples (B,), and the data of the cells.
+    """Blocks of cells of one wo.
 
-    wi, area, expected, block  per cell, (C, 3), (C,), (C,), (C,): center, solid angle, expectation, index of the block
+    observed  number of samples in each block, (B,)
+    wi        centers of the cells, (C, 3)
+    area      their solid angles, (C,)
+    expected  expected number of samples in each cell, (C,)
+    block     index of each cell's block, (C,)
     """
 
     wo: np.ndarray
@@ -49,12 +53,12 @@ class Blocks:
     block: np.ndarray
 
     def joined(self, values: np.ndarray) -> np.ndarray:
-        """Values of the cells (C,), summed over each block, (B,)."""
+        """The sum of the cells' values (C,) over each block, (B,)."""
         return np.bincount(self.block, values, len(self.observed))
 
 
 def blocks(cells: SampleCells) -> Blocks | None:
-    """The cells of a test, in blocks; None if their wo is unknown."""
+    """The cells of a chi-square test, combined into blocks; None if their wo is unknown."""
     if cells.wo is None:
         return None
     a, b, c, d = boxes(cells.rows, cells.columns)
@@ -69,7 +73,7 @@ def blocks(cells: SampleCells) -> Blocks | None:
 
 
 def crowd(subject: Subject, held: Blocks) -> str:
-    """The worst difference of one sign between samples and pdf, its place, and the light in those cells, as text."""
+    """The largest difference of one sign between samples and pdf, its place, and the light in those cells, as text."""
     expected = held.joined(held.expected)
     off = (held.observed - expected) / np.sqrt(np.maximum(expected, FULL))
     sign = 1.0 if np.sum(np.maximum(off, 0.0) ** 2) >= np.sum(np.minimum(off, 0.0) ** 2) else -1.0
@@ -97,7 +101,8 @@ def crowd(subject: Subject, held: Blocks) -> str:
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The factor between samples and pdf; None if none fits. For the arguments, see `mixture.named`."""
+    """The factor by which samples and pdf differ, as a cause; None if none fits. For the arguments, see
+    `mixture.named`."""
     light = estimators.of_subject(subject)
     total = float(held.observed.sum())
     for formula, guess, field, of_wo in _factors(subject):
@@ -138,8 +143,8 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
-    """The likely cause if samples follow the pdf's distribution, but their number differs from it by a factor that
-    depends on wo."""
+    """The probable cause if samples follow the distribution of the pdf, but their number differs from the expectation
+    by a factor that depends on wo."""
     agree = f"samples over pdf are {scale:.3g} for all wi, and another number for other wo"
     u = directions.numbers(np.random.default_rng(46), DRAWN)
     s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
@@ -183,7 +188,7 @@ def _sides(held: Blocks) -> Cause | None:
 
 
 def effect(expected: np.ndarray, observed: np.ndarray) -> float:
-    """RMS of observed / expected - 1 beyond the noise of the counts."""
+    """The RMS of observed / expected - 1, minus the noise of the counts."""
     order = np.argsort(expected)
     low = expected[order] < FULL
     e = np.append(expected[order][~low], expected[order][low].sum())
@@ -196,7 +201,7 @@ def effect(expected: np.ndarray, observed: np.ndarray) -> float:
 
 
 def _factors(subject: Subject) -> Iterator[Factor]:
-    """Constants, other sampling densities, and factors of the table, the simplest first."""
+    """The candidate factors: constants, other sampling densities, and factors of the table, the simplest first."""
 
     def over_pdf(o: np.ndarray, i: np.ndarray, value: Callable[[np.ndarray, np.ndarray], Any]) -> np.ndarray:
         pdf = subject.pdf(o, i)
@@ -220,7 +225,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
 
 
 def unsampled(subject: Subject) -> str:
-    """A description of where int pdf exceeds the fraction of valid samples; "" if it does not."""
+    """A description of the views for which int pdf exceeds the fraction of valid samples; "" if there are none."""
     light = estimators.of_subject(subject)
     excess = light.claimed - light.drawn
     row = int(np.argmax(excess))

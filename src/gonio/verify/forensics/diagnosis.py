@@ -1,6 +1,6 @@
-"""The explanation of failures: their effect on a picture, their probable cause, and which of them follow from others.
+"""The explanation of failures: their effect on a picture, their probable cause, and their dependence on one another.
 
-It runs after all laws, and only for those that fail; a report without failures costs nothing extra.
+It runs after all laws, and only for those that fail, so a report without failures costs nothing extra.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LIMIT = 60.0  # seconds per law; the explanation takes less than one unless the 
 
 
 class Answer(NamedTuple):
-    """A law's verdict, and the subject and the finding behind it."""
+    """A law's verdict, with the subject and the finding on which it is based."""
 
     law: Law
     verdict: Verdict
@@ -44,7 +44,8 @@ class Answer(NamedTuple):
 def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callable[[Law, Subject], Verdict]) -> None:
     """Set `bias`, `grade` and `cause` of the verdicts of one card that fail, or are violated as declared.
 
-    judge  tests another subject against a law, at a lower cost
+    answers  the verdicts of the card
+    judge    function (law, subject) that tests another subject and returns the verdict
     """
     failed = [answer for answer in answers if answer.verdict.status in (FAIL, DECLARED)]
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
@@ -98,7 +99,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
 
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The failures, ordered so that those from which others follow come first."""
+    """The failures among verdicts, ordered so that those from which others follow come first."""
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
@@ -140,7 +141,7 @@ def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: i
 
 
 def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verdict]) -> tuple[Grade, str] | None:
-    """The grade and the reason if a material, or one inside it, violates a law by nature."""
+    """The grade and the reason if a material, or an inner one, violates a law by nature; None if not."""
     reason = subject.by_nature.get(law.name)
     if reason:
         return Grade.BY_NATURE, reason

@@ -1,4 +1,4 @@
-"""Where values that are negative or not finite occur: at which parameter value, random number or side."""
+"""The conditions under which values are negative or not finite: parameter values, random numbers or sides."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ Bad = tuple[str, np.ndarray, np.ndarray | None]
 
 
 def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fails: Callable[[Subject], bool]) -> str:
-    """The changed parameters that a fault needs, as text: "for tint = 0"; "" if none is needed, or if there are too
+    """The changed parameters without which a fault does not occur, as text: "for tint = 0"; "" if there are none or too
     many.
 
-    settings  the values at which the fault occurs
-    fails     whether a subject has the fault
+    settings  parameter values at which the fault occurs
+    fault     the fault, as text
+    fails     function that returns whether a subject has the fault
     """
     if not settings or len(settings) > MOST or fails(subject):
         return ""
@@ -50,7 +51,7 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
 
 
 def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cause | None:
-    """The random number whose extreme value causes the fault; None if it occurs at other values too."""
+    """A cause if the extreme value of a random number causes the fault; None if it also occurs at other values."""
     for what, bad, u in rows:
         if u is None or not bad.any():
             continue
@@ -66,9 +67,10 @@ def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cau
 
 
 def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: bool) -> Cause | None:
-    """The side of the surface, and the angle, of the views with the fault; None if neither singles them out.
+    """The side of the surface, and the angle, of the views with a fault; None if neither distinguishes them.
 
-    wo, bad  directions and faults of the same samples, (N, 3) and (N,)
+    what     name of the faulty quantity
+    wo, bad  directions of samples, (N, 3), and whether each sample has the fault, (N,)
     """
     below = wo[:, 2] < 0.0
     sides = [side for side in (below, ~below) if side.any() and not np.any(bad & ~side)]

@@ -1,6 +1,8 @@
 """The table of factors that may be missing, doubled or misplaced: products of cosines, powers of the index, widths of
-a distribution, the Fresnel term. A factor is a field over (wo, wi). `fits` looks for the factor by which the ratio of
-two values must be divided, `crowding` for that by which a pdf must be multiplied to give the density of the samples.
+a distribution, the Fresnel term.
+
+A factor is a function of (wo, wi). `fits` looks for the factor by which the ratio of two values must be divided,
+`crowding` for that by which a pdf must be multiplied to give the density of the samples.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps (wo, w
 
 
 class Factor(NamedTuple):
-    """A factor: its formula, the mistake that it suggests, and its values; with `of_wo`, up to a constant per wo."""
+    """A factor: its formula, the mistake that it suggests, and its values. With `of_wo`, the values hold up to a constant
+    per wo."""
 
     formula: str
     guess: str
@@ -30,7 +33,8 @@ class Factor(NamedTuple):
 
 
 class Cosine(NamedTuple):
-    """A cosine or sine in a factor's formula: the mistake that it suggests, and its values over (wo, wi, m)."""
+    """A cosine or sine in the formula of a factor: the mistake that it suggests, and its values as a function of
+    (wo, wi, m)."""
 
     guess: str
     field: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -52,19 +56,20 @@ COSINES = {
 
 
 def half_vector(wo: np.ndarray, wi: np.ndarray, eta: np.ndarray | float = 1.0) -> np.ndarray:
-    """The half vector on wo's side: of a reflection, or of a refraction with eta, wi's index divided by wo's."""
+    """The half vector on wo's side, of a reflection or, with eta (the index on wi's side divided by that on wo's), of a
+    refraction."""
     m = wo + (eta[:, None] if isinstance(eta, np.ndarray) else eta) * wi
     m = m / np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
     return m * np.copysign(1.0, np.sum(m * wo, axis=1, keepdims=True))
 
 
 def values_of(names: Sequence[str], wo: np.ndarray, wi: np.ndarray, m: np.ndarray) -> np.ndarray:
-    """The values of some of COSINES, (N, names), kept above 0 so that they have logarithms."""
+    """The values of some COSINES, (N, names), clamped to be positive so that they have logarithms."""
     return np.maximum(np.abs(np.stack([COSINES[name].field(wo, wi, m) for name in names], axis=1)), 1e-9)
 
 
 def product(scale: float | str, powers: Mapping[str, int]) -> str:
-    """A scale times powers as a formula: "4 (o.m)", "1 / (4 (o.m))", "cos_i / cos_o"."""
+    """A scale times powers of cosines as a formula: "4 (o.m)", "1 / (4 (o.m))", "cos_i / cos_o"."""
 
     def joined(sign: int) -> list[str]:
         chosen = [(name, abs(p)) for name, p in powers.items() if p * sign > 0]
@@ -82,12 +87,12 @@ def product(scale: float | str, powers: Mapping[str, int]) -> str:
 
 
 def guess_of(names: Sequence[str]) -> str:
-    """The mistakes that the given names of COSINES suggest."""
+    """The mistakes that some COSINES suggest, by their names."""
     return " and ".join(COSINES[name].guess for name in names)
 
 
 def cosines(names: Sequence[str]) -> Iterator[Factor]:
-    """Products of one or two cosines of a reflection, each to the power 1 or -1."""
+    """The factors that are products of one or two cosines of a reflection, each to the power 1 or -1."""
     for count in (1, 2):
         for which in itertools.combinations(names, count):
             for powers in itertools.product((1, -1), repeat=count):
@@ -105,7 +110,7 @@ def cosines(names: Sequence[str]) -> Iterator[Factor]:
 
 
 def index_below(subject: Subject) -> Iterator[float]:
-    """The index below divided by that above, by the samples and by a parameter named eta, unless it is 1."""
+    """The index below divided by that above, from the samples and from a parameter named eta, unless it is 1."""
     if not subject.transmits:
         return
     wo = directions.on_side(directions.uniform(np.random.default_rng(4), 2048), 1)
@@ -129,7 +134,8 @@ SIDES = {"": 0.0, " from outside": 1.0, " from inside": -1.0}
 
 
 def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence[str] = ("",)) -> Iterator[Factor]:
-    """Powers of the index in transmission, inverted from below; from both sides, or from one of SIDES only."""
+    """The factors that are powers of the index in transmission, inverted for light from below; for both sides, or for
+    one of SIDES only."""
     for eta in index_below(subject):
         for place in sides:
             for power in powers:
@@ -144,8 +150,8 @@ def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence
 
 
 def normals(subject: Subject) -> Iterator[Factor]:
-    """The ratio of the density of visible normals to that of all normals, apart from the masking of wo, and its
-    inverse."""
+    """The factors for sampling visible normals instead of all normals: the ratio of their densities, without the masking
+    of wo, and its inverse."""
     visible, all_ = "visible normals", "all normals"
     for eta in [*index_below(subject)] or [1.0]:
         for power, drawn, stated in ((1.0, visible, all_), (-1.0, all_, visible)):
@@ -161,7 +167,7 @@ def normals(subject: Subject) -> Iterator[Factor]:
 
 
 def refractions(subject: Subject) -> Iterator[Factor]:
-    """Powers of the cosines of a refraction and of its index."""
+    """The factors that are powers of the cosines of a refraction and of its index."""
     names = ("(o.m)", "(i.m)", "cos_i", "cos_o", "cos_m")
     singles = [{name: power} for name in names for power in (1, -1, 2, -2)]
     pairs = [{a: p, b: q} for a, b in itertools.combinations(names, 2) for p in (1, -1) for q in (1, -1)]
@@ -189,7 +195,7 @@ WIDTH = "alpha in place of alpha^2, or the reverse"
 
 
 def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
-    """The subject with its two widths swapped, with alpha^2, and with sqrt(alpha), if that changes anything."""
+    """The subject with its two widths swapped, with alpha^2 and with sqrt(alpha), each if it changes values."""
     pair = getattr(subject.model, "alpha", None)
     if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
         exchanged = subject.replace(alpha=(pair[1], pair[0]))
@@ -211,7 +217,8 @@ def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
 
 
 def distributions(subject: Subject) -> Iterator[Factor]:
-    """Ratios of D at another width, alpha^2 or sqrt(alpha), to D at alpha, for GGX and Beckmann, and their inverses."""
+    """The factors for another width: ratios of D at alpha^2 or sqrt(alpha) to D at alpha, for GGX and Beckmann, and
+    their inverses."""
     value = getattr(subject.model, "alpha", None)
     if not isinstance(value, int | float | tuple | list) or np.size(value) > 2:
         return
@@ -245,7 +252,7 @@ def _ggx(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
 
 
 def _beckmann(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """D of Beckmann (Heitz2014, eq. 81), kept above 0 so that ratios stay finite."""
+    """D of Beckmann (Heitz2014, eq. 81), clamped to be positive so that ratios are finite."""
     q = ((m[:, 0] / alpha[0]) ** 2 + (m[:, 1] / alpha[1]) ** 2) / m[:, 2] ** 2
     return np.asarray(np.exp(-np.minimum(q, 600.0)) / (np.pi * alpha[0] * alpha[1] * m[:, 2] ** 4))
 
@@ -256,7 +263,8 @@ AT_NORMAL = "Fresnel's term at the normal in place of the half vector"
 
 
 def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
-    """The exact F of a dielectric at n.o divided by that at o.m, or at n.i: F in reflection, 1 - F in transmission."""
+    """The factors for F at the wrong cosine: the exact F of a dielectric at n.o divided by that at o.m, or at n.i, with
+    F for reflection and 1 - F for transmission."""
     for eta in index_below(subject):
 
         def field(o: np.ndarray, i: np.ndarray, eta: float = eta) -> np.ndarray:
@@ -281,7 +289,8 @@ def _inverse(field: Field, o: np.ndarray, i: np.ndarray) -> np.ndarray:
 
 
 def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Reflectance of unpolarized light, from the cosine >= 0 and the relative index eta (Walter2007, eq. 22)."""
+    """Reflectance of a dielectric for unpolarized light, from the cosine >= 0 and the relative index eta (Walter2007,
+    eq. 22)."""
     square = eta**2 - 1.0 + cosine**2
     g = np.sqrt(np.maximum(square, 0.0))
     plus = np.maximum(g + cosine, 1e-12)
@@ -290,7 +299,7 @@ def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
 
 
 def schlick_curve(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Schlick's curve, as a function of the cosine on the side of the smaller index."""
+    """Schlick's curve for a dielectric, as a function of the cosine on the side of the lower index."""
     r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
     sin2 = (1.0 - cosine**2) / eta**2
     outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cosine)

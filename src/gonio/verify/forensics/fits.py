@@ -1,5 +1,7 @@
-"""Fits a formula to the ratio of two values that should be equal: a constant, a factor of the table, or a factor with
-fitted constants. The result is the simplest formula that holds for nearly every pair of directions.
+"""Fit a formula to the ratio of two values that should be equal: a constant, a factor of the table, or a factor with
+fitted constants.
+
+The result is the simplest formula that holds for nearly every pair of directions.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ FEWEST = 64  # pairs of directions that a fit needs
 
 
 def fitted(ratio: Ratio) -> Fit | None:
-    """The first candidate formula that explains a ratio everywhere."""
+    """The first candidate formula that explains a ratio everywhere; None if none does."""
     if len(ratio.wo) < FEWEST:
         return None
     plain = scalar(ratio)
@@ -30,7 +32,7 @@ def fitted(ratio: Ratio) -> Fit | None:
 
 
 def simple(ratio: Ratio) -> Fit | None:
-    """The fit by a known number, a color or powers of cosines, without evaluating another material; None if none."""
+    """The fit by a known number, a color or powers of cosines, which needs no other evaluations; None if none holds."""
     if len(ratio.wo) < FEWEST:
         return None
     fit = _constant(ratio)
@@ -44,7 +46,7 @@ def _reflects(ratio: Ratio) -> bool:
 
 
 def _constant(ratio: Ratio) -> Fit | None:
-    """The same factor everywhere: pi, 2, 4, or an unnamed one, including 0 and -1."""
+    """The fit by the same factor everywhere: pi, 2, 4 or any other number, including 0 and -1."""
     r = scalar(ratio)
     if r is None:
         return None
@@ -67,7 +69,7 @@ def _constant(ratio: Ratio) -> Fit | None:
 
 
 def _color(ratio: Ratio) -> Fit | None:
-    """A constant per channel: an albedo or a tint that one of the two values lacks."""
+    """The fit by one constant per channel, an albedo or a tint that one of the two values lacks."""
     if ratio.above.shape[1] != 3 or ratio.antisymmetric or np.any(ratio.below <= 0.0):
         return None
     r = ratio.above / ratio.below
@@ -87,7 +89,7 @@ COSINES = ("(o.m)", "cos_m", "cos_i", "cos_o", "sin_i", "sin_o")
 
 
 def _cosines(ratio: Ratio) -> Fit | None:
-    """Powers of the cosines of a reflection, times a known number: 4 (o.m), cos_i, cos_o / cos_i, sin_i ..."""
+    """The fit by powers of the cosines of a reflection, times a known number: 4 (o.m), cos_i, cos_o / cos_i, sin_i ..."""
     r = scalar(ratio)
     if r is None or not _reflects(ratio):
         return None
@@ -109,7 +111,7 @@ def _cosines(ratio: Ratio) -> Fit | None:
 
 
 def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], positive: np.ndarray) -> Fit | None:
-    """Integer powers of some cosines, by least squares."""
+    """The fit by integer powers of some cosines, by least squares."""
     if np.any(np.ptp(np.percentile(logs, [5.0, 95.0], axis=0), axis=0) < 0.05):
         return None  # nearly constant: any power would fit
     rows = np.flatnonzero(positive)
@@ -133,7 +135,7 @@ def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], pos
 
 
 def _of_table(ratio: Ratio, table: Iterator[factors.Factor]) -> Fit | None:
-    """The first factor of a table that equals the ratio."""
+    """The fit by the first factor of a table that equals the ratio."""
     r = scalar(ratio)
     for factor in table if r is not None else ():
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -200,7 +202,7 @@ SCHLICK = {"n.o": "cos_o", "n.i": "cos_i", "o.m": "(o.m)", "n.m": "cos_m"}
 
 
 def _schlick(ratio: Ratio) -> Fit | None:
-    """Schlick's F at another cosine, such as n.o instead of o.m. R0 is fitted per channel."""
+    """The fit by Schlick's F at another cosine, such as n.o instead of o.m, with R0 fitted per channel."""
     if not _reflects(ratio):
         return None
     wo, wi, m = ratio.wo, ratio.wi, factors.half_vector(ratio.wo, ratio.wi)
@@ -225,7 +227,7 @@ def _schlick(ratio: Ratio) -> Fit | None:
 
 
 def _schlick_quotient(ratio: Ratio, r: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of a ratio divided by (R0 + (1 - R0) x) / (R0 + (1 - R0) y), with R0 solved for."""
+    """Spread and cover, as in `holds`, of a ratio divided by (R0 + (1 - R0) x) / (R0 + (1 - R0) y), with R0 fitted."""
     spread, cover = 0.0, 1.0
     for column in r.T:
         # the equation is linear in R0
@@ -251,7 +253,8 @@ KNOTS = 97  # of a function that may have kinks, such as a smooth step at the ho
 
 
 def _one_direction(ratio: Ratio) -> Fit | None:
-    """f(wo, wi) / f(wi, wo) = g(cos_o) / g(cos_i): a term of one of the two directions only."""
+    """The fit by f(wo, wi) / f(wi, wo) = g(cos_o) / g(cos_i), for a term that depends on one of the two directions
+    only."""
     r = scalar(ratio) if ratio.antisymmetric else None
     if r is None or not _reflects(ratio) or not np.all(r > 0.0):
         return None

@@ -1,11 +1,11 @@
-"""Why a material reflects more light than arrives: which part of it gains, and how the gain depends on parameters.
+"""The reason why a material reflects more light than arrives: the part that gains, and parameters that matter.
 
-Without absorption, a normalized part reflects at most 1. So the albedos of the lossless variant reveal
+Without absorption, a normalized part reflects at most 1. So the albedos of the lossless variant reveal causes:
 
-    parts       with one color 1 and the others 0: which part gains by itself, or whether only their sum does
-    parameters  proportional to a power of one: a normalization lacks it; or no gain at one end of its range
-    lobes       at a smooth interface: transmission that is not what reflection leaves
-    views       1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
+    parts       with one color 1 and the others 0: the part that gains by itself, or that only the sum of parts gains
+    parameters  albedo proportional to a power of one: a normalization lacks it; or no gain at one end of its range
+    lobes       at a smooth interface: transmission and reflection whose sum is not 1
+    views       albedo 1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
 """
 
 from __future__ import annotations
@@ -36,7 +36,11 @@ MOST = 6  # largest number of parameters, or of colors
 
 
 def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
-    """The parts, parameters and views on which a gain depends; `white` is the subject without absorption."""
+    """The parts, parameters and views on which a gain depends.
+
+    white   the subject without absorption
+    albedo  function that returns the albedos of a subject
+    """
     if not isinstance(white.model, BSDF) or white.stochastic:
         return
     here = albedo(white)
@@ -55,7 +59,7 @@ def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
 
 
 def _parts(white: Subject, albedo: Albedo, here: float) -> str:
-    """A description of the colors whose part gains by itself; "" if there are fewer than two colors or no such part."""
+    """A description of the colors whose part gains on its own; "" if there are fewer than two colors or no such part."""
     colors = {
         leaf.path: leaf.parameter
         for leaf in tree.leaves(white.model)
@@ -100,8 +104,8 @@ def _of(subject: Subject, values: dict[str, Any], albedo: Albedo) -> np.ndarray 
 
 
 def _numbers(white: Subject) -> Iterator[tuple[str, str, Callable[[float], Any], float, float, float]]:
-    """Numeric parameters except colors and angles, widths one at a time: name, path, the function from a number to the
-    parameter's value, the current number, and its range."""
+    """The numeric parameters except colors and angles, with each width separately: name, path, the function from a
+    number to the value of the parameter, the current number, and its range."""
     for leaf in tree.leaves(white.model):
         parameter, value = leaf.parameter, leaf.value
         if not parameter.numeric or parameter.white is not None or parameter.kind in ("angle", "spectrum"):
@@ -120,7 +124,8 @@ def _pair(value: float, other: float, first: bool) -> tuple[float, float]:
 
 
 def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | None, Cause | None]:
-    """The powers of parameters to which the albedo at the normal is proportional, or an end of a range without gain."""
+    """A description of the powers of parameters to which the albedo at the normal is proportional, or of an end of a
+    range without gain."""
     powers: dict[str, float] = {}
     ends: list[Cause] = []
     scale = 1.0
@@ -172,7 +177,7 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
 
 
 def _views(here: np.ndarray) -> Cause | None:
-    """A cause if the albedo is 1 at the normal and a power of the cosine elsewhere."""
+    """A cause if the albedo is 1 at the normal and proportional to a power of the cosine elsewhere."""
     a = here.mean(1)
     if a[0] < LEAST_AT_NORMAL or a[0] > 1.0 + GAIN or a.max() < 1.0 + GAIN:
         return None
@@ -192,7 +197,7 @@ EXACT = 1e-3  # tolerance for the light of delta lobes
 
 
 def of_lobes(subject: Subject, seed: int) -> Iterator[Cause]:
-    """Causes by what delta lobes transmit, if that is not what their reflection leaves."""
+    """Causes from the delta lobes, if the sum of their reflected and transmitted light is not 1."""
     wo = directions.single(directions.at(np.array(VIEWS[1:]), 37.0))
     known = lobes.of(subject, wo, seed, "importance")
     through = known.through(wo)

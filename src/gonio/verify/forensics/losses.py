@@ -1,4 +1,4 @@
-"""Where a white furnace loses light: the parameters at whose ends the loss vanishes."""
+"""The reason why a white furnace loses light: parameters for whose extreme values the loss vanishes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LITTLE = 0.2  # fraction of the loss that counts as none
 
 
 def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> Iterator[Cause]:
-    """The parameters on which a loss depends: mixed parameters, or a parameter with which it grows.
+    """The parameters on which a loss depends: a mixture of several, or a single one with which it increases.
 
     white  the subject without absorption
     loss   function that returns the largest loss of a subject in a furnace
@@ -44,7 +44,7 @@ def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> It
 
 
 def _ranges(model: BSDF) -> list[tuple[str, float, tuple[float, float]]]:
-    """The numbers with a finite range, except colors: path, value and ends."""
+    """The numeric parameters with a finite range, except colors: path, value, and the ends of the range."""
     result: list[tuple[str, float, tuple[float, float]]] = []
     for leaf in tree.surface(model):
         parameter, value = leaf.parameter, leaf.value

@@ -1,10 +1,10 @@
-"""Whether a distribution's Lambda is that of its D.
+"""A check of whether the Lambda of a distribution is that of its D.
 
-The facets that are visible from wo fill the surface's projected area (Heitz2014, eq. 14), so
+The facets that are visible from wo fill the projected area of the surface (Heitz2014, eq. 14), so
 
     int D(m) max(wo . m, 0) dm = (1 + Lambda(wo)) cos theta_o.
 
-A wrong Lambda satisfies every other law as long as it only dims the light, since D and the density of normals are
+A wrong Lambda satisfies every other law as long as it only reduces the light, since D and the density of normals are
 correct.
 """
 
@@ -28,7 +28,7 @@ MISMATCH = 0.01  # of 1 + Lambda: the errors of Gonio's tables and of published 
 
 
 def mismatch(subject: Subject) -> str:
-    """A description of the largest difference between 1 + Lambda and the projected area by D; "" if they agree, or if
+    """A description of the largest difference between 1 + Lambda and the projected area of D; "" if they agree, or if
     there is no such distribution."""
     model = subject.model
     ndf, alpha = getattr(model, "ndf", None), getattr(model, "alpha", None)
@@ -54,7 +54,7 @@ def mismatch(subject: Subject) -> str:
 
 
 def _areas(ndf: object, alpha: tuple[float, float], wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """1 + Lambda of wo (N, 3), and the projected area of facets by D divided by cos theta_o, (N,) each."""
+    """1 + Lambda for wo (N, 3), and the projected area of the facets of D divided by cos theta_o, (N,) each."""
     types = backend.types("float64")
     pair = types.vec2(*(backend.float_of(one, types) for one in alpha))
     # slopes at equal steps of an angle: dense where D is large, and up to the horizon

@@ -1,10 +1,10 @@
-"""Where samples lie that the pdf does not predict, if no single factor of `crowding` explains them.
+"""The places of samples that the pdf does not predict, if no single factor of `crowding` explains them.
 
-The counts o and expectations e of blocks of cells have a ratio r = o / e. Three patterns of r have a name:
+The counts o and expectations e of blocks of cells have a ratio r = o / e. Three patterns of r are recognized:
 
-    the pdf in another frame     samples follow pdf(wo, M wi), with M a rotation about the normal or a mirror image
-    two parts                    r is a constant c in most blocks; elsewhere only larger (the pdf lacks a lobe), or only
-                                 smaller (the pdf has a lobe that is never sampled)
+    the pdf in another frame     samples follow pdf(wo, M wi), where M is a rotation about the normal or a mirror image
+    two parts                    r is a constant c in most blocks, and elsewhere only larger than c (the pdf lacks a
+                                 lobe), or only smaller (the pdf has a lobe that is never sampled)
     one variable                 r is a function of one angle, whose distribution differs from that in the pdf
 """
 
@@ -37,7 +37,7 @@ FEW = 0.06  # fraction of the hemisphere below which a crowd is a ring or a poin
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The pattern of the difference; None if it has none. For the arguments, see `mixture.named`."""
+    """The pattern of the difference, as a cause; None if there is no pattern. For the arguments, see `mixture.named`."""
     expected = held.joined(held.expected)
     if held.observed.sum() < 1000 or expected.sum() <= 0.0:
         return None
@@ -55,7 +55,8 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Rotations about the normal and mirror images: as text, with the mistake that they suggest and their matrix."""
+    """Rotations about the normal and mirror images: for each, its description, the mistake that it suggests, and its
+    matrix."""
     guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
     for path, angle in _angles(subject):
         for factor in (1.0, -1.0, 2.0, -2.0):
@@ -162,8 +163,8 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
 
 
 def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
-    """A description of where most of a weight per block is, "" if it is everywhere; and whether it fills a small part
-    of the sphere."""
+    """A description of the place of most of a weight per block ("" if it is everywhere), and whether the place is a
+    small part of the sphere."""
     area = held.joined(held.area)
     share = weight / max(float(weight.sum()), 1e-30)
     order = np.argsort(-share / np.maximum(area, 1e-12))
@@ -221,7 +222,8 @@ VARIABLES: dict[str, tuple[str, Variable]] = {
 
 
 def _one_variable(cells: SampleCells, held: Blocks, before: float) -> Cause | None:
-    """The only angle on which the ratio of samples to pdf depends: one ratio per step of it removes the difference."""
+    """A cause if the ratio of samples to pdf depends on one angle only: one ratio per step of this angle removes the
+    difference."""
     wo = np.broadcast_to(held.wo, held.wi.shape)
     e, o = held.expected, cells.observed.ravel().astype(float)
     best: tuple[float, str, str, np.ndarray] | None = None

@@ -1,5 +1,5 @@
-"""The laws, one file each. To add a law, add a file to this folder, an entry point to a package, or a registered class:
-see `gonio.members`.
+"""The laws, one file each. To add a law, add a file to this folder or an entry point to a package, or register a class
+(see `gonio.members`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ def laws() -> dict[str, Law]:
 
 
 def chosen(names: Sequence[str] | None) -> list[Law]:
-    """The laws with these names in the order of a report; for None, all except those on request. Raises InputError for
-    an unknown name."""
+    """The laws with the given names, in the order of a report.
+
+    names  names of laws; None selects all except those that are tested on request only
+    Raises InputError for an unknown name.
+    """
     asked = None if names is None else {Law.family.get(name).name for name in names}
     return [law for name, law in laws().items() if (not law.on_request if asked is None else name in asked)]

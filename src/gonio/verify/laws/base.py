@@ -17,16 +17,16 @@ from ..verdict import Finding
 
 
 class Law:
-    """A law, which returns a Finding for a subject, or raises DoesNotApply.
+    """A law. Its method `judge` returns a Finding for a subject, or raises DoesNotApply.
 
-    number   its place in the report; Gonio's own are 1 to 13
-    name     its name on the command line and in `known_violations`
-    title    the law as a sentence
-    meaning  the effect of a violation on pictures
+    number      its place in the report; those of Gonio's laws are 1 to 13
+    name        its name on the command line and in `known_violations`
+    title       the law as a sentence
+    meaning     the effect of a violation on pictures
     everywhere  whether it is also tested at other parameter values
-    at_ends     whether these may lie at the ends of their ranges
-    samples     whether it tests `sample`; guides are computed at only a few other parameter values
-    on_request  whether it is tested only when it is named
+    at_ends     whether these values may lie at the ends of their ranges
+    samples     whether it tests `sample`; if a material needs a guide, few other parameter values are tested
+    on_request  whether it is tested only if it is named
     """
 
     family: ClassVar[Family[Law]]
@@ -43,11 +43,16 @@ class Law:
         raise NotImplementedError(f"{type(self).__name__} has no judge")
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias | None:
-        """The effect of a failure on a picture; None if it is unknown. Called only after a failure."""
+        """The effect of a failure on a picture; None if it is unknown. Called only after a failure.
+
+        finding  the finding of the failure
+        seed     seed of the random numbers
+        """
         return None
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
-        """Ratios that may determine a failure's cause, or causes that are already known, the best first."""
+        """Ratios from which the cause of a failure may be determined, or causes that are already known, the best first.
+        Arguments as for `bias`."""
         return ()
 
 
@@ -55,15 +60,17 @@ Law.family = Family("law", "gonio.laws", ["gonio.verify.laws"], instances_of(Law
 
 
 def where_found(subject: Subject, finding: Finding) -> Subject:
-    """The subject with the settings of a finding."""
+    """The subject with the parameter values of a finding."""
     return subject.replace(**finding.settings) if finding.settings else subject
 
 
 def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (wo, wi) at which the subject may be positive, (count, 3) each: a third uniform on the sphere, a third with
-    wi sampled by the model (narrow lobes), a third near grazing angles.
+    """Pairs (wo, wi) for which `eval` may be positive, (count, 3) each: a third uniform on the sphere, a third with wi
+    sampled by the subject (for narrow lobes), and a third near grazing angles.
 
-    They are rounded to float32, so that both precisions get the same input; with `exact`, they are 64-bit unit vectors.
+    seed   seed of the directions
+    exact  whether they are 64-bit unit vectors; else they are rounded to float32, so that both precisions get the same
+           input
     """
     key = f"pairs {count} {seed} {exact}"
     if key not in subject.memo:  # several laws use the same pairs
@@ -109,8 +116,11 @@ def rounding(
 ) -> np.ndarray:
     """The change of a value if both directions change by ALLOWED rounding errors of float32 (6e-8 each), (N, channels).
 
-    Narrow lobes magnify the rounding error of a half vector by 1 / alpha, and a step that close may be crossed; no
-    float32 code can be more accurate.
+    Narrow lobes magnify the rounding error of a half vector by 1 / alpha, and a step within this distance may be
+    crossed; no float32 code can be more accurate.
+
+    function  function (wo, wi) that returns the values, (N, channels)
+    times     number of random changes
     """
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
@@ -138,10 +148,12 @@ def beyond_rounding(
     floor: float | np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """The relative difference of a and b (N, channels) beyond the effect on `function` of rounding the directions.
+    """The relative difference of a and b, (N, channels), minus the effect of rounding the directions on `function`.
 
-    Pairs whose plain difference is below a hundredth of the tolerance keep it. Pairs above the tolerance are examined
-    again: four random changes of direction may miss how fast a value changes where it is steepest.
+    Rounding is not considered for pairs whose difference is below a hundredth of the tolerance. Pairs above the
+    tolerance are examined again with more changes of direction, since four may miss the steepest change of a value.
+
+    floor  smallest value by which differences are divided
     """
     error = relative(a, b, 0.0, floor)
     for seed, times, least in ((0, ROUNDINGS, MINOR * tolerance), (1, CLOSER, tolerance)):
@@ -157,13 +169,13 @@ def beyond_rounding(
 def relative(
     a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """(|a - b| - noise) / max(|a|, |b|, floor), never below 0."""
+    """(|a - b| - noise) / max(|a|, |b|, floor), clamped to >= 0."""
     size = np.maximum(np.maximum(np.abs(a), np.abs(b)), floor)
     return np.maximum(np.abs(a - b) - noise, 0.0) / np.where(size > 0.0, size, 1.0)
 
 
 def worst_of(error: np.ndarray) -> tuple[int, float]:
-    """Row and size of the largest entry of (N,) or (N, channels); NaN counts as infinite."""
+    """The index and the size of the largest error in an array (N,) or (N, channels), where NaN counts as infinite."""
     flat = np.where(np.isfinite(error), error, np.inf)
     flat = flat if flat.ndim == 1 else flat.max(1)
     row = int(np.argmax(flat)) if len(flat) else 0
@@ -171,11 +183,11 @@ def worst_of(error: np.ndarray) -> tuple[int, float]:
 
 
 def angles(w: np.ndarray) -> str:
-    """A direction's theta and phi in degrees, as text."""
+    """theta and phi of a direction in degrees, as text."""
     theta, phi = directions.angles(w)
     return f"{theta:.4g}, {phi:.4g}"
 
 
 def pair_in_words(wo: np.ndarray, wi: np.ndarray) -> str:
-    """Both directions in degrees, as text."""
+    """The angles of both directions in degrees, as text."""
     return f"wo at {angles(wo)}; wi at {angles(wi)} degrees"

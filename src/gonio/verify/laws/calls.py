@@ -25,9 +25,9 @@ DARK = 1e-30  # smallest size to which differences are relative: a kernel may fl
 
 
 class Calls(Law):
-    """The result of a row does not depend on the other rows, on their number or on earlier calls; only transmission
-    depends on `mode`. For a plugin, eval_pdf, eval_pdf_sample, masks of lanes, components and types, and the flags
-    agree with eval, pdf and sample."""
+    """The result for a ray does not depend on the other rays of a call, on their number or on earlier calls; only
+    transmission depends on `mode`. For a plugin, eval_pdf, eval_pdf_sample, masks of lanes, components and types, and
+    the flags agree with eval, pdf and sample."""
 
     number = 11
     name = "calls"
@@ -53,7 +53,7 @@ class Calls(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        """The error of the call that path tracers make; 0 for other calls."""
+        """The error of a call that path tracers make; 0 for other calls."""
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         worst = max(wrong, key=lambda answer: answer.share)
         if worst.share > 0.0:
@@ -116,10 +116,10 @@ def _answers(
     mode: Mode = "radiance",
     lanes: int = 0,
 ) -> list[dict[str, np.ndarray]]:
-    """Results of eval, pdf and sample, rows (N, ...), called with Dr.Jit vectors as a renderer does.
+    """Results (N, ...) of `eval`, `pdf` and `sample`, called with Dr.Jit vectors as by a renderer.
 
     times  number of consecutive calls of each method, with one result per call
-    lanes  a multiple of N, to which the rows are repeated; the results are those of the last N
+    lanes  number of lanes, a multiple of N, to which the arguments are repeated; the results are those of the last N
     """
     dr = backend.drjit()
     types = backend.types(precision)
@@ -147,7 +147,7 @@ def _answers(
 
 
 def _lanes(value: Any, last: Any, lanes: int) -> Any:
-    """Some lanes of a value; a value that is the same for all lanes is returned unchanged."""
+    """The last lanes of a value; a value that is the same for all lanes is returned unchanged."""
     dr = backend.drjit()
     if not dr.is_array_v(value) or dr.width(value) != lanes:
         return value
@@ -201,7 +201,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
 def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
-    """The largest difference beyond `same`, relative to the larger value, as text."""
+    """The largest relative difference above `same`, relative to the larger value, as text; "" if there is none."""
     lit = first["sample's pdf"][:, 0] > 0.0 if "sample's pdf" in first else np.ones(len(wo), bool)
     for name, a in first.items():
         b = second[name]
@@ -253,7 +253,8 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
 
 
 def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> Iterator[Answer]:
-    """Check that each ray has the result of its own values if parameters vary from ray to ray, as with textures."""
+    """Check that the result for each ray follows from its own values if parameters vary from ray to ray, as with
+    textures."""
     if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
         return
     along = [axis for axis in ranges.axes(subject) if axis.path not in subject.model.fixed]
@@ -295,7 +296,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Check that declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, eta of
+    """Check that declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, and eta of
     samples."""
     model = subject.model
     # all pairs of sides, even those without declared values

@@ -29,8 +29,8 @@ CHECKS64 = (lobe_checks.float32, lobe_checks.derivatives)  # for models with flo
 
 
 class DeltaLobes(Law):
-    """A delta lobe follows Snell's law or the mirror direction, has the factor (eta_o / eta_i)^2 in radiance, reflects
-    by Fresnel's equations for its own index, is reciprocal, and is chosen as often as its pdf states."""
+    """A delta lobe lies in the mirror direction or follows Snell's law, has the factor (eta_o / eta_i)^2 in radiance,
+    reflects by Fresnel's equations for its own index, is reciprocal, and is chosen as often as its pdf states."""
 
     number = 10
     samples = True
@@ -72,7 +72,7 @@ class DeltaLobes(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        """The fraction of a lobe's light that goes in another direction, is in excess, or is missing."""
+        """The fraction of a lobe's light that goes in a wrong direction, is in excess, or is missing."""
         misses: list[Miss] = finding.details  # type: ignore[assignment]
         if not misses:
             return estimators.sampling_bias(subject)  # chosen more or less often than stated
@@ -92,7 +92,7 @@ class DeltaLobes(Law):
 
 
 def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
-    """The mistake in the frequency of lobes, their stated probability, or their weight; "" if none is clear."""
+    """The mistake in the frequency of lobes, their stated probability or their weight; "" if none is clear."""
     sampled = (share > 0.02) & (pdf > 0.0)
     if sampled.sum() < 8:
         return ""
@@ -124,7 +124,7 @@ def _pair(miss: Miss) -> str:
 
 
 def _views(subject: Subject, effort: Effort, seed: int) -> np.ndarray:
-    """Directions wo on each side that reflects or transmits, from the normal to 89 degrees."""
+    """Directions wo, from the normal to 89 degrees, on each side of the surface that reflects or transmits."""
     rng = np.random.default_rng([seed, 91])
     count = 48 if effort.full else 16
     mu = np.concatenate([[1.0], (np.arange(count) + rng.uniform(size=count)) / count])
@@ -138,7 +138,7 @@ def _views(subject: Subject, effort: Effort, seed: int) -> np.ndarray:
 
 
 def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
-    """Tests of whether each lobe is chosen as often as its pdf, a probability, states."""
+    """Tests of whether each lobe is chosen as often as its pdf, which is a probability, states."""
     views = [(25.0, 40.0), (70.0, 200.0)] if effort.full else [(50.0, 100.0)]
     wo = np.concatenate(
         [[directions.at(t if side > 0 else 180.0 - t, p) for t, p in views] for side in subject.sides or (1,)]

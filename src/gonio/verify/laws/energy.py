@@ -34,9 +34,11 @@ GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and
 
 
 class Energy(Law):
-    """Directional albedo for power <= 1 for every wo, by quadrature of eval and by the model's own sampling alike.
+    """The directional albedo for power is at most 1 for every wo, both by quadrature of `eval` and by the model's own
+    sampling.
 
-    albedo(wo) = int f*(wo, wi) |cos theta_i| dwi over both sides, f* without the radiance factor of transmission.
+    albedo(wo) = int f*(wo, wi) |cos theta_i| dwi over both sides, where f* is f without the radiance factor of
+    transmission.
     """
 
     number = 3
@@ -148,7 +150,7 @@ class Energy(Law):
         yield from gains.causes(white, albedo)
 
     def _of_albedo(self, curves: AlbedoCurves) -> Iterator[Cause]:
-        """Causes of a gain that the albedo curves themselves show."""
+        """Causes of a gain that follow from the albedo curves alone."""
         # the correct albedo is known only where nothing is absorbed
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:
@@ -173,7 +175,7 @@ class Energy(Law):
             yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times that {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
-        """Check that the closed form of a material's albedo equals the integral of its values."""
+        """Check that the closed form of a material's albedo equals the integral of `eval`."""
         if not isinstance(subject.model, BSDF) or subject.stochastic:
             return
 
@@ -195,7 +197,7 @@ class Energy(Law):
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
-        """Test the lossless variant, with every albedo 1 and F = 1: its loss is the light that the model neglects."""
+        """Test the lossless variant, with every albedo 1 and F = 1, whose loss is the light that the model neglects."""
         value, error = _quadrature(white, wo, effort, seed)
         curves.furnace = value
         gain = float((value - error).max() - 1.0)
@@ -224,7 +226,7 @@ class Energy(Law):
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
-        """Look for a gain with a single albedo or a single F set to 1: with all of them, another term may hide it."""
+        """Look for a gain with a single albedo or a single F set to 1, since another term may hide it if all are 1."""
         if not effort.full or not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
             return
         white = {
@@ -247,13 +249,13 @@ class Energy(Law):
 
 
 def _judged_lossless(subject: Subject) -> Subject | None:
-    """The lossless variant; the subject itself if it has no albedos to set and claims to lose nothing."""
+    """The lossless variant, or the subject itself if it has no albedos to set and claims to lose nothing."""
     claimed = getattr(subject.model, "lossless_tolerance", None) is not None
     return lossless_variant(subject) or (subject if claimed else None)
 
 
 def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
-    """Check that the albedo by which the authors weight other layers is the integral of the values."""
+    """Check that the albedo by which the authors of a model weight other layers is the integral of `eval`."""
     stated = subject.model.stated_albedo(wo) if isinstance(subject.model, BSDF) and not subject.stochastic else None
     if stated is None:
         return
@@ -269,7 +271,7 @@ def _stated(subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarr
 
 
 def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
-    """The side from which every sample fails, or carries nothing, while `eval` is positive."""
+    """A cause for each side from which every sample fails or carries no light although `eval` is positive."""
     for sign, side in ((1.0, "above"), (-1.0, "below")):
         mine = curves.wo[:, 2] * sign > 0.0
         if mine.any() and not curves.sampling[mine].any() and curves.quadrature[mine].max(1).min() > GAIN:
@@ -278,7 +280,7 @@ def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
-    """The channel of a white furnace that is a constant times the other two, which are equal."""
+    """A cause if one channel of a white furnace is a constant times the other two, which are equal."""
     for channel, name in enumerate(("red", "green", "blue")):
         a, b = np.delete(furnace, channel, axis=1).T
         factor = furnace[:, channel] / np.maximum(a, 1e-9)
@@ -289,7 +291,7 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
 
 
 def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed: int) -> bool:
-    """Whether more light is reflected than arrives if every color has its largest channel in all three."""
+    """Whether more light is reflected than arrives if every color is gray with the value of its largest channel."""
     gray = {
         name: (max(value),) * 3
         for name, parameter in subject.parameters.items()
@@ -301,8 +303,8 @@ def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed:
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
-    """Directions wo on each side that reflects or transmits: in equal steps of the cosine, along the normal, and near
-    grazing angles."""
+    """Directions wo on each side of the surface that reflects or transmits: in equal steps of the cosine, along the
+    normal, and near grazing angles."""
     # not at midpoints: steps of a material lie at simple fractions, where the two precisions may take different sides
     mu = (np.arange(effort.furnace) + 0.47) / effort.furnace
     # the normal itself as well, where tangents and azimuths are undefined
@@ -312,7 +314,7 @@ def _views(subject: Subject, effort: Effort) -> np.ndarray:
 
 
 def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """int eval dwi for power plus the light of the delta lobes, and the error of the sum, (N, channels)."""
+    """int eval dwi for power plus the light of the delta lobes, and the error of this sum, (N, channels) each."""
     ideal = _deltas(subject, wo, seed, effort.full)
     if not subject.has_density:
         return ideal, np.full_like(ideal, 1e-6)
@@ -336,7 +338,8 @@ def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarr
 
 
 def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """The integral of a stochastic eval over directions, half of them the model's own, and three standard errors."""
+    """The integral of a stochastic `eval` by random directions, half of them from the model, and three standard
+    errors."""
     values, errors = [], []
     half, even = count // 2, 0.25 / np.pi
     for i, one in enumerate(wo):
@@ -354,7 +357,7 @@ def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean weight for power, its standard error, and the largest single contribution, (N, channels) each."""
+    """The mean weight for power, its standard error, and the largest single contribution, (N, channels) each."""
     dr = backend.drjit()
     single, exact = backend.types("float32"), backend.types("float64")
     model = subject.bound()
@@ -382,7 +385,11 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np.ndarray, heavy: np.ndarray) -> float:
-    """p-value of the channels' mean; if a single sample is comparable to the noise, the noise is underestimated."""
+    """The p-value for the mean over the channels. If a single sample is comparable to the noise, the noise is
+    underestimated.
+
+    heavy  the largest single contribution
+    """
     spread = float(np.hypot(noise.mean(), 1e-6))
     if float(heavy.mean()) > 0.2 * spread:
         spread += float(heavy.mean())

@@ -30,8 +30,8 @@ LEVELS = 3  # subdivisions into ever smaller parts
 
 
 class Gradients(Law):
-    """d eval / d parameter by forward-mode autodiff equals five-point differences, for every differentiable parameter,
-    including those of inner materials."""
+    """d eval / d parameter by forward-mode automatic differentiation equals five-point differences, for every
+    differentiable parameter, including those of inner materials."""
 
     number = 8
     name = "gradients"
@@ -108,7 +108,7 @@ class Gradients(Law):
     def _worst(
         self, subject: Subject, finding: Finding, seed: int
     ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The worst parameter, pairs away from edges, and its derivatives there by both methods."""
+        """The worst parameter, pairs away from edges, and the derivatives for these pairs by both methods."""
         name = finding.worst.partition(":")[0]
         wo, wi = pairs(subject, 4096, seed)
         exact, differences, smooth, _ = _derivatives(subject.model, [name], wo, wi)[name]
@@ -116,9 +116,9 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter with zero derivative changes nearly all values at once when it is changed by a third, and has
-    zero derivative there too. If the derivative there is not zero, the parameter is only clamped at the given value; if
-    pairs change one by one, it is the threshold of a step in space."""
+    """Whether a parameter with zero derivative changes nearly all values at once when it is changed by a third, and
+    also has zero derivative after this change. If that derivative is not zero, the parameter is only clamped at the
+    given value; if the values of pairs change one by one, it is the threshold of a step in space."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -140,8 +140,8 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
 
 
 def _at_once(subject: Subject, path: str, ends: tuple[Any, Any], pair: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Whether nearly all values change at the same value of the parameter, sought in the step with the most changes,
-    then in the part of this step with the most changes, and so on."""
+    """Whether nearly all values change at the same value of the parameter. It is sought in the step with the most
+    changes, then in the part of this step with the most changes, and so on."""
     low, high = 0.0, 1.0
     for _ in range(LEVELS):
         at = np.linspace(low, high, PARTS + 1)
@@ -174,7 +174,7 @@ def _size(value: Any) -> float:
 
 
 def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], Any]:
-    """A function that shifts a bound value."""
+    """A function that shifts the bound value of a parameter."""
 
     def moved(bound: Any) -> Any:
         if parameter.kind != "angle":
@@ -188,8 +188,8 @@ def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], An
 
 
 class _Derivatives(NamedTuple):
-    """Derivatives by autodiff and by differences, (N, channels) each; whether two different steps agree and no kink
-    explains the difference, (N,); and the size below which a derivative counts as 0."""
+    """Derivatives by automatic differentiation and by differences, (N, channels) each; whether two different steps
+    agree and no kink explains the difference, (N,); and the size below which a derivative counts as 0."""
 
     exact: np.ndarray
     differences: np.ndarray
@@ -200,9 +200,9 @@ class _Derivatives(NamedTuple):
 def _derivatives(
     model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float = STEP
 ) -> dict[str, _Derivatives]:
-    """The derivatives by the parameters at some paths, with steps relative to their sizes. All are computed at once,
-    each on its own rays, where the others are moved by 0: one kernel serves them all. If a result is not finite, its
-    parameter is moved alone, since 0 times the NaN of another derivative is NaN."""
+    """The derivatives with respect to the parameters at some paths, with steps relative to their sizes. All are
+    computed at once by one kernel, each on its own rays, for which the others are moved by 0. If a result is not
+    finite, its parameter is moved alone, since 0 times the NaN of another derivative is NaN."""
     derivatives: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):

@@ -25,8 +25,8 @@ TURN = 0.7  # radians by which the axes are rotated
 
 
 class Isotropy(Law):
-    """An isotropic f depends on theta_o, theta_i and |phi_o - phi_i| only; an anisotropic one is wider along the axis
-    with the larger alpha."""
+    """An isotropic f depends on theta_o, theta_i and |phi_o - phi_i| only; the lobe of an anisotropic f is wider along
+    the axis with the larger alpha."""
 
     number = 6
     name = "isotropy"
@@ -72,14 +72,14 @@ class Isotropy(Law):
 
     @staticmethod
     def _drawn_along_axes(subject: Subject, first: Pair, second: Pair) -> bool:
-        """Whether the density of samples changes under rotation: isotropic values may be sampled along the axes."""
+        """Whether the density of samples changes under rotation, as isotropic values may be sampled along the axes."""
         there, back = subject.pdf(*first), subject.pdf(*second)
         return bool(np.any(np.abs(there - back) > VISIBLE * np.maximum(there, back)))
 
     def _rotated_together(
         self, subject: Subject, finding: Finding, pair: tuple[np.ndarray, np.ndarray], exact: bool
     ) -> None:
-        """Check that with its axes rotated, the material has the same values for directions rotated with them."""
+        """Check that the values are the same if the axes of the material and the directions are rotated together."""
         other = _with_turned_axes(subject)
         if other is None:
             return
@@ -137,7 +137,7 @@ class Isotropy(Law):
             yield Cause(f"{words}, or does the formula depend on a tangent?", "turns")
 
     def _cause_of_turn(self, subject: Subject, seed: int) -> Cause:
-        """Whether the axes rotate the wrong way, or only parts of the formula rotate."""
+        """The cause if the axes rotate the wrong way, or if only parts of the formula rotate."""
         wo, wi = pairs(subject, 4096, seed)
         other = _with_turned_axes(subject)
         assert other is not None, "the law has failed for it"
@@ -157,7 +157,7 @@ class Isotropy(Law):
         return self._error(there, back, exact, noise)
 
     def _error(self, there: np.ndarray, back: np.ndarray, exact: bool, noise: np.ndarray | float) -> np.ndarray:
-        """Largest relative difference over the channels, (N,)."""
+        """The largest relative difference over the channels, (N,)."""
         if exact:
             floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
             return relative(there, back, 0.0, floor).max(1)
@@ -165,8 +165,8 @@ class Isotropy(Law):
         return relative(there, back, noise, floor).max(1)
 
     def _axes(self, subject: Subject, finding: Finding) -> None:
-        """Check that the second moments of eval over wi along the two axes, for wo at the normal, are in the order of
-        the two widths."""
+        """Check that the second moments of `eval` over wi along the two axes, for wo along the normal, have the order
+        of the two widths."""
         name = next((n for n, p in subject.parameters.items() if p.kind == "alpha"), "")
         pair = getattr(subject.model, name, None)
         if not isinstance(pair, tuple | list):
@@ -190,7 +190,8 @@ class Isotropy(Law):
 
 
 def _spread(subject: Subject) -> tuple[float, float, float]:
-    """Second moments of eval over wi along the two axes, for wo at the normal; and their sum divided by the light."""
+    """The second moments of `eval` over wi along the two axes, for wo along the normal; and their sum divided by the
+    light."""
     turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
     phi0 = float(turn or 0.0)
     theta = np.geomspace(1e-4, 0.499 * np.pi, 400)
@@ -206,7 +207,7 @@ def _spread(subject: Subject) -> tuple[float, float, float]:
 
 
 def _with_turned_axes(subject: Subject) -> Subject | None:
-    """The subject with its axes rotated by TURN; None if it has no parameter for that."""
+    """The subject with its axes rotated by TURN; None if it has no parameter for the rotation."""
     parameter = subject.parameters.get(ROTATION)
     if parameter is None or parameter.kind != "angle":
         return None
@@ -214,7 +215,7 @@ def _with_turned_axes(subject: Subject) -> Subject | None:
 
 
 def _swapped(subject: Subject) -> Subject | None:
-    """The subject with alpha_x and alpha_y swapped; None if it has none."""
+    """The subject with alpha_x and alpha_y swapped; None if it does not have both."""
     for name, parameter in subject.parameters.items():
         pair = getattr(subject.model, name, None)
         if parameter.kind == "alpha" and isinstance(pair, tuple | list):

@@ -27,12 +27,12 @@ STEP = 0.5
 
 
 class Limits(Law):
-    """At a declared limit, the muted parameters change no value of eval, and eval equals that of the model it reduces
-    to.
+    """At a declared limit, the muted parameters change no value of `eval`, and `eval` equals that of the model to which
+    the material reduces.
 
     All limits are compared at once, each on separate rays: on a quarter of them with the other parameters as given, on
-    the rest with random ones. The same values as numbers instead of arrays must give the same result, although the code
-    of parts that are off is then omitted.
+    the rest with random ones. The same parameter values as numbers instead of arrays must give the same result,
+    although the code of parts that are off is then omitted.
     """
 
     number = 12
@@ -68,9 +68,9 @@ class _Case(NamedTuple):
     """A comparison at a limit.
 
     limit    the limit
-    against  the comparison as text, such as "coat_color changes values"
-    one      the subject at the limit, with one value per pair where parameters vary
-    other    the subject that it must equal
+    against  the violation as text, such as "coat_color changes values"
+    one      the subject at the limit, with one value per pair for parameters that vary
+    other    the subject to which it must be equal
     number   whether both are the same material, with the limit given by numbers instead of arrays
     error    relative difference of their values, (N, channels)
     """
@@ -88,11 +88,11 @@ class _Case(NamedTuple):
 
     @property
     def words(self) -> str:
-        """ "where coat_weight = 0"."""
+        """The limit as text: "where coat_weight = 0"."""
         return "where " + ", ".join(f"{name} = {value:g}" for name, value in self.limit.values.items())
 
     def at(self, row: int) -> tuple[Subject, Subject]:
-        """The subject that it must equal and the subject at the limit, with the parameters of one of the rows."""
+        """The two subjects, `other` and `one`, with the parameter values of one pair."""
         return _row(self.other, row, len(self.error)), _row(self.one, row, len(self.error))
 
 
@@ -164,7 +164,7 @@ def _named(
     wo: np.ndarray,
     wi: np.ndarray,
 ) -> list[_Case]:
-    """The case; if it fails, one case for each parameter that changes values by itself."""
+    """The case itself, or, if it fails, one case for each parameter that changes values on its own."""
     if case.size <= TOLERANCE or len(names) == 1:
         return [case]
     cases = []
@@ -210,7 +210,7 @@ def _against_model(limit: Limit, one: _Side, wo: np.ndarray, wi: np.ndarray) -> 
 
 
 class _Side(NamedTuple):
-    """One side of a comparison: a subject, and its values of eval, (N, channels)."""
+    """One side of a comparison: a subject, and its values of `eval`, (N, channels)."""
 
     subject: Subject
     values: np.ndarray
@@ -219,7 +219,7 @@ class _Side(NamedTuple):
 def _case(
     limit: Limit, text: str, one: _Side, other: _Side, wo: np.ndarray, wi: np.ndarray, number: bool = False
 ) -> _Case:
-    """The comparison of two sides, up to the rounding of the directions, which narrow lobes magnify."""
+    """The comparison of two sides, except for the effect of rounding the directions, which narrow lobes magnify."""
     a, b = one.values, other.values
     floor = np.percentile(np.abs(b).max(1), 90.0)
     error = relative(a, b, 0.0, floor)
@@ -240,8 +240,8 @@ def _case(
 def _block(
     subject: Subject, axes: Mapping[str, ranges.Axis], limit: Limit, rng: np.random.Generator, count: int
 ) -> dict[str, np.ndarray]:
-    """One value per pair for every parameter that may vary: that of the limit, if it has one; else the given value for
-    every fourth pair and random values for the others."""
+    """One value per pair for every parameter that may vary: the value at the limit if the limit sets the parameter,
+    else the given value for every fourth pair and random values for the others."""
     columns = {}
     for path, axis in axes.items():
         column = _draw(axis, rng, count)
@@ -255,15 +255,15 @@ def _block(
 def _changed(
     axes: Mapping[str, ranges.Axis], limit: Limit, block: dict[str, np.ndarray], rng: np.random.Generator
 ) -> dict[str, np.ndarray]:
-    """The block with other random values for the muted parameters."""
+    """The block of values with different random values for the muted parameters."""
     muted = [path for path in axes if any(fnmatchcase(path, pattern) for pattern in limit.mutes)]
     drawn = {path: _draw(axes[path], rng, len(block[path])) for path in muted if path not in limit.values}
     return {**block, **drawn}
 
 
 def _in_blocks(subject: Subject, blocks: list[dict[str, np.ndarray]]) -> Subject | None:
-    """The subject with the blocks' values one after the other, so that one kernel, with the code of all parts, serves
-    them; None if a parameter of a limit must not vary from ray to ray."""
+    """The subject with the values of all blocks one after the other, so that one kernel, with the code of all parts,
+    serves them all; None if a parameter of a limit must not vary from ray to ray."""
     if any(path not in blocks[0] for limit in subject.model.limits for path in limit.values):
         return None
     try:
@@ -275,7 +275,7 @@ def _in_blocks(subject: Subject, blocks: list[dict[str, np.ndarray]]) -> Subject
 def _values(
     together: Subject | None, blocks: list[dict[str, np.ndarray]], wo: np.ndarray, wi: np.ndarray
 ) -> np.ndarray:
-    """eval of every block, (blocks, N, channels)."""
+    """`eval` for every block, (blocks, N, channels)."""
     assert together is not None
     count = len(blocks)
     value = together.eval(np.tile(wo, (count, 1)), np.tile(wi, (count, 1)))
@@ -290,7 +290,7 @@ def _draw(axis: ranges.Axis, rng: np.random.Generator, count: int) -> np.ndarray
 
 
 def _part(subject: Subject, rows: np.ndarray, count: int) -> Subject:
-    """The subject with the values of some of `count` rays, for parameters that have one per ray."""
+    """The subject for some of `count` rays: parameters with one value per ray are restricted to these."""
 
     def part(value: Any) -> Any:
         if isinstance(value, tuple):
@@ -319,8 +319,8 @@ def _row(subject: Subject, row: int, count: int) -> Subject:
 
 
 def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
-    """Check that a weight or a thickness fades out: values near 0 are close to those at 0. Nothing else can be tested
-    for a material that declares no limits."""
+    """Check that the effect of a weight or thickness vanishes continuously: values near 0 are close to those at 0.
+    Nothing else can be tested for a material that declares no limits."""
     names = [axis for axis in ranges.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:

@@ -22,7 +22,8 @@ POWERS = np.geomspace(0.2, 6.0, 4001)  # exponents of a color that values may fo
 
 
 class Linearity(Law):
-    """eval is affine in each albedo, eval(c a + (1-c) b) = c eval(a) + (1-c) eval(b), and mixes mix values.
+    """`eval` is affine in each albedo, eval(c a + (1-c) b) = c eval(a) + (1-c) eval(b), and mixtures of materials mix
+    their values.
 
     An albedo is a spectrum that is declared to lie in [0, 1].
     """
@@ -93,8 +94,9 @@ class Linearity(Law):
 
 
 def _power_of(rows: np.ndarray) -> float | None:
-    """The exponent p != 1 for which all pairs follow a + b x^p, from values at GRAYS (4, N); None if there is none.
+    """The exponent p != 1 for which the values of all pairs are a + b x^p; None if there is none.
 
+    rows  values at the albedos GRAYS, (4, N)
     a and b, which differ from pair to pair, cancel in the ratio of two differences of values.
     """
     first, *inner, last = rows
@@ -111,7 +113,8 @@ def _power_of(rows: np.ndarray) -> float | None:
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
-    """Values that should be equal: at an albedo between two others, and of a mix, each with its interpolation."""
+    """Values that should be equal: that at an albedo between two others, and that of a mixture, each with its
+    interpolation."""
 
     def between(name: str, a: Value, b: Value) -> severity.Pair:
         low, high = subject.replace(**{name: a}), subject.replace(**{name: b})
@@ -136,16 +139,20 @@ COLORS = (0.125, 0.5, 0.875), (0.875, 0.25, 0.0)
 
 
 def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given: bool) -> bool:
-    """Whether light is reflected once, twice, and so on by this albedo, or passes a layer of this reflectance several
-    times: see `statistics.is_power_series` and `is_dimmed`. If the other colors do not have their given values, the
-    first power may be absent: light that hits a black part once is lost."""
+    """Whether light is reflected with this albedo once, twice, and so on, or passes a layer with this reflectance
+    several times; see `statistics.is_power_series` and `is_dimmed`.
+
+    name   path of the albedo
+    given  whether the other colors have their given values; if not, the first power may be absent, since light that
+           hits a black part once is lost
+    """
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
     noise = 1e-9 if subject.best == "float64" else 1e-4
     return statistics.is_power_series(rows, noise, first_power=given) or statistics.is_dimmed(rows, noise)
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether an albedo changes no value, as with a cache that ignores it or a parameter that is never read."""
+    """Whether an albedo changes no value, as if a cache ignored it or the parameter were never read."""
     low, high = (subject.replace(**{name: v}) for v in (0.125, 0.875))
     first, second = low.eval(wo, wi), high.eval(wo, wi)
     if not np.array_equal(first, second) or not np.any(first > 0.0):

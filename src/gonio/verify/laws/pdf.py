@@ -42,7 +42,8 @@ MIN_LIGHT = 1e-3  # smallest mean value relative to which that fraction is measu
 
 
 class Pdf(Law):
-    """int pdf dwi = 1 - failed samples, pdf > 0 where eval > 0, and samples are distributed by the pdf (chi-square)."""
+    """int pdf dwi = 1 - the fraction of failed samples, pdf > 0 where eval > 0, and samples are distributed according
+    to the pdf (chi-square test)."""
 
     number = 4
     samples = True
@@ -144,8 +145,8 @@ STEEP = 0.7  # largest ratio of the pdf's deficit near the normal to its deficit
 
 
 def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[Cause]:
-    """Yield a cause if no sample fails and the pdf predicts too few, with a deficit that grows with the angle of the
-    view, but nowhere too many."""
+    """Yield a cause if no sample fails and the pdf predicts too few samples for some views and too many for none, with
+    a deficit that increases with the angle of the view."""
     above = [tested for tested in tests if tested.wo[2] > 0.0]
     if len(above) < 2 or min(tested.cells.observed.sum() / tested.cells.drawn for tested in above) < ALL:
         return
@@ -161,7 +162,7 @@ def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[C
 
 
 def _missing(cells: SampleCells) -> float:
-    """Fraction of samples that the pdf predicts in excess of those observed, where the excess is significant."""
+    """The fraction of samples that the pdf predicts in excess of those observed, where the excess is significant."""
     held = crowding.blocks(cells)
     if held is None:
         return 1.0
@@ -176,7 +177,10 @@ STILL = 1e-7  # change of a direction that counts as none
 
 
 def _swept(subject: Subject, wo: np.ndarray, dimension: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sampled directions (TRIALS, SWEEP, 3) as one random number sweeps [0, 1), and which of them have a density."""
+    """Sampled directions (TRIALS, SWEEP, 3) for values of one random number in [0, 1), and whether each has a density.
+
+    dimension  index of the random number that varies
+    """
     u = np.repeat(directions.numbers(np.random.default_rng([seed, 45]), TRIALS), SWEEP, axis=0)
     u[:, dimension] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
     s = subject.sample(np.repeat(wo, len(u), axis=0), u)
@@ -191,7 +195,7 @@ def _parts(wi: np.ndarray) -> list[slice]:
 
 
 def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
-    """A description of the ends of [0, 1), or of a lobe's part of it, at which a random number does not move the
+    """A description of the ends of [0, 1), or of a lobe's part of it, near which a random number does not change the
     direction although it does elsewhere; "" if there are none."""
     for dimension, name in enumerate(("first", "second", "third")):
         wi, fine = _swept(subject, wo, dimension, seed)
@@ -213,9 +217,9 @@ def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
 
 
 def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
-    """Whether u.x chooses a lobe and then, without being remapped to [0, 1), its direction: over the lobe's part of
-    [0, 1), the azimuth covers less than 2 pi, or the polar angle does not reach the middle of the lobe, which is at one
-    end of [0, 1)."""
+    """Whether u.x chooses a lobe and then, without being remapped to [0, 1), also its direction. If so, within the
+    lobe's part of [0, 1), the azimuth covers less than 2 pi, or the polar angle does not reach the middle of the lobe,
+    which is at one end of [0, 1)."""
     wi, fine = _swept(subject, wo, 0, seed)
     if _misses_the_middle(wo[0], wi, fine):
         return True
@@ -237,8 +241,8 @@ MOVED = np.radians(10.0)  # smallest change of the polar angle over a part
 
 
 def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool:
-    """Whether u.x changes a lobe's polar angle over its part of [0, 1), but never comes near the lobe's middle: the
-    normal, the mirror direction, the normal as the half vector, or wo."""
+    """Whether u.x changes the polar angle of a lobe over its part of [0, 1), but the direction never comes near the
+    lobe's middle: the normal, the mirror direction, the normal as the half vector, or wo."""
     m = wi + wo
     m = m / np.maximum(np.linalg.norm(m, axis=-1, keepdims=True), 1e-9)
     cosines = [wi[..., 2], np.sum(wi * wo * [-1.0, -1.0, 1.0], axis=-1), np.abs(m[..., 2]), np.sum(wi * wo, axis=-1)]
@@ -262,7 +266,7 @@ _KINDS = {
 
 
 class _Repeat:
-    """A test repeated with another seed: other cells, other samples."""
+    """Repeats a test with another seed, which gives other cells and other samples."""
 
     def __init__(self, subject: Subject, wo: np.ndarray, kind: str, effort: Effort, seed: int) -> None:
         self.subject, self.wo, self.kind, self.effort, self.seed = (subject, wo, kind, effort, seed)
@@ -273,7 +277,7 @@ class _Repeat:
 
 
 def _widths(subject: Subject, effort: Effort) -> list[float]:
-    """Other values of alpha to test, if there is such a parameter."""
+    """The other values of alpha to test; none if there is no such parameter."""
     parameter = subject.parameters.get("alpha")
     if parameter is None or parameter.kind not in ("alpha", "float"):
         return []

@@ -28,7 +28,8 @@ NEGATIVE = 1e-6  # fraction of the largest value by which float32 sums with canc
 
 
 class Positivity(Law):
-    """eval, pdf and weight are finite and >= 0, and gradients finite, to 89.9999 degrees and at extreme parameters."""
+    """`eval`, `pdf` and the weight are finite and >= 0, and gradients are finite, up to 89.9999 degrees and at extreme
+    parameter values."""
 
     number = 1
     name = "positivity"
@@ -163,7 +164,8 @@ _FAULTS = {"not finite": lambda values: ~np.isfinite(values), "negative": lambda
 def _drawn(
     subject: Subject, effort: Effort, seed: int, precision: Precision
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """The checked quantities except eval: name, values (n, channels), and random numbers if they are of samples."""
+    """The checked quantities except `eval`: for each, its name, its values (n, channels), and the random numbers if it
+    belongs to samples."""
     wo, wi, u = _grid(subject, effort, seed)
     for what, values, _, _, rows in _values(subject, wo, wi, u, precision):
         if what not in ("eval", "wi"):
@@ -173,7 +175,7 @@ def _drawn(
 
 
 def _exact_places(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Directions at which formulas divide by 0, each as a name and a mask of the rows."""
+    """Special directions at which formulas may divide by 0: for each, its name and a mask of the pairs."""
     normal = [np.hypot(w[:, 0], w[:, 1]) == 0.0 for w in (wo, wi)]
     level = [w[:, 2] == 0.0 for w in (wo, wi)]
     equal, opposite = np.all(wo == wi, axis=1), np.all(wo == -wi, axis=1)
@@ -194,7 +196,7 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings combined in one call, one value per ray; one by one if the subject takes no arrays.
+    """Settings combined in one call, with one value per ray, or one by one if the subject does not accept arrays.
 
     All parameters that have a range are arrays, so that one kernel serves the given values and all others.
     """
@@ -225,7 +227,8 @@ def _batches(
 
 
 def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs, at extreme angles on both sides, even a side without values, and at random; and random numbers."""
+    """Pairs of directions, at extreme angles on both sides (even on a side without values) and at random; and random
+    numbers."""
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
@@ -242,7 +245,7 @@ def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.n
 def _values(
     subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Each checked quantity: its name, values (n, channels), directions, and rows."""
+    """The checked quantities: for each, its name, its values (n, channels), the directions, and their indices."""
     rows = np.arange(len(wo))
     yield "eval", subject.eval(wo, wi, precision=precision), wo, wi, rows
     if subject.drawn_by is not None:
@@ -261,8 +264,8 @@ def _own_axes(subject: Subject) -> list[ranges.Axis]:
 
 
 def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
-    """The subject with all parameters at the low ends, and with all at the high ends, of their ranges. Arrays with both
-    of them need the code of all parts, so that all other values share their kernels."""
+    """The subject with all parameters at the low ends of their ranges, and with all at the high ends. Arrays with both
+    need the code of all parts, so that all other values share the same kernels."""
     corners = []
     for end in ("low", "high"):
         values = {axis.path: getattr(axis, end) for axis in _own_axes(subject)}
@@ -289,7 +292,8 @@ def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
 
 
 def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tuple[str, int]]:
-    """Parameters for which the gradient of the summed values is not finite, each with the row at fault."""
+    """The parameters for which the gradient of the summed values is not finite, each with the index of a pair that
+    causes it."""
     dr = backend.drjit()
     kind = backend.types("float32")
     leaves: dict[str, list[Any]] = {}

@@ -20,7 +20,7 @@ TOLERANCE = 1e-3
 
 
 class Precision(Law):
-    """eval and pdf in float32 equal those in float64, except for the effect of rounding the directions."""
+    """`eval` and `pdf` in float32 equal those in float64, except for the effect of rounding the directions."""
 
     number = 9
     name = "precision"

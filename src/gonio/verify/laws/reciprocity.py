@@ -25,7 +25,7 @@ PAIRS = 1 << 13  # pairs of directions used to find a cause
 
 
 class Reciprocity(Law):
-    """f(wo, wi) / eta_o^2 = f(wi, wo) / eta_i^2, eta the index on each direction's side (Veach1997, eq. 5.14)."""
+    """f(wo, wi) / eta_o^2 = f(wi, wo) / eta_i^2, with eta the index on each direction's side (Veach1997, eq. 5.14)."""
 
     number = 2
     name = "reciprocity"
@@ -93,7 +93,8 @@ class Reciprocity(Law):
             yield Cause(f"{words}: {guess}?", "one direction of a base")
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
-        """The finding for a stochastic model: means over many values per pair, in both orders of the directions."""
+        """The finding for a stochastic model, from the means over many values per pair, in both orders of the
+        directions."""
         wo, wi = pairs(subject, 96, seed)
         keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 0.02  # f divides by the cosine
         wo, wi = wo[keep][:24], wi[keep][:24]
@@ -134,10 +135,10 @@ def _difference_is_even(subject: Subject, seed: int) -> bool:
 
 
 def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed: int) -> float | None:
-    """Mean of f(wo, wi) - f(wi, wo), in standard errors; None if both are 0.
+    """The mean of f(wo, wi) - f(wi, wo), in standard errors; None if both are 0.
 
-    The random numbers of a model may be a hash of its directions. Each row therefore gets another `seed` if the model
-    has one; otherwise the directions are perturbed slightly, equally in both orders.
+    The random numbers of a model may be a hash of its directions. Each value is therefore computed with another `seed`
+    if the model has this parameter; otherwise, the directions are perturbed slightly, equally in both orders.
     """
     a, b = (np.tile(w, (REPEATS, 1)) for w in (wo, wi))
     if "seed" in subject.parameters:
@@ -165,7 +166,7 @@ def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
 
 
 def _eta(subject: Subject, seed: int) -> float:
-    """Index below divided by index above, by the model's own samples; 1 if nothing is transmitted."""
+    """The index below divided by that above, as the model's samples state it; 1 if nothing is transmitted."""
     if not subject.transmits:
         return 1.0
     rng = np.random.default_rng([seed, 4])

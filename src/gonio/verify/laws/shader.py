@@ -1,4 +1,4 @@
-"""Shader code: written as text and read back, it has the values of the material."""
+"""Shader code: written and read back, it has the values of the material."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Shader(Law):
 
 
 def inputs(model: BSDF, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions wo and wi and random numbers, (count, 3) each."""
+    """Directions wo and wi and random numbers u for a material, (count, 3) each."""
     wo, wi = pairs(subjects.of(model), count, seed)
     return wo, wi, directions.numbers(np.random.default_rng([seed, 12]), count)
 
@@ -85,7 +85,7 @@ def _add(
     inputs: tuple[np.ndarray, ...],
     fields: dict[str, np.ndarray],
 ) -> None:
-    """Record a difference as the finding's worst."""
+    """Record a difference as the largest of a finding."""
     finding.figure = max(finding.figure, worst.figure)
     wo, wi, u = (rows[worst.row] for rows in inputs)
     place = f"u = {np.round(u, 4)}" if worst.function == "sample" else pair_in_words(wo, wi)
@@ -96,7 +96,8 @@ def _add(
 
 
 def languages(finding: Finding) -> list[str]:
-    """The languages that can be read back here: without a compiler, WGSL only, and the law cannot pass."""
+    """The languages that can be read back on this machine. Without a compiler, this is only WGSL, and the law cannot
+    pass."""
     from ...shaders import read_back
     from ...spirv.compiler import compiler
 

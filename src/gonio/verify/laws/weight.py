@@ -25,7 +25,7 @@ PAIRS = 1 << 13  # samples used to find a cause
 
 
 class Weight(Law):
-    """weight = eval / pdf at the sampled wi; declared delta samples have neither a value nor a pdf."""
+    """weight = eval / pdf at the sampled wi; for declared delta samples, `eval` and `pdf` are 0."""
 
     number = 5
     samples = True
@@ -158,7 +158,7 @@ class Weight(Law):
 
 
 def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precision) -> np.ndarray:
-    """Whether a change of wi by a few float32 ulps makes the value or the pdf vanish, or appear."""
+    """Whether a change of wi by a few float32 ulps makes the value or the pdf zero or nonzero."""
     rng = np.random.default_rng(8)
     moved = np.concatenate([wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape) for _ in range(6)])
     many = np.tile(wo, (6, 1))
@@ -169,10 +169,11 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 
 
 def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
-    """A description such as "clamped to at most 1" if all weights (N, channels) that differ from the correct ones have
-    one value; else "".
+    """A description such as "clamped to at most 1" if all weights that differ from the correct ones have one value;
+    else "".
 
-    name  of the correct weights
+    weight, right  the weights and the correct weights, (N, channels) each
+    name           name of the correct weights
     """
     if not len(weight):
         return ""
@@ -193,7 +194,7 @@ def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
 
 
 def _gray(values: np.ndarray) -> bool:
-    """Whether all channels are equal, within a percent for most rows."""
+    """Whether all channels are equal, within a percent for most samples."""
     return not len(values) or bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
 
 
@@ -208,8 +209,8 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
 
 
 def _conventions(s: object, inner: np.ndarray, problems: list[str], precision: Precision) -> None:
-    """Check that failed samples have weight 0, in the rows `inner`, that the others have unit directions, and that
-    probabilities are at most 1."""
+    """Check that failed samples have weight 0, for the samples in the mask `inner`, that the others have unit
+    directions, and that probabilities are at most 1."""
     pdf, weight, wi, delta = s.pdf, s.weight, s.wi, s.delta  # type: ignore[attr-defined]
     good = pdf > 0.0
     wrong = []
@@ -225,7 +226,8 @@ def _conventions(s: object, inner: np.ndarray, problems: list[str], precision: P
 
 
 def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> Finding:
-    """The finding for a stochastic model: mean weight under `sample` against mean eval / pdf at the same directions."""
+    """The finding for a stochastic model, from the mean weight of `sample` and the mean of eval / pdf at the same
+    directions."""
 
     def p_value(seed: int) -> float:
         wo, u = _drawn(subject, 16 * effort.pairs, seed)
