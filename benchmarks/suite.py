@@ -105,7 +105,7 @@ def theirs(scene: Scene, sampler: str, spp: int, integrator: str = "path") -> Ca
 
 
 def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    """A converged picture, and the difference between the two methods that made it: the worst 10 x 10 block, in sigma."""
+    """A converged picture, and the difference between the two methods that made it, in sigma of the worst block."""
     folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
     content = (Path(__file__).with_name("scenes") / "__init__.py").read_bytes()
     facts = f"{scene.name} {scene.size} {seconds:g} {mi.__version__}".encode()
@@ -132,7 +132,7 @@ def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np
 
 
 def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The difference between the means of two stacks of blocks: Student's t, as a normal deviate of equal probability."""
+    """The difference between the means of two stacks of blocks: Student's t as a normal deviate."""
     squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
     t = np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + (ROUNDING * np.mean(b, 0)) ** 2 + 1e-20)
     return np.asarray(stats.norm.isf(stats.t.sf(t, min(len(a), len(b)) - 1)))

@@ -131,7 +131,7 @@ def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) 
 
 
 def _line(text: str, where: str) -> Line:
-    """The model of a line. Raises InputError for code, which a file must not run, and for text that names no material."""
+    """The model of a line. Raises InputError for code, which a file must not run, and for an unknown material."""
     if ".py" in text.lower():
         raise InputError(f"'{text}' is code, which is not run from a file", where, "name a model of Gonio's")
     try:

@@ -126,7 +126,7 @@ class Difference:
 def difference(
     a: BSDF, b: BSDF, metric: str = "mean", tolerance: float | None = None, pairs: int = PAIRS, seed: int = 1
 ) -> Difference:
-    """Compare f and albedo of A with those of B, at the angles at which both are known.
+    """Compare f and the albedo of a material A with those of B, at the angles at which both are known.
 
     metric     the metric to which the tolerance applies, one of METRICS
     tolerance  the largest value of the metric that passes; if None, any value passes

@@ -63,7 +63,10 @@ EVERYWHERE = AngularRange()
 
 
 def of_nodes(view: NDArray[np.floating], light: NDArray[np.floating], azimuth: NDArray[np.floating]) -> AngularRange:
-    """The range that a table covers, from its sorted nodes in radians; an axis without nodes has the full range."""
+    """The range that a table covers, from its sorted nodes in radians.
+
+    view, light, azimuth  nodes of the angles as in `AngularRange`; an axis without nodes has the full range
+    """
     ranges = []
     for nodes, (lowest, highest) in zip((view, light, azimuth), EVERYWHERE, strict=True):
         low, high = (np.degrees(nodes[0]), np.degrees(nodes[-1])) if len(nodes) else (lowest, highest)

@@ -109,7 +109,7 @@ def number(
 
 
 def index(default: PlainIndex, doc: str, *, low: float, high: float) -> Index:
-    """Declare a refractive index: a number, or the name of a substance of `go.indices()`."""
+    """Declare a refractive index: a number, or the name of a substance of `go.indices()`. Arguments as for `number`."""
     return _declare(IndexParameter, default, doc, low=low, high=high)
 
 
@@ -141,12 +141,14 @@ def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0,
     """Declare a microfacet width alpha, or a tuple of two (along x, along y). Bound, it is a vector of two.
 
     low  the smallest alpha at which the model is valid: 0 if it becomes a mirror there, positive if it divides by alpha
+    For the other arguments, see `number`.
     """
     return _declare(WidthParameter, default, doc, low=low, high=high)
 
 
 def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
-    """Declare an angle in radians. Bound, it is the vector (cos, sin), or None for the plain number 0."""
+    """Declare an angle in radians, with its default and documentation. Bound, it is the vector (cos, sin), or None for
+    the plain number 0."""
     return _declare(AngleParameter, default, doc, unit="rad")
 
 

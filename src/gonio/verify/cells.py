@@ -50,7 +50,11 @@ class Grid(NamedTuple):
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Place cells by a subject's samples; None if no sample has a density."""
+    """Place cells by a subject's samples for each wo, (N, 3); None if no sample has a density.
+
+    seed   seed of the samples
+    cells  numbers of rows and columns per side of the surface
+    """
     rng = np.random.default_rng([seed, 11])
     pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
     many = np.repeat(wo, pilot, axis=0)

@@ -49,7 +49,11 @@ class Lobes(NamedTuple):
 
 
 def chosen(count: int, seed: int) -> np.ndarray:
-    """Random numbers (n, 3) that select every lobe of one wo: the first number is in equal steps and near both ends."""
+    """Random numbers (n, 3) that select every lobe of one wo: the first number increases in `count` equal steps, and is
+    then near both ends.
+
+    seed  seed of the other two numbers
+    """
     first = np.concatenate([(np.arange(count) + 0.5) / count, ENDS, 1.0 - np.array(ENDS)])
     u = directions.numbers(np.random.default_rng([seed, 31]), len(first))
     u[:, 0] = np.minimum(first, 0.99999994)
@@ -59,7 +63,12 @@ def chosen(count: int, seed: int) -> np.ndarray:
 def of(
     subject: Subject, wo: np.ndarray, seed: int, mode: Mode = "radiance", precision: Precision | None = None
 ) -> Lobes:
-    """The delta lobes for each wo (N, 3)."""
+    """The delta lobes for each wo (N, 3).
+
+    seed       seed of the samples
+    mode       as in `BSDF.sample`
+    precision  precision of the samples; None for the best
+    """
     u = chosen(DRAWN, seed)
     n, k = len(wo), len(u)
     s = subject.sample(np.repeat(wo, k, axis=0), np.tile(u, (n, 1)), mode, precision)

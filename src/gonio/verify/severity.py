@@ -187,8 +187,8 @@ def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """As `between`, but by Monte Carlo integration, with half of the directions uniform, for differences that are too
-    irregular for cells."""
+    """As `between`, with the same arguments, but by Monte Carlo integration with half of the directions uniform, for
+    differences that are too irregular for cells."""
     if subject.stochastic or not subject.steady:
         return None
     wo, mass = views(subject.sides)

@@ -14,7 +14,8 @@ ROUNDING, TINY = 2.0**-50, 1e-300
 
 
 def chi_square_tail(statistic: float, degrees: int) -> float:
-    """P(X >= statistic) for the chi-square distribution: the incomplete gamma function Q(degrees / 2, statistic / 2)."""
+    """P(X >= statistic) for the chi-square distribution, by the incomplete gamma function
+    Q(degrees / 2, statistic / 2)."""
     a, x = 0.5 * degrees, 0.5 * statistic
     if not math.isfinite(x) or x <= 0.0:
         return 0.0 if x > 0.0 else math.nan if math.isnan(x) else 1.0
@@ -39,7 +40,8 @@ def normal_two_sided(z: float) -> float:
 def binomial_two_sided(count: int, trials: int, probability: float) -> float:
     """The probability of a count at least as far from its expectation on either side, as twice the smaller tail.
 
-    probability  probability of each trial
+    trials       number of trials
+    probability  probability of success in each trial
     """
     at_least = _beta(count, trials - count + 1, probability) if count > 0 else 1.0
     at_most = _beta(trials - count, count + 1, 1.0 - probability) if count < trials else 1.0

@@ -40,7 +40,7 @@ def trial(
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """As `child.trial`, but computed by the current executor of parts."""
+    """As `child.trial`, with the same arguments, but computed by the current executor of parts."""
     # Several local processes split the targets themselves; quick trials end before anything could be lost.
     if not executor.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)

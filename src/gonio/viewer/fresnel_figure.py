@@ -143,7 +143,7 @@ def _phases(axes: Axes, lines: Sequence[Index]) -> None:
 
 
 def _differences(axes: Axes, lines: Sequence[Index]) -> None:
-    """The phase difference of s and p, by which linearly polarized light becomes elliptical, or circular at 90 degrees."""
+    """The phase difference of s and p: linearly polarized light becomes elliptical, or circular at 90 degrees."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         retardance = np.degrees(np.unwrap(np.angle(-at.r_p * np.conj(at.r_s))))

@@ -72,6 +72,7 @@ def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precis
     """E from random samples.
 
     at         the points (mu, alpha, alpha_y, phi) at which E is estimated
+    sampling   method and number of samples
     precision  precision of the formulas, "float32" or "float64"
     Returns float64 arrays of the broadcast shape of `at`. Raises InputError for unknown names and for spp < 1.
     """

@@ -128,9 +128,10 @@ def glass(
 ) -> TwoWays:
     """The power reflected and transmitted by a rough dielectric (albedo 1), whose sum is E(mu, alpha, eta).
 
-    eta    index on the far side divided by that on wo's side: if it is above 1, wo lies in the less dense medium, if
-           below 1, in the denser one
-    nodes  numbers of nodes in each piece of azimuth and of slope
+    points  the points (mu, alpha, alpha_y, phi) at which it is evaluated
+    eta     index on the far side divided by that on wo's side: if it is above 1, wo lies in the less dense medium, if
+            below 1, in the denser one
+    nodes   numbers of nodes in each piece of azimuth and of slope
     """
     known_masking(masking_name)
     kind = fresnel.kind(fresnel_name)

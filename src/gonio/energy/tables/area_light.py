@@ -29,8 +29,8 @@ Corners = tuple[Direction, Direction, Direction, Direction]
 
 @function
 def edge(a: Direction, b: Direction) -> Scalar:
-    """The contribution of an edge of a polygon to the integral of the cosine lobe, times 2 pi: the angle of the edge
-    times the z of the unit normal of its plane."""
+    """The contribution of an edge of a polygon to the integral of the cosine lobe, times 2 pi: the angle between the
+    vectors a and b to its ends, times the z of the unit normal of their plane."""
     across = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
     sine = norm(across)
     return across.z * safe_div(ops.atan2(sine, where(sine > 0.0, dot(a, b), 1.0)), sine)

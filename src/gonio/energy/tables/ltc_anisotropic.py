@@ -37,8 +37,8 @@ def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
     """Bake tables over (roughness, azimuth, sqrt(1 - mu)), with nodes at both ends, as `ltc.bake` but with eight
     numbers of W.
 
-    The roughness is the root of the larger width; the ratio of the widths is that of the material. Raises InputError if
-    the x and y axes are not axes of symmetry, and in the cases of `ltc.bake`.
+    The roughness is the root of the larger width; the ratio of the widths is that of the material. Arguments as for
+    `ltc.bake`. Raises InputError if the x and y axes are not axes of symmetry, and in the cases of `ltc.bake`.
     """
     path = ltc.check(model, size)
     _check_symmetry(model)

@@ -33,7 +33,9 @@ def schlick_table(ndf: str, masking: str) -> Table:
 def reflected(surface: Microsurface, f0: Spectrum, E: Scalar, wo: Direction) -> Spectrum:
     """F0 A + B at wo.
 
-    E      E(mu) at F = 1, A + B
+    surface  the microsurface
+    f0       F0
+    E        E(mu) at F = 1, which is A + B
     """
     alpha, _ = widths(surface.alpha)
     row, column = inset(sqrt(sqrt(alpha.x * alpha.y)), SIZE), inset(sqrt(maximum(wo.z, 1e-6)), SIZE)

@@ -188,7 +188,7 @@ def _sides(held: Blocks) -> Cause | None:
 
 
 def effect(expected: np.ndarray, observed: np.ndarray) -> float:
-    """The RMS of observed / expected - 1, minus the noise of the counts."""
+    """The RMS of observed / expected - 1 in excess of the noise of the counts."""
     order = np.argsort(expected)
     low = expected[order] < FULL
     e = np.append(expected[order][~low], expected[order][low].sum())

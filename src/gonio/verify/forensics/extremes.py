@@ -25,7 +25,7 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
     many.
 
     settings  parameter values at which the fault occurs
-    fault     the fault, as text
+    fault     the fault: "not finite" or "negative"
     fails     function that returns whether a subject has the fault
     """
     if not settings or len(settings) > MOST or fails(subject):
@@ -67,7 +67,8 @@ def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cau
 
 
 def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: bool) -> Cause | None:
-    """The side of the surface, and the angle, of the views with a fault; None if neither distinguishes them.
+    """A cause that names the side of the surface, or the angles, of the views with a fault; None if neither
+    distinguishes them.
 
     what     name of the faulty quantity
     wo, bad  directions of samples, (N, 3), and whether each sample has the fault, (N,)

@@ -23,8 +23,8 @@ Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps (wo, w
 
 
 class Factor(NamedTuple):
-    """A factor: its formula, the mistake that it suggests, and its values. With `of_wo`, the values hold up to a constant
-    per wo."""
+    """A factor: its formula, the mistake that it suggests, and its values. With `of_wo`, the values hold up to a
+    constant per wo."""
 
     formula: str
     guess: str
@@ -150,8 +150,8 @@ def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence
 
 
 def normals(subject: Subject) -> Iterator[Factor]:
-    """The factors for sampling visible normals instead of all normals: the ratio of their densities, without the masking
-    of wo, and its inverse."""
+    """The factors for sampling visible normals instead of all normals: the ratio of their densities, without the
+    masking of wo, and its inverse."""
     visible, all_ = "visible normals", "all normals"
     for eta in [*index_below(subject)] or [1.0]:
         for power, drawn, stated in ((1.0, visible, all_), (-1.0, all_, visible)):

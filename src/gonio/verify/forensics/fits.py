@@ -89,7 +89,7 @@ COSINES = ("(o.m)", "cos_m", "cos_i", "cos_o", "sin_i", "sin_o")
 
 
 def _cosines(ratio: Ratio) -> Fit | None:
-    """The fit by powers of the cosines of a reflection, times a known number: 4 (o.m), cos_i, cos_o / cos_i, sin_i ..."""
+    """The fit by powers of the cosines of a reflection, times a known number: 4 (o.m), cos_i, cos_o / cos_i, ..."""
     r = scalar(ratio)
     if r is None or not _reflects(ratio):
         return None

@@ -59,7 +59,7 @@ def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
 
 
 def _parts(white: Subject, albedo: Albedo, here: float) -> str:
-    """A description of the colors whose part gains on its own; "" if there are fewer than two colors or no such part."""
+    """A description of the colors whose part gains on its own; "" if there is no such part or only one color."""
     colors = {
         leaf.path: leaf.parameter
         for leaf in tree.leaves(white.model)

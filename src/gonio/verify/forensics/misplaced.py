@@ -37,7 +37,7 @@ FEW = 0.06  # fraction of the hemisphere below which a crowd is a ring or a poin
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
-    """The pattern of the difference, as a cause; None if there is no pattern. For the arguments, see `mixture.named`."""
+    """The pattern of the difference, as a cause; None if there is none. For the arguments, see `mixture.named`."""
     expected = held.joined(held.expected)
     if held.observed.sum() < 1000 or expected.sum() <= 0.0:
         return None

@@ -1,8 +1,8 @@
-"""Lobes that a random number selects: the weights in the pdf against those of the samples.
+"""Lobes that a random number selects: comparison of their weights in the pdf with those of the samples.
 
-A sweep finds the number that selects: the sampled direction jumps at the same value of it whatever the other numbers
-are. Samples below and above this value give histograms of two lobes, a(wi) and b(wi), and the pdf's expectation in the
-same blocks of cells is compared with
+A sweep finds the number that selects a lobe: the sampled direction jumps at one value of this number, whatever the
+other numbers are. Samples below and above this value give histograms of two lobes, a(wi) and b(wi), and the expectation
+by the pdf in the same blocks of cells is compared with
 
     x a + y b + ...                  constant weights
     s(wi) a + (1 - s(wi)) b          the probability s of the first lobe, evaluated at the sampled direction
@@ -33,8 +33,9 @@ VIEWS = (2.0, 20.0, 35.0, 50.0, 60.0, 70.0, 78.0, 84.0, 88.0)  # degrees at whic
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
     """The mistake in the weights of the lobes; None if there is only one lobe, or if weights do not explain it.
 
-    cells  the cells of the chi-square test of one wo
-    held   the same in blocks
+    cells  the cells of the chi-square test for one wo
+    held   the same cells, combined into blocks
+    seed   seed of the samples
     """
     choice = _choice(subject, held.wo, seed)
     if choice is None:
@@ -71,7 +72,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 
 
 def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
-    """The mistake that the weights of the lobes in the pdf suggest, given their fractions of the samples."""
+    """The mistake that the weights of the lobes in the pdf suggest, given the lobes' fractions of the samples."""
     given, chosen = (", ".join(f"{w:.3g}" for w in part) for part in (weights, shares))
     words = f"the pdf weighs the lobes {given}, the samples choose them {chosen}"
     if np.abs(weights[::-1] - shares).max() < SHARE:
@@ -94,7 +95,8 @@ def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
 
 
 def _choice(subject: Subject, wo: np.ndarray, seed: int) -> tuple[int, np.ndarray] | None:
-    """The number (0, 1 or 2) that selects one of several lobes, and the values at which the next lobe begins."""
+    """The index (0, 1 or 2) of the random number that selects one of several lobes, and the values at which the next
+    lobe begins."""
     for dimension in range(3):
         u = np.repeat(directions.numbers(np.random.default_rng([seed, 47]), TRIALS), SWEEP, axis=0)
         u[:, dimension] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
@@ -108,7 +110,7 @@ def _choice(subject: Subject, wo: np.ndarray, seed: int) -> tuple[int, np.ndarra
 
 
 def _share_at(subject: Subject, wi: np.ndarray, dimension: int, seed: int) -> np.ndarray | None:
-    """The probability of the first lobe for wo = wi, (C,), of an isotropic material; None if no selection is found."""
+    """The probability of the first lobe of an isotropic material for wo = wi, (C,); None if no selection is found."""
     shares = []
     for theta in VIEWS:
         choice = _choice(subject, directions.single(directions.at(np.array([theta]), 30.0))[0], seed)
@@ -120,7 +122,7 @@ def _share_at(subject: Subject, wi: np.ndarray, dimension: int, seed: int) -> np
 
 
 def _blocks_of(wi: np.ndarray, cells: SampleCells, held: Blocks) -> np.ndarray:
-    """The block of each direction, (N,); -1 outside all cells."""
+    """The index of each direction's block, (N,); -1 outside all cells."""
     place = np.full(len(wi), -1)
     _, rows, columns = cells.expected.shape
     for side, sign in enumerate(cells.sides):
@@ -136,13 +138,13 @@ def _blocks_of(wi: np.ndarray, cells: SampleCells, held: Blocks) -> np.ndarray:
 
 
 def _weights(lobes: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """Weights (K,) with which the lobes (K, B) sum to the expectation (B,), by noise-weighted least squares."""
+    """The weights (K,) with which the lobes (K, B) sum to the expectation (B,), by noise-weighted least squares."""
     scale = 1.0 / np.sqrt(np.maximum(expected, 1e-6))
     return np.asarray(np.linalg.lstsq((lobes * scale).T, expected * scale, rcond=None)[0])
 
 
 def _effect(fitted: np.ndarray, expected: np.ndarray) -> float:
-    """RMS of fitted / expected - 1 beyond the noise of `fitted`, over well-filled blocks."""
+    """The RMS of fitted / expected - 1 over well-filled blocks, in excess of the noise of `fitted`."""
     filled = expected * SAMPLES > 100.0
     if not filled.any():
         return np.inf

@@ -1,5 +1,7 @@
-"""The operation in which a NaN or an infinity originates: the recorded material is evaluated again at one pair, and the
-result is traced back to the first operation whose arguments are all finite.
+"""The operation in which a NaN or an infinity originates.
+
+The recorded material is evaluated again for one pair of directions, and the result is traced back to the first
+operation whose arguments are all finite.
 
     origin.of(material, wo, wi)     "0 / 0 in V_Kelemen (my.glsl:31)"
 """
@@ -21,7 +23,8 @@ Number = Any  # a NumPy value for one pair: (1,), or (3, 1) for vectors and colo
 
 
 def of(material: BSDF, wo: NDArray[np.float64], wi: NDArray[np.float64]) -> str:
-    """Where eval stops being finite at a pair, in the first precision in which it does; "" if that cannot be found."""
+    """A description of the operation after which `eval` is not finite for a pair, in the first precision in which this
+    happens; "" if it cannot be found."""
     try:
         recording = material.record("eval")
     except GonioError:
@@ -58,7 +61,7 @@ def _finite(value: Number) -> bool:
 
 
 class _Called:
-    """One call of a recorded function: the values of its nodes, and the calls inside it."""
+    """A call of a recorded function: the values of its nodes, and the calls inside it."""
 
     def __init__(self, function: graph.Function, arguments: list[Number], outside: Callable[[int], str] | None = None):
         self.function, self.outside = function, outside
@@ -97,7 +100,7 @@ class _Called:
         return lambda place: self.origin(call.args[place])
 
     def origin(self, node: graph.Node) -> str:
-        """A description of where a non-finite value originates."""
+        """A description of the operation in which the non-finite value of a node originates."""
         if node.op == "parameter":
             return self.outside(self.places[node.index]) if self.outside else ""
         if node.op in ("call", "element"):
@@ -118,7 +121,8 @@ class _Called:
 
 
 def _is_power(node: graph.Node) -> bool:
-    """Whether a node is the root that represents a shader's power of a negative number: of x where x < 0, else of 0."""
+    """Whether a node is the root that represents a shader's power of a negative number: the root of x if x < 0, else
+    of 0."""
     base = node.args[0] if node.op == "sqrt" else None
     if not isinstance(base, graph.Node) or base.op != "where" or _constant(base.args[2]) != 0.0:
         return False
@@ -131,7 +135,7 @@ def _constant(one: object) -> object:
 
 
 def _words(op: str, given: list[Number]) -> str:
-    """A description of what an operation did with finite arguments."""
+    """A description of an operation on given finite arguments."""
     if op == "div":
         if np.all(given[1] != 0.0):
             return "an overflow of a quotient"

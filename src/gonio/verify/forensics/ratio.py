@@ -24,7 +24,7 @@ class Cause:
     """A probable cause.
 
     words   the cause as a sentence of the report
-    key     the same without numbers: failures with the same key have the same cause
+    key     the cause without numbers; failures with the same key have the same cause
     """
 
     words: str
@@ -33,15 +33,16 @@ class Cause:
 
 @dataclasses.dataclass(frozen=True)
 class Ratio:
-    """Two values that should be equal, at pairs of directions.
+    """Two values that should be equal, for pairs of directions.
 
-    top, bottom    their names, "weight x pdf" and "eval"
-    wo, wi         (N, 3)
+    top, bottom    names of the two values, such as "weight x pdf" and "eval"
+    wo, wi         directions, (N, 3)
     above, below   the values, (N, channels)
-    recompute      computes `below` for another subject, other directions or the other mode
-    numbers        constants, besides the usual ones, that this ratio may equal: "2 alpha"
+    subject        the subject to which they belong
+    recompute      function that computes `below` for another subject, other directions or the other mode
+    numbers        constants, in addition to the usual ones, to which this ratio may be equal: "2 alpha"
     zero           the mistake that a ratio of 0 suggests
-    antisymmetric  whether swapping wo and wi inverts the ratio: factors symmetric in the two cancel
+    antisymmetric  whether swapping wo and wi inverts the ratio, so that factors symmetric in the two cancel
     accuracy       relative difference of two values that count as equal; None derives it from the precision
     """
 
@@ -71,7 +72,7 @@ class Ratio:
 
 
 class Fit(NamedTuple):
-    """The formula of a ratio, the mistake that it suggests, and how well it holds; `number` if it is a constant."""
+    """The formula of a ratio, the mistake that it suggests, and how well it holds; `number` is a constant."""
 
     formula: str
     guess: str
@@ -97,7 +98,7 @@ NUMBERS |= {"4 / pi": 4.0 / np.pi, "pi / 4": np.pi / 4.0, "2 / pi": 2.0 / np.pi,
 
 
 def written(value: float, allowed: float = SPREAD) -> str:
-    """A number as a formula if it is a known one, else as digits."""
+    """A number as text: as a formula if it is a known number, else as digits."""
     for name, known in NUMBERS.items():
         if abs(value / known - 1.0) < allowed:
             return name
@@ -105,7 +106,7 @@ def written(value: float, allowed: float = SPREAD) -> str:
 
 
 def factor_key(number: float) -> str:
-    """One key for a factor and its inverse: the ratio does not show which of the two values lacks it."""
+    """A common key for a factor and its inverse, since the ratio does not show which of the two values lacks it."""
     return f"factor {max(number, 1.0 / number):.3g}" if number > 0.0 else f"factor {number:.3g}"
 
 
@@ -117,7 +118,7 @@ def tolerance(ratio: Ratio) -> float:
 
 
 def scalar(ratio: Ratio) -> np.ndarray | None:
-    """One number per pair (N,) if all channels have the same ratio, else None."""
+    """The ratio as one number per pair, (N,), if it is the same for all channels; else None."""
     lit = np.abs(ratio.below) > 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     r = np.divide(ratio.above, ratio.below, out=np.full_like(ratio.above, np.nan), where=lit)
     with warnings.catch_warnings():
@@ -129,7 +130,7 @@ def scalar(ratio: Ratio) -> np.ndarray | None:
 
 
 def holds(ratio: Ratio, quotient: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of values that should be 1; None if too many of them are not."""
+    """Spread and cover of quotients that should be 1; None if too many of them are not 1."""
     allowed = max(SPREAD, tolerance(ratio))
     good = np.isfinite(quotient)
     cover = float(np.mean(good & (np.abs(quotient - 1.0) < allowed)))

@@ -1,4 +1,4 @@
-"""A failure of a Mitsuba plugin as a short program for its authors, which needs only Mitsuba.
+"""A failure of a Mitsuba plugin as a short program for the plugin's authors, which requires only Mitsuba.
 
 As long as the defect exists, the program ends with an AssertionError that states the measured value.
 
@@ -44,7 +44,7 @@ SAMPLE = "bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.n
 
 
 def script(law: str, subject: Subject, finding: Finding) -> str:
-    """The program for a law's finding."""
+    """The program for a finding of a law; "" if there is none."""
     make = MAKERS.get(law)
     subject = where_found(subject, finding)
     if make is None or getattr(subject.model, "plugin", None) is None:
@@ -57,7 +57,7 @@ def _head(subject: Subject, wo: np.ndarray) -> str:
 
 
 def _registered(subject: Subject, head: str) -> str:
-    """The head of a program, which also runs the file that registers the plugin, if there is one."""
+    """The first lines of a program, which also run the file that registers the plugin, if there is one."""
     file, _, name = subject.target.rpartition(":")
     if not (name and file.endswith(".py")):
         return head
@@ -88,7 +88,8 @@ def _literal(value: object) -> str:
 
 
 def _energy(subject: Subject, finding: Finding) -> str:
-    """The albedo by a grid of directions; if there is no gain, compared with that of the samples."""
+    """A program that computes the albedo on a grid of directions and, if there is no gain, compares it with that of the
+    samples."""
     from ..laws.energy import lossless_variant
 
     mode = "ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance\n"
@@ -117,7 +118,7 @@ def _energy(subject: Subject, finding: Finding) -> str:
 
 
 def _pdf(subject: Subject, finding: Finding) -> str:
-    """The fraction of samples that the pdf predicts in a region, compared with that of the samples themselves."""
+    """A program that compares the fraction of samples that the pdf predicts in a region with the observed fraction."""
     cells = finding.evidence
     if not isinstance(cells, SampleCells) or cells.wo is None:
         return ""

@@ -1,8 +1,8 @@
-"""A cosine that is rounded to few bits: values change in equal steps of it.
+"""Detection of a cosine that is rounded to few bits, so that values change in equal steps of it.
 
-In half precision, 1 - cos^2 has few digits where cos is near 1: the peak of a narrow lobe becomes a disk with rings.
-Along a line on which the cosine decreases evenly, the values of such a lobe are constant except for jumps at equal
-distances.
+In half precision, 1 - cos^2 has few digits if cos is close to 1, so the peak of a narrow lobe becomes a disk with
+rings. Along a line on which the cosine decreases evenly, the values of such a lobe are constant except for jumps at
+equal distances.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ EQUAL = 0.1  # largest relative spread of their distances
 
 
 def named(subject: Subject) -> Cause | None:
-    """The cosine that is rounded; None if values change smoothly, or in unequal steps."""
+    """A cause that names the rounded cosine; None if values change smoothly, or in unequal steps."""
     wo = directions.at(np.array([30.0]), 20.0)[0]
     cos = 1.0 - RANGE * (np.arange(ALONG) + 0.5) / ALONG
     axes = {

@@ -1,14 +1,14 @@
-"""A trial in separate processes: a BSDF that loops, crashes, prints or exhausts memory still gets a report.
+"""A trial in separate processes, which reports on a BSDF even if it loops, crashes, prints or exhausts memory.
 
     trial(Task((Item("glass.py:Glass"),), "quick", seed=1), jobs=2)
 
 Each process (`worker`) tests one card at a time and announces every step and every call of the BSDF. If it crashes, or
 exceeds its time or memory, a new process tests the card again without the call that was in progress, which fails the
 laws that need it; or, if no call was in progress, without the law. The threshold of a statistical test depends on the
-number of tests in the report, which is known only after all cards: a card is decided by the number of its own tests,
-and again if the final number makes a difference. Therefore the report does not depend on the number of processes.
+number of tests in the report, which is known only after all cards. A card is therefore decided by the number of its own
+tests, and again if the final number makes a difference, so that the report does not depend on the number of processes.
 
-This module imports nothing of Gonio or NumPy at the top: the first process starts before this one loads the rest.
+This module imports nothing of Gonio or NumPy at the top, since the first process starts before this one loads the rest.
 """
 
 from __future__ import annotations
@@ -45,7 +45,12 @@ Tell = Callable[[str], None]
 
 
 class Item(NamedTuple):
-    """A target's name with its settings, each "alpha=0.3"; or a pickled material."""
+    """A target of a trial.
+
+    target    its name, or a pickled material
+    settings  values of its parameters, each "alpha=0.3"
+    sweep     values of the parameter that varies, as `vary` of `targets.resolve`
+    """
 
     target: str | bytes
     settings: tuple[str, ...] = ()
@@ -53,12 +58,18 @@ class Item(NamedTuple):
 
     @property
     def cards(self) -> int:
-        """The largest number of cards that it may give."""
+        """The largest number of cards that may result from it."""
         return 1 if not self.sweep else 5 if ".." in self.sweep else self.sweep.count(",") + 1
 
 
 class Task(NamedTuple):
-    """A trial; `laws` by name, None for all laws."""
+    """A trial.
+
+    items   the targets
+    effort  name of the effort
+    seed    seed of all random numbers
+    laws    names of the laws; None for all
+    """
 
     items: list[Item]
     effort: str
@@ -67,7 +78,7 @@ class Task(NamedTuple):
 
 
 def item_of(material: Any) -> Item:
-    """A Python object in a form that another process can load. Raises InputError if that is not possible."""
+    """A material in a form that another process can load. Raises InputError if there is none."""
     from ...catalog import notation, outside
     from ...material import BSDF, tree
 
@@ -101,9 +112,11 @@ def trial(
     """The report of a task.
 
     jobs       number of simultaneous processes
-    limit      seconds per law; GONIO_VERIFY_LIMIT or 300 if not given
-    memory     GB per process; if not given, half of the machine's memory for all processes together
-    tell       called with each law's result if there is a single card, else with each card's, as soon as it is known
+    limit      seconds per law; None means GONIO_VERIFY_LIMIT or 300
+    memory     GB per process; None means half of the machine's memory for all processes together
+    progress   function that is called with the number of completed steps, the number of all steps, and the next step
+    tell       function that is called with the result of each law if there is a single card, else with that of each
+               card, as soon as it is known
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
@@ -135,9 +148,9 @@ def trial(
 class _State:
     """The state of a card that is being tested.
 
-    skip       laws that must not be tested again, and why
-    forbidden  methods and values with which they must not be called again, and why
-    strikes    crashes outside of any call
+    skip       laws that must not be tested again, with the reasons
+    forbidden  methods, with the parameter values for which they must not be called again, and the reasons
+    strikes    number of crashes outside any call
     """
 
     title: str
@@ -148,7 +161,7 @@ class _State:
     card: Card | None = None
 
     def avoid(self, laws: list[str], step: str, call: Call | None, reason: str) -> None:
-        """Exclude the call in progress from the next attempt, or the law if there was none."""
+        """Exclude the call in progress from the next attempt or, if there was none, the law."""
         if call is not None and call[:2] not in self.forbidden:
             method, key, values = call
             self.forbidden[method, key] = f"{reason} (in {method}{', at ' if values else ''}{values})"
@@ -191,7 +204,11 @@ class _Pool:
         return [one.card for one in self.states or () if one.card]
 
     def judge(self, threshold: float | None, repeat: Sequence[int] = ()) -> None:
-        """Test all cards, or some of them again, with a threshold; None for the number of a card's own tests."""
+        """Test all cards, or some of them again.
+
+        threshold  p-value below which a test rejects; None for that of a report on each card alone
+        repeat     indices of the cards to test again; empty for all cards
+        """
         self.waiting = list(repeat)
         for number in repeat:
             assert self.states is not None
@@ -213,7 +230,7 @@ class _Pool:
             self.workers.append(Process(self.task, self.limit, self.answers))
 
     def _listen(self) -> None:
-        """Handle the answers that arrive within a moment, and end processes that exceed their limits."""
+        """Handle the answers that arrive within a short time, and end processes that exceed their limits."""
         with contextlib.suppress(queue.Empty):
             timeout = LOOK
             while True:
@@ -279,7 +296,7 @@ class _Pool:
         raise error
 
     def _lost(self, worker: Process, reason: str) -> None:
-        """Handle the end of a process: its card is tested again without the step or the call in progress."""
+        """Handle the end of a process, whose card is tested again without the step or the call in progress."""
         last, call = worker.last_line(), worker.call
         worker.close()
         self.workers.remove(worker)
@@ -298,7 +315,7 @@ class _Pool:
 
 
 def _machine_memory() -> float:
-    """Bytes of memory of this machine, or of its container, which psutil does not know."""
+    """The memory of this machine, or of its container, which psutil does not consider, in bytes."""
     sizes = [float(psutil.virtual_memory().total)]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with contextlib.suppress(ValueError, OSError):

@@ -1,6 +1,6 @@
-"""One process of a trial, as the parent sees it: its card and step, since when, and the call in progress.
+"""The parent's view of one process of a trial: its card and step, their starting time, and the call in progress.
 
-This module imports nothing of Gonio or NumPy at the top: the first process starts before this one loads the rest.
+This module imports nothing of Gonio or NumPy at the top, since the first process starts before this one loads the rest.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Call = tuple[str, str, str]  # a method, and the material's parameter values as 
 
 
 class _Started(NamedTuple):
-    """A process that waits for its task, its folder, and the file in it that receives what it prints."""
+    """A process that waits for its task, its folder, and the file in this folder that receives its output."""
 
     folder: tempfile.TemporaryDirectory[str]
     log: Path
@@ -42,7 +42,7 @@ _ahead: list[_Started] = []
 
 
 def start_ahead() -> None:
-    """Start the first process before its task is known: it loads while the command line is read."""
+    """Start the first process before its task is known, so that it loads while the command line is read."""
     _ahead.append(_start())
 
 
@@ -63,7 +63,7 @@ def _start() -> _Started:
 
 
 class Process:
-    """One process: its card and step, their starting time, and the call in progress."""
+    """One process of a trial: its card and step, their starting time, and the call in progress."""
 
     def __init__(self, task: object, limit: float, answers: queue.Queue[tuple[Process, Any]]) -> None:
         self.folder, self.log, self.process = _ahead.pop() if _ahead else _start()
@@ -75,7 +75,7 @@ class Process:
         threading.Thread(target=self._read, args=(answers,), daemon=True).start()
 
     def order(self, *order: object) -> None:
-        """Send an order; if the process has ended, the end of its answers shows that."""
+        """Send an order. If the process has ended, this is detected by the end of its answers."""
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             self.process.stdin.write(pickle.dumps(order))
@@ -86,14 +86,18 @@ class Process:
 
     @property
     def call(self) -> Call | None:
-        """The call that was in progress when the process ended; None outside of any call."""
+        """The call that was in progress when the process ended; None if there was none."""
         try:
             return pickle.loads(self.in_progress.read_bytes()) or None
         except Exception:  # before the first call, or after an end in the middle of writing
             return None
 
     def over(self, limit: float, memory: float) -> str:
-        """The limit that it exceeds, as text; "" if none."""
+        """The limit that the process exceeds, as text; "" if none.
+
+        limit   seconds per law
+        memory  bytes
+        """
         limit, grace = (limit, GRACE) if self.card >= 0 else (max(limit, LOAD), 0.0)
         if self.busy and time.monotonic() - self.since > limit + grace:
             return watch.words(limit) if self.card >= 0 else f"not finished after {limit:g} s"
@@ -105,7 +109,10 @@ class Process:
         return ""
 
     def end(self, reason: str = "") -> None:
-        """Kill the process and those that it started."""
+        """Kill the process and those that it started.
+
+        reason  the reason, which `why` then returns
+        """
         self.reason = self.reason or reason
         with contextlib.suppress(ProcessLookupError, PermissionError):
             if hasattr(os, "killpg"):
@@ -115,7 +122,7 @@ class Process:
         self.process.wait()
 
     def why(self) -> str:
-        """The reason for the end of its answers."""
+        """The reason why its answers ended."""
         try:
             code = self.process.wait(timeout=1.0)
         except psutil.TimeoutExpired:
@@ -127,7 +134,7 @@ class Process:
         return f"the process crashed: {getattr(code, 'name', code)}"
 
     def lines(self) -> int:
-        """Number of lines printed since the previous call of this method."""
+        """The number of lines that it printed since the previous call of this method."""
         with self.log.open("rb") as file:
             file.seek(self.counted)
             text = file.read()

@@ -1,4 +1,4 @@
-"""A time limit for the BSDF's own code: an endless loop must not hang the trial."""
+"""A time limit for the code of a BSDF, so that an endless loop does not hang the trial."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = 
 
 
 def words(seconds: float) -> str:
-    """The reason for the failure of a law that did not end."""
+    """The message for a law that did not end within a number of seconds."""
     return f"not finished after {seconds:g} s: does `sample` loop on a condition that may never hold?"
 
 
 @contextlib.contextmanager
 def limited(what: str, seconds: float | None = None) -> Iterator[None]:
-    """Raise TimeoutError in the block after that many seconds.
+    """A context that raises TimeoutError in its block after a number of seconds.
 
-    A loop in Python is interrupted. A loop in a compiled kernel is not: the process then prints an error and exits with
-    code 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside the main thread, and on
-    platforms without SIGALRM.
+    what  name of the law, for the error
+    A loop in Python is interrupted. A loop in a compiled kernel cannot be: the process then prints an error and exits
+    with code 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside the main thread,
+    and on platforms without SIGALRM.
     """
     seconds = seconds or LIMIT
     text = words(seconds)

@@ -1,9 +1,9 @@
-"""The process in which a BSDF is tested, started by `child`: it may loop, crash, print, or exhaust memory.
+"""The process in which a BSDF is tested, started by `child`. It may loop, crash, print, or exhaust memory.
 
-Orders arrive pickled on standard input. Answers leave pickled through a copy of standard output, and what the BSDF
-prints goes to the file that is standard error. An order is (card, skip, forbidden, threshold). An answer before each
-step, and a file around each call of the BSDF, tell what comes next, so that the parent knows what was in progress if
-the process ends.
+Orders arrive pickled on standard input. Answers are sent pickled through a copy of standard output, and the output of
+the BSDF goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step, an
+answer announces it, and before each call of the BSDF, a file describes it, so that the parent knows what was in
+progress if the process ends.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Say = Callable[..., None]
 
 
 def main() -> None:
-    """Follow the parent's orders until it closes the pipe."""
+    """Execute the orders of the parent until it closes the pipe."""
     orders, say = _pipes()
     _end_with(os.getppid())
     warnings.showwarning = lambda message, category, *more, **options: (
@@ -93,7 +93,7 @@ def _work(orders: IO[bytes], say: Say) -> None:
 
 
 def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
-    """The subjects, and the shaders that could not be read although other targets could."""
+    """The subjects of the targets, and the shaders that could not be read although other targets could."""
     subjects: list[Subject] = []
     unread: list[Unread] = []
     for item in items:
@@ -108,14 +108,15 @@ def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
 
 
 def _outside(error: BaseException) -> str:
-    """file:line of an exception in a user's file, outside `guarded` calls; else ""."""
+    """FILE:LINE of an exception in a user's file, outside `guarded` calls; else ""."""
     files = {getattr(module, "__file__", "") for name, module in sys.modules.items() if name.startswith(outside.PREFIX)}
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 
 
 def _pipes() -> tuple[IO[bytes], Say]:
-    """The stream of orders, and the function that sends an answer, independent of what the BSDF reads and prints."""
+    """The stream of orders, and the function that sends an answer. Both are independent of what the BSDF reads and
+    prints."""
     orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
@@ -136,15 +137,16 @@ def _pipes() -> tuple[IO[bytes], Say]:
 
 
 class _Stuck(BaseException):
-    """A call that did not end in time. No law catches it: a new process starts, which does not repeat the call."""
+    """A call did not end in time. No law catches this exception, since a new process starts without repeating the
+    call."""
 
 
 class _Calls:
-    """Writes each call of the BSDF to a file for the parent, and refuses calls that ended an earlier process.
+    """Write each call of the BSDF to a file for the parent, and reject calls that ended an earlier process.
 
-    in_progress path of the file
-    forbidden   by method and values, the reason why that call must not be repeated
-    given       key of the material's given values
+    in_progress  path of the file
+    forbidden    (method, parameter values) -> the reason why such a call must not be repeated
+    given        key of the material's given parameter values
     """
 
     def __init__(self, in_progress: str) -> None:
@@ -182,7 +184,7 @@ class _Calls:
             os.write(self.file, pickle.dumps(call))
 
     def _values(self, model: Any) -> tuple[str, str]:
-        """The values of a material's parameters as a key, the same in every process, and as text."""
+        """The parameter values of a material as a key, which is the same in every process, and as text."""
         known = self._keys.get(id(model))
         if known is None or known[0] is not model:  # the model is stored, so that no other object gets its id
             key = words = ""

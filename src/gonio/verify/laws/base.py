@@ -148,7 +148,7 @@ def beyond_rounding(
     floor: float | np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """The relative difference of a and b, (N, channels), minus the effect of rounding the directions on `function`.
+    """The relative difference of a and b, (N, channels), beyond the effect of rounding the directions on `function`.
 
     Rounding is not considered for pairs whose difference is below a hundredth of the tolerance. Pairs above the
     tolerance are examined again with more changes of direction, since four may miss the steepest change of a value.
