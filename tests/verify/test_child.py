@@ -11,8 +11,11 @@ import time
 from pathlib import Path
 
 import gonio as go
+import psutil
 import pytest
+from gonio import cli
 from gonio.verify import Report, verify
+from gonio.verify.isolation import process
 
 HOSTILE = '''
 import ctypes, os, sys, threading
@@ -246,3 +249,12 @@ def test_the_parent_starts_the_child_before_it_loads_anything() -> None:
 
 def test_no_target_is_an_empty_report() -> None:
     assert verify([], quick=True).passed
+
+
+def test_a_process_that_got_no_task_ends_with_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    """Otherwise the next command of this program would run in the folder of the first."""
+    before = set(psutil.Process().children())
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["verify"])
+    assert ended.value.code == 2 and "Missing argument" in capsys.readouterr().err
+    assert set(psutil.Process().children()) == before and not process._ahead

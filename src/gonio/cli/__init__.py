@@ -22,19 +22,21 @@ __all__ = ["Verb", "main", "run", "verb"]
 def main(arguments: list[str] | None = None) -> None:
     """The `gonio` command."""
     import sys
+    from contextlib import ExitStack
 
     from .. import garbage
     from . import signals, streams
 
     streams.prepare()
-    with signals.at_once(), garbage.paused():  # imports leave no garbage
-        if (sys.argv[1:] if arguments is None else arguments)[:1] == ["verify"]:
-            from ..verify.isolation import process
+    with ExitStack() as stack:
+        with signals.at_once(), garbage.paused():  # imports leave no garbage
+            if (sys.argv[1:] if arguments is None else arguments)[:1] == ["verify"]:
+                from ..verify.isolation import process
 
-            process.start_ahead()
-        from . import app
-    with signals.as_exceptions() as ended:
-        sys.exit(app.run(arguments, ended))
+                stack.enter_context(process.started_ahead())
+            from . import app
+        with signals.as_exceptions() as ended:
+            sys.exit(app.run(arguments, ended))
 
 
 if not TYPE_CHECKING:

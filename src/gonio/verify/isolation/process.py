@@ -15,6 +15,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,9 +42,19 @@ class _Started(NamedTuple):
 _ahead: list[_Started] = []
 
 
-def start_ahead() -> None:
-    """Start the first process before its task is known, so that it loads while the command line is read."""
+@contextlib.contextmanager
+def started_ahead() -> Iterator[None]:
+    """Start the first process before its task is known: it loads while the command line is read. A process that got no
+    task ends with the block."""
     _ahead.append(_start())
+    try:
+        yield
+    finally:
+        while _ahead:
+            unused = _ahead.pop()
+            unused.process.kill()
+            unused.process.communicate()
+            unused.folder.cleanup()
 
 
 def _start() -> _Started:
