@@ -1,8 +1,7 @@
 """Judge pictures of tables of E and E_avg, such as the homework's, by the form that fits best and its distance.
 
 Distances are root mean squares in gray levels of 255. A form is identified by the rows of roughness 0.55 and above,
-where cosine sampling has converged. Below, a table computed by cosine sampling is noisy and too dark, which is not a
-mistake.
+where cosine sampling has converged. Below, a table by cosine sampling is noisy and too dark, which is not a mistake.
 """
 
 from __future__ import annotations
@@ -52,8 +51,7 @@ class Table:
 
 
 class _Layout(NamedTuple):
-    """A layout of the table in the picture: its description, the mistake (None if it is allowed), and the values
-    [roughness, mu]."""
+    """A layout of the table in the picture: its description, the mistake, if it is one, and values [roughness, mu]."""
 
     words: str
     mistake: Mistake | None

@@ -58,9 +58,8 @@ def render(
                    bit-identical results. None writes one next to the output if the render takes more than a minute
     until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
                    pixel (65,536 if None); warns if these do not suffice
-    gradient       paths of numbers and colors of materials; the result is the picture and its derivative with respect
-                   to each, (1 + paths, height, width, 3). "....albedo.r" is one channel of a color. Shapes with equal
-                   materials are differentiated together
+    gradient       paths of numbers and colors of materials ("....albedo.r" is one channel); the result is the picture
+                   and its derivatives, (1 + paths, height, width, 3). Equal materials are differentiated together
     Warns (GonioWarning) about suspicious scenes, about a .png that clips, and when it continues from a checkpoint.
     Raises InputError for an invalid scene or option, MachineError if this machine cannot render it.
     """

@@ -76,20 +76,16 @@ def bake(
               linearly transformed cosines of the target, with shader code for light from quadrilaterals
     resolution  texels along each axis, 1 to 4096; None: 128, or for "ltc" 64 (anisotropic: 16), where at most 256
     method    "quadrature", or the density to sample: "cosine", the distribution's name, or "visible"
-    samples   samples per texel, for a `method` that samples
-    sampler   their points: "hammersley", "stratified" or "independent"
-    seed      seed of independent points; None: 0
-    masking   masking of a distribution; a material has its own
+    samples   per texel, if the method samples: by `sampler` "hammersley", "stratified" or "independent" (with `seed`)
+    masking   masking of a distribution
     layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures)
-    store     what the homework's pictures hold: "E" or "1-E"
-    flip      whether their bottom row has the lowest roughness
-    wrap      convert them to bytes as the homework's program does: rounded down, and 256 becomes 0
+    store     "E" or "1-E" in the homework's pictures, whose bottom row has the lowest roughness if `flip`, and whose
+              bytes are rounded down, with 256 as 0, if `wrap`
     aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
     floor     lower bound of the denominator of D, for method "cosine"
     preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
-    ndf       for an environment: the distribution for prefiltering; None: ggx. The error of the split sum is measured
-              with `masking`
-    levels    for an environment: number of levels, of roughness 0 to 1; None: 6
+    ndf       for an environment: the distribution for prefiltering (None: ggx) into `levels` levels of roughness 0 to 1
+              (None: 6); the error of the split sum is measured with `masking`
     Tables baked before come from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
     """

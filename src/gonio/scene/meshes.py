@@ -224,10 +224,8 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """The triangles of Wavefront OBJ data, from its lines v, vt, vn and f; other lines are ignored.
-
-    Polygons become fans, and negative indices count from the end. Errors name `path` and `where`.
-    """
+    """The triangles of Wavefront OBJ data, from its lines v, vt, vn and f. Polygons become fans, and negative indices
+    count from the end. Errors name `path` and `where`."""
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}

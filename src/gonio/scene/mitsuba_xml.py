@@ -6,8 +6,8 @@ Includes, search paths and parameters have the same meaning as in Mitsuba:
     <include filename="materials.xml"/>    inserts another file here
     <path value="textures"/>               a folder that is searched first for files of plugins
 
-They are resolved here, because Mitsuba would also search the current folder. In the rewritten text, each file is an
-absolute path to a file that may be read, and each plugin is one that may be loaded.
+Mitsuba would also search the current folder. In the rewritten text, each file is an absolute path that may be read, and
+each plugin is one that may be loaded.
 """
 
 from __future__ import annotations
@@ -91,10 +91,8 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
 
 
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
-    """The absolute path of a file of a scene, for Mitsuba.
+    """The absolute path of a file of a scene, for Mitsuba; `name` and `location` are the file and its place in errors.
 
-    name      the file's name in errors
-    location  file and line that errors name
     Raises InputError for a file that must not be opened: one outside the scene's folder, or an inconsistent one that
     could corrupt the memory of a C++ library.
     """
@@ -115,10 +113,7 @@ def property_value(
 ) -> str:
     """The value of a string property of a plugin; if it names a file, the path of that file.
 
-    kind        type of the plugin
-    location    file and line that errors name
-    locate      function that returns the path of a file that may be read, given its name
-    allow_code  whether the property may name code
+    locate  function that returns the path of a file that may be read, given its name
     Raises InputError for code that is not allowed, and if Mitsuba would search other folders for a file of that name.
     """
     if outside.names_code(value) and not allow_code:

@@ -65,22 +65,16 @@ def verify(
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    anything that `go.material` accepts, the name of a target as for `gonio verify`, or a list of these
-    vary      for the name of a target, the values of a parameter, each with its own card: "alpha=0.01..1" for five
-              values, or "alpha=0.1,0.5"
-    quick     whether to run only a fast first check
-    deep      whether to use more samples, directions and widths
+    vary      for a target's name, values of a parameter, each with a card: "alpha=0.01..1" (five) or "alpha=0.1,0.5"
+    quick     whether to run only a fast first check; `deep` uses more samples, directions and widths
     seed      seed of all random numbers, 1 if None; the same seed gives the same report
     law       name of a law, or a list of names; None selects all laws
     output    folder for report.html and report.json
-    junit     file for JUnit's XML
-    sarif     file for SARIF
-    baseline  file of known failures, which do not fail the report
-    write_baseline  file into which to write the failures of this report as a baseline
+    junit     file for JUnit's XML; `sarif` one for SARIF
+    baseline  file of known failures, which do not fail the report; `write_baseline` writes the failures of this one
     tolerate  "invisible", "small" or "visible": failures of this grade and below do not fail the report
-    progress  function that is called with the number of completed steps, the number of all steps, and the name of the
-              next step
-    isolated  whether each BSDF is tested in its own process, which it may crash or block; None isolates BSDFs that are
-              given by name
+    progress  called with the number of completed steps, the number of all steps, and the name of the next step
+    isolated  whether each BSDF is tested in a process of its own, which it may crash; None: if it is given by name
     workers   number of such processes at a time, on which the results do not depend
     timeout   seconds per law in such a process; None means 300
     memory    GB per process; None means half of the machine's memory for all processes together
@@ -335,11 +329,7 @@ def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
 def decide(
     law: Law, one: Subject, finding: Finding, threshold: float, seed: int, place: Place | None = None
 ) -> Verdict:
-    """The verdict on a finding.
-
-    threshold  p-value below which a test rejects
-    place      the parameter values of the finding; None for the given ones
-    """
+    """The verdict on a finding at a `place`, None for the given values; tests reject p-values below `threshold`."""
     why = list(finding.problems)
     statistical: list[str] = []
     lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
@@ -368,9 +358,7 @@ def decide(
         else:
             why.append(f"the violation, {size:.4g}, is more than the declared {breach.size:.4g}: {breach.reason}")
     elif over:
-        why.append(_exceeds(finding))
-        if law.name in getattr(one.model, "known_violations", {}):
-            why.append("a violation is declared, but its size is 0 with these parameters")
+        why += _exceeds(finding, law.name in getattr(one.model, "known_violations", {}))
     why += statistical
     if status == PASS and finding.untried:
         status, why = NOT_TRIED, [finding.untried]
@@ -397,10 +385,14 @@ def decide(
     )
 
 
-def _exceeds(finding: Finding) -> str:
-    """A sentence that states the measured value, which exceeds its tolerance."""
+def _exceeds(finding: Finding, declared: bool) -> list[str]:
+    """A description of a measured value above its tolerance.
+
+    declared  whether a violation is declared for other parameters
+    """
     figure = finding.shown or f"{finding.figure:.3g}"
-    return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
+    words = [f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"]
+    return words + ["a violation is declared, but its size is 0 with these parameters"] * declared
 
 
 def _subjects(targets: Sequence[BSDF | Subject | str], vary: str) -> list[Subject]:

@@ -130,8 +130,7 @@ class _Facets:
 
 
 def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
-    """Follow one walker per lane from wo. Returns the light of two or more hits scattered along wi, times
-    |cos theta_i|, and the end of the walk.
+    """(light of two or more hits scattered along wi, times |cos theta_i|, end of the walk), of one walker per lane.
 
     base   a bound conductor or dielectric
     wi     the target direction; None estimates no light

@@ -189,8 +189,7 @@ def measure(
     surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
     facet        material of the facets, as a string or an object: "mirror", "lambert:albedo=0.8", "conductor:Au"; a
                  string that does not set alpha gives smooth facets (alpha = 0)
-    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular, samples; "": the
-                 default kind
+    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular, samples; "": default
     theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
     solid_angle  solid angle of the detector, sr, over which f is averaged; None: 0.006 for surfaces, 0 for materials
     noise        relative standard deviation of a reading

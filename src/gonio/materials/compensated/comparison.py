@@ -90,18 +90,13 @@ def compare(
     walks          number of random walks per albedo, 1000 or more
     pairs          number of pairs of directions that are evaluated for `cost`, 1024 or more
     seed           seed of the random walks and of the directions for `reciprocity`
-    own            user materials: one with a base is compared as a method, any other as a base. For a base without
-                   microfacets, there is no random walk as a reference
-
-    Returns a dict that can be stored as JSON:
-
-    roughness, mu, walks  the arguments
+    own            user materials: one with a base is a method, any other a base, with a random walk if it has facets
+    Returns a dict that can be stored as JSON, with the first three arguments and
     albedo       [base][method], (roughness, mu, 3)
     rms          [base][method], RMS difference of the albedos from those of the random walk
     furnace      [base][method], largest |1 - albedo|, for the lossless bases
     reciprocity  [method], largest relative violation for gold
     cost         [method], time of one evaluation divided by that of the uncompensated metal
-
     Raises InputError if `walks` or `pairs` is too small.
     """
     if walks < 1000 or pairs < 1024:
