@@ -92,7 +92,6 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
 
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
     """The absolute path of a file of a scene, for Mitsuba; `name` and `location` are the file and its place in errors.
-
     Raises InputError for a file that must not be opened: one outside the scene's folder, or an inconsistent one that
     could corrupt the memory of a C++ library.
     """

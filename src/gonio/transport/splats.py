@@ -47,7 +47,7 @@ class Splat(NamedTuple):
 class SplatCamera:
     """The camera of a picture made of splats.
 
-    unit  radiance of one unit of the integers in which splats are added up
+    unit  radiance of an increment of 1: splats are added up as integers
     """
 
     def __init__(self, data: SceneData, particles: Particles) -> None:
@@ -65,7 +65,7 @@ class SplatCamera:
 
     @staticmethod
     def check(data: SceneData, location: str) -> None:
-        """Raise InputError, which names `location`, if particles cannot make the requested picture."""
+        """Raise InputError, naming `location`, if particle tracing cannot render the requested picture."""
         sensor = data.sensor
         if data.aovs:
             hint = "leave out --denoise, or use path"

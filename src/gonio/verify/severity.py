@@ -2,7 +2,7 @@
 
 A bias is a fraction of the reflected light. It is stated for the worst direction wo, and as the cosine-weighted average
 over the hemisphere of wo, which is the average over a sphere viewed by an orthographic camera. `estimators` computes
-the bias of sampling.
+the bias due to sampling.
 
     bias = severity.between(subject, pair)     bias.worst, bias.average, bias.share, bias.words
 """

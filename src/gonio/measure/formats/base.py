@@ -31,11 +31,11 @@ class Format:
     several: ClassVar[bool] = False  # whether a file holds several materials
 
     def fits(self, data: bytes) -> bool:
-        """Whether a file's contents are of this format; called if several formats share the file's suffix."""
+        """Whether a file's contents are in this format; called if several formats share the file's suffix."""
         return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
-        """The table in a file's bytes. Raises InputError if they are of another format.
+        """The table in a file's bytes. Raises InputError if they are in another format.
 
         where  name of the file, for errors
         item   the material, in files that hold several
@@ -43,11 +43,11 @@ class Format:
         raise NotImplementedError
 
     def write(self, table: Measurement) -> bytes:
-        """The bytes of a file for a table of the kind `writes`."""
+        """The contents of a file, as bytes, for a table of the kind that `writes` names."""
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
     def resampled(self, source: Measurement) -> Measurement:
-        """A table of the kind `writes` with the values of another; unchanged if it is already of that kind."""
+        """The table converted to the kind that `writes` names; unchanged if it is already of that kind."""
         raise NotImplementedError
 
     def items(self, data: bytes, where: str) -> list[str]:

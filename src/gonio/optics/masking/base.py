@@ -35,13 +35,13 @@ class Masking(Part):
         return distribution("ggx")
 
     def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G for two directions on the same side of the surface; m is the normal of the facet that mirrors one into the
+        """G for two directions on the same side of the surface; m is the normal of the facet that reflects one into the
         other."""
         raise self.lacks("no `reflected`", "reflected(self, ndf, wo, wi, m, alpha)")
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """G for two directions on opposite sides; m is the normal of the facet that refracts one into the other. By
-        default, it is `reflected`."""
+        """G for two directions on opposite sides; m is the normal of the facet that refracts one into the other. The
+        default returns the value of `reflected`."""
         return self.reflected(ndf, wo, wi, m, alpha)
 
     def onset(self, alpha: Scalar) -> Scalar:
