@@ -65,7 +65,25 @@ def test_a_declared_breach_is_no_failure_unless_it_is_larger_or_absent() -> None
     absent = verdict(finding(0.0), declared)
     assert absent.status == "fail" and "but holds" in absent.why[0]
     assert verdict(finding(0.0), {"energy": KnownViolation("maybe", 0.5, certain=False)}).status == "pass"
-    # a statistical rejection is never what was declared
+    none, of_size_0 = (verdict(finding(0.8), one) for one in ({}, {"energy": KnownViolation("by nature", 0.0)}))
+    assert none.status == of_size_0.status == "fail" and len(none.why) == 1 and "its size is 0" in of_size_0.why[1]
+
+
+class Bright(go.Lambert):
+    """Lambert with 1.3 times its light."""
+
+    def eval(self, wo: Any, wi: Any, mode: Any = "radiance") -> Any:
+        return super().eval(wo, wi, mode) * 1.3
+
+
+def test_a_gain_of_the_lossless_variant_alone_is_called_that() -> None:
+    dim, bright = (verify(Bright(albedo), quick=True, law="energy")["energy"] for albedo in (0.1, 1.0))
+    assert dim.shown.startswith(("gain 0.29", "gain 0.30")) and dim.shown.endswith(" of the lossless variant")
+    assert "lossless" not in bright.shown
+
+
+def test_a_statistical_rejection_is_never_what_was_declared() -> None:
+    declared = {"energy": KnownViolation("by nature", 0.5)}
     both = finding(0.4, trials=[Trial(1e-6, "here", lambda: 1e-6)])
     assert verdict(both, declared).status == "fail"
 

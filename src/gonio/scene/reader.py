@@ -14,7 +14,7 @@ from ..bridge.types import Json
 from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from . import overrides as override
-from .materials import OWN, MaterialPart, numbers_in
+from .materials import BY_TYPE, OWN, MaterialPart, numbers_in
 from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
@@ -230,7 +230,7 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     elif kind == "union_tag_invalid":
         tag = str(context["tag"])
         known = [name for item in context["expected_tags"].split(",") if (name := item.strip(" '")) != OWN]
-        hint = ELSEWHERE.get(tag) or _as_file(tag) or did_you_mean(tag, _plain(known))
+        hint = ELSEWHERE.get(tag) or (tag not in BY_TYPE and _as_object(tag)) or did_you_mean(tag, _plain(known))
         what, more = f"unknown type '{tag}'", ("type",)
     elif kind == "union_tag_not_found":
         what, hint = "key 'type' is missing", 'add "type": it says what this object is'
@@ -248,7 +248,7 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
         limit = next(context[name] for name in ("gt", "ge", "lt", "le") if name in context)
         what, hint = f"expected a number {sign} {limit:g}, got {value}", f"give a number {sign} {limit:g}"
     elif kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
-        what, hint = f"expected an object {{...}}, got {got}", _as_file(value) or "put it in { }"
+        what, hint = f"expected an object {{...}}, got {got}", _as_object(value) or "put it in { }"
     elif kind == "list_type":
         what, hint = f"expected a list [...], got {got}", "put it in [ ]"
     elif kind == "bool_type":
@@ -262,11 +262,17 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     return pointer(*steps, *more), what, hint
 
 
-def _as_file(value: Json) -> str:
-    """How to write the name of a file where an object, or its type, is expected; "" for other values."""
-    if not isinstance(value, str) or not Path(value).suffix:
+def _as_object(value: Json) -> str:
+    """How to write a material by its name, a class, or a file's name, where an object or its type is expected; "" for
+    other values."""
+    if not isinstance(value, str):
         return ""
-    return f'write {{"type": "{_type_of(value)}", "file": "{value}"}}'
+    name, bracket, _ = value.partition("(")
+    if outside.names_code(value):
+        return f'write {{"type": "{value}"}}, and allow it with --allow-code'
+    if name in BY_TYPE:
+        return f'write {{"type": "{name}"{", ..." if bracket else ""}}}, with its parameters as keys'
+    return f'write {{"type": "{_type_of(value)}", "file": "{value}"}}' if Path(value).suffix and not bracket else ""
 
 
 def _plain(known: list[str]) -> list[str]:
