@@ -139,7 +139,7 @@ class Glass(NamedTuple):
         return where(wo.z * wi.z > 0.0, 1.0, 1.0 / sqr(self.eta(wo, wi)))
 
     def given(self, wo: Direction) -> Scalar:
-        return where(self.thin.scale > 0.0, self.of_mean_width(wo), 0.0)
+        return where(self.thin.scale > 0.0, self.at(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """M(mu_i) mu_i / (pi M_avg) of wi's side and the mean width, times the fraction for that side."""

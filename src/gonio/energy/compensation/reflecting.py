@@ -22,7 +22,7 @@ class Reflecting(NamedTuple):
 
     c             coefficients of the polynomial; for two widths, at their mean
     bend          the cosine below which masking is strong
-    scale         1 / (pi M_avg) of this polynomial, that is, of the sampled lobe
+    scale         1 / (pi M_avg) of this polynomial
     true_scale    1 / (pi M_avg) of M itself; equal to `scale` for one width
     average       M_avg
     F_avg         mean reflectance
@@ -52,7 +52,7 @@ class Reflecting(NamedTuple):
         return even + self.two.apart * (self.two.at(w, self.ndf, self.masking) - even)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M at the mean width, by which the lobe is sampled, for a direction above the surface."""
+        """M at the mean width, for a direction above the surface."""
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
@@ -65,19 +65,50 @@ class Reflecting(NamedTuple):
         return 1.0
 
     def given(self, wo: Direction) -> Scalar:
-        return where((self.scale > 0.0) & (wo.z > 0.0), self.of_mean_width(wo), 0.0)
+        return where((self.scale > 0.0) & (wo.z > 0.0), self.at(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the lobe, M(mu_i) mu_i / (pi M_avg) at the mean of the two widths, 1/sr."""
-        return self.of_mean_width(wi) * maximum(wi.z, 0.0) * self.scale
+        """The density of the lobe, 1/sr: M(mu_i) mu_i / (pi M_avg), for two widths the average of that of the mean
+        width and that of the larger one.
+
+        M of two widths is far above that of the mean width near the normal, and above that of the larger one at grazing
+        angles.
+        """
+        density = self.of_mean_width(wi) * self.scale
+        if self.two is not None:
+            density = 0.5 * (density + self.two.larger.at(wi, self.ndf, self.masking) * self.two.larger.scale)
+        return density * maximum(wi.z, 0.0)
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
         """A direction with the density `pdf`: mu^2 from the table of its inverse, and a uniform azimuth."""
-        (mu2,) = lookup(curves.lobe(self.ndf, self.masking), self.row, inset(u.y, curves.LOBE_NODES))
+        row, v = self.row, u.y
+        if self.two is not None:
+            of_mean = v < 0.5
+            row, v = where(of_mean, row, self.two.larger.row), where(of_mean, 2.0 * v, 2.0 * v - 1.0)
+        (mu2,) = lookup(curves.lobe(self.ndf, self.masking), row, inset(v, curves.LOBE_NODES))
         return lobe.from_square(mu2, u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
         return ones_like(wo.z)
+
+
+class OneWidth(NamedTuple):
+    """M of one width and the lobe proportional to M mu.
+
+    c      coefficients of the polynomial
+    bend   the cosine below which masking is strong
+    scale  1 / (pi M_avg)
+    row    coordinate in the table of the inverse of the lobe
+    """
+
+    c: tuple[Scalar, ...]
+    bend: Scalar
+    scale: Scalar
+    row: Scalar
+
+    def at(self, w: Direction, ndf: str, masking: str) -> Scalar:
+        """M at a direction above the surface."""
+        return curves.missing(form_of(ndf, masking), self.c, self.bend, w.z)
 
 
 class TwoWidths(NamedTuple):
@@ -88,12 +119,14 @@ class TwoWidths(NamedTuple):
     rotation  rotation of the base
     apart     weight of this M relative to that of the mean width; 0 for equal widths, where the two fits differ by up
               to 2 % of a small value
+    larger    M of the larger width, by which half of the lobe is sampled
     """
 
     c_phi: tuple[Scalar, ...]
     alpha: Pair
     rotation: Pair | None
     apart: Scalar
+    larger: OneWidth
 
     def at(self, w: Direction, ndf: str, masking: str) -> Scalar:
         """M at a direction above the surface."""
@@ -122,7 +155,7 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
         place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
         apart = minimum((1.0 - smaller / larger) / APART, 1.0)
-        anisotropic = TwoWidths(tuple(channels), alpha, surface.rotation, apart)
+        anisotropic = TwoWidths(tuple(channels), alpha, surface.rotation, apart, _one_width(surface, larger))
         true_mean = mean + apart * (maximum(of_both, 0.0) - mean)
     return Reflecting(
         c=tuple(c),
@@ -137,6 +170,13 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
         ndf=surface.ndf,
         masking=surface.masking,
     )
+
+
+def _one_width(surface: Microsurface, width: Scalar) -> OneWidth:
+    names = surface.ndf, surface.masking
+    *c, average = curves.coefficients(*names, width)
+    bend = knee(form_of(*names), surface.masking, width)
+    return OneWidth(tuple(c), bend, lobe.over_pi(maximum(average, 0.0)), inset(sqrt(width), curves.ROWS))
 
 
 def has_two_widths(base: BSDF) -> bool:

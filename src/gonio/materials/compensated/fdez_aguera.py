@@ -11,7 +11,8 @@ from ...energy.compensation.missing import missing_energy
 from ...energy.compensation.reflecting import Reflecting
 from ...energy.tables import split_sum
 from ...material import KnownViolation, method
-from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
+from ...ops import Direction, Mode, Scalar, Spectrum, abs, function, maximum, where
+from ...optics import warp
 from ...optics.fresnel.schlick import schlick_average
 from ...optics.roughness import widths
 from ._compensated import _Compensated, lobe_ratio
@@ -71,3 +72,13 @@ class FdezAguera(_Compensated):
         f0 = self.base.normal_reflectance()
         assert isinstance(lost, Reflecting) and f0 is not None, "checked on construction"
         return Derived(lost, f0, schlick_average(f0), lobe_ratio(f_add(lost, "bounce"), lost))
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """cos theta_i / pi, the density of a diffuse lobe."""
+        return warp.square_to_cosine_hemisphere_pdf(wi)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction with the density `_lobe_pdf`."""
+        return warp.square_to_cosine_hemisphere(u.y, u.z)
