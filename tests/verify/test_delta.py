@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gonio as go
 import pytest
@@ -59,6 +59,40 @@ class DimmerAtGrazing(go.Dielectric):
         s = super().sample(wo, u, mode)
         outside = ops.minimum(ops.abs(wo.z), ops.abs(s.wi.z))
         return s._replace(weight=s.weight * ops.where(wo.z * s.wi.z < 0.0, 0.7 + 0.3 * outside, 1.0))
+
+
+class BesideTheMirror(go.Mirror):
+    """Orders of a grating next to the mirror direction: one at -0.02, or two at -0.02 and 0.02."""
+
+    orders: ClassVar[int] = 1
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        first = (u.x < 0.5) | (self.orders == 1)
+        x = ops.where(first, -0.02, 0.02) - wo.x
+        z2 = 1.0 - x * x - wo.y * wo.y
+        valid = (wo.z > 0.0) & (z2 > 0.0)
+        pdf = ops.where(valid, 1.0 / self.orders, 0.0)
+        wi = ops.vec3(x, -wo.y, ops.sqrt(ops.maximum(z2, 0.0)))
+        s = super().sample(wo, u, mode)
+        return s._replace(
+            wi=ops.where(valid, wi, s.wi), pdf=pdf, delta=valid, weight=s.weight * ops.where(valid, 1.0, 0.0)
+        )
+
+    @property
+    def isotropic(self) -> bool:
+        return False
+
+
+class TwoOrders(BesideTheMirror):
+    orders = 2
+
+
+@pytest.mark.parametrize(("kind", "failed"), [(BesideTheMirror, True), (TwoOrders, False)])
+def test_lobes_on_both_sides_of_the_mirror_direction_are_a_grating(kind: type[go.BSDF], failed: bool) -> None:
+    for seed in (1, 2):
+        verdict = verify(kind(), quick=True, law="delta", seed=seed)["delta"]
+        assert verdict.failed == failed, verdict.why
+        assert failed == ("next to the mirror direction" in " ".join(verdict.why))
 
 
 def test_light_that_is_lost_on_the_way_is_lost_by_beers_law() -> None:

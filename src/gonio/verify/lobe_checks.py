@@ -113,14 +113,22 @@ def direction(probe: Probe) -> Misses:
         if straight.any():
             yield from _unstated_index(o, i, straight)
         mirror = o * [-1.0, -1.0, 1.0]
-        # a grating has orders next to the mirror direction, and one exactly along it
-        _, exact = lobes.along(lobes.rows_of(probe.radiance, rows), mirror)
+        # a grating has orders next to the mirror direction, with one exactly along it or in pairs on both sides of it
+        _, exact = lobes.along(there := lobes.rows_of(probe.radiance, rows), mirror)
+        _, paired = lobes.along(there, _opposite_order(o, i))
         # not near the normal, where the mirror direction and the way back to wo coincide
         oblique = ~through & (np.hypot(o[:, 0], o[:, 1]) > 0.2)
-        close = oblique & ~exact & (np.abs(i - mirror).max(1) < 0.1)
+        close = oblique & ~exact & ~paired & (np.abs(i - mirror)[:, :2].max(1) < 0.1)
         if close.sum() < CLOSE * oblique.sum():
             continue  # the lobe only crosses the mirror direction at some views
         yield _miss(np.abs(i - mirror).max(1) * close, "a lobe next to the mirror direction", o, i)
+
+
+def _opposite_order(o: np.ndarray, i: np.ndarray) -> np.ndarray:
+    """For each order i of a grating, the direction of the order -i: their tangential components sum to -2 o."""
+    tangential = -2.0 * o[:, :2] - i[:, :2]
+    squared = 1.0 - np.sum(tangential**2, axis=1)
+    return np.column_stack([tangential, np.sign(i[:, 2]) * np.sqrt(np.maximum(squared, 0.0))])
 
 
 def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray) -> Miss:
