@@ -25,8 +25,7 @@ from .base import Law, pairs, where_found
 GAIN = 1e-3
 FINER = 100.0  # how many times as accurate an integral is when it is repeated
 STATED = "the albedo that is stated"
-FURNACE = "white furnace"
-LOST = f"{FURNACE} loses"
+LOST = "white furnace loses"
 COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo at which the parameters behind a loss are sought
 MOST_ALONE = 6  # parameters that are made lossless one at a time
 ELSEWHERE = 88.0  # degrees of the most oblique view at other parameter values
@@ -64,6 +63,8 @@ class Energy(Law):
         theta = directions.angles(wo)[:, 0]
         finding.worst = f"wo at {theta[row]:.4g} degrees, channel {channel}: albedo {value[row, channel]:.5f}"
         finding.shown = f"albedo {value.min():.4f} to {value.max():.4f}"
+        if finding.figure > GAIN:
+            finding.shown = f"gain {finding.figure:.4f}"
         for i in range(0 if guided else len(wo)):
             p = _agreement(value[i], error[i], mean[i], noise[i], heavy[i])
 
@@ -87,9 +88,6 @@ class Energy(Law):
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
             self._one_at_a_time(subject, wo, effort, seed, finding)
-        if finding.figure > GAIN:
-            of_variant = finding.worst.startswith(FURNACE)
-            finding.shown = f"gain {finding.figure:.4f}" + (" of the lossless variant" if of_variant else "")
         finding.evidence = curves
         return finding
 
@@ -204,7 +202,9 @@ class Energy(Law):
         theta = directions.angles(wo)[:, 0]
         if gain > finding.figure:
             finding.figure = gain
-            finding.worst = f"{FURNACE}, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
+            if gain > GAIN:
+                finding.shown = f"gain {gain:.4f} of the lossless variant"
+            finding.worst = f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
         lost = np.round(1.0 - value.mean(1), 6) + 0.0  # not -0
         above = wo[:, 2] > 0.0
         order = np.argsort(wo[above, 2])
@@ -245,6 +245,7 @@ class Energy(Law):
             gain = float((albedo - error).max() - 1.0)
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}
+                finding.shown = f"gain {gain:.4f}"
                 finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
 
 
