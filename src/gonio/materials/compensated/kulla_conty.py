@@ -102,12 +102,13 @@ class KullaConty(_Compensated):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "a measured base is sampled anew for each value, and samples that switch lobes change E by 1e-4",
+            "the albedo of a base without tables is estimated again for each value, by samples whose choice of a lobe may "
+            "change E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "a measured base is sampled anew in each precision",
+            "the albedo of a base without tables is estimated separately in each precision",
             lambda model: 0.01 if model.needs_uniform else 0.0,
             certain=False,
         ),
