@@ -5,10 +5,10 @@ The profile of a parameter at x is the smallest sum of squares of all fits in wh
 
     t^2 s
 
-above the minimum, where t is the quantile of Student's distribution, J is the Jacobian of the residuals, V is the covariance of the
-parameters and s = V_kk / (J^T J)^-1_kk for parameter k. s is the variance of correlated residuals of unequal size,
-relative to that of independent ones of size 1: for a parabola, the ends are value +- t sqrt(V_kk), those of the
-standard error. Profiles that are not parabolas arise from an index of refraction of
+above the minimum, where t is the quantile of Student's distribution, J is the Jacobian of the residuals, V is the
+covariance of the parameters and s = V_kk / (J^T J)^-1_kk for parameter k. s is the variance of correlated residuals of
+unequal size, relative to that of independent ones of size 1: for a parabola, the ends are value +- t sqrt(V_kk), those
+of the standard error. Profiles that are not parabolas arise from an index of refraction of
 1, where the reflectance has no slope, so that J^T J does not constrain it; from a value at a bound of its range; and
 from a width that the data bound from one side only.
 """

@@ -83,17 +83,22 @@ def remainder(x: Value, y: Value) -> Value:
     return subtract(x, multiply(y, truncated(divide(x, y))))
 
 
+def _differ(a: Value, b: Value) -> Value:
+    """a != b, which holds for NaN, but is false for it in Dr.Jit's LLVM backend."""
+    return negated(a == b)
+
+
 FLOATS: dict[str, Callable[..., Value]] = {
     "FNegate": negate, "FAdd": add, "FSub": subtract, "FMul": multiply, "FDiv": divide, "FMod": floor_modulo,
     "FRem": remainder,
     "VectorTimesScalar": multiply, "MatrixTimesScalar": multiply,
     "FOrdEqual": _compare(operator.eq), "FUnordEqual": _compare(operator.eq),
-    "FOrdNotEqual": _compare(operator.ne), "FUnordNotEqual": _compare(operator.ne),
+    "FOrdNotEqual": _compare(_differ), "FUnordNotEqual": _compare(_differ),
     "FOrdLess": _compare(operator.lt), "FUnordLess": _compare(operator.lt),
     "FOrdGreater": _compare(operator.gt), "FUnordGreater": _compare(operator.gt),
     "FOrdLessEqual": _compare(operator.le), "FUnordLessEqual": _compare(operator.le),
     "FOrdGreaterEqual": _compare(operator.ge), "FUnordGreaterEqual": _compare(operator.ge),
-    "IsNan": _compare(operator.ne), "IsInf": lambda x: is_infinite(numeric(x)),
+    "IsNan": lambda x: is_nan(numeric(x)), "IsInf": lambda x: is_infinite(numeric(x)),
     "ConvertIToF": numeric,
 }  # fmt: skip
 
@@ -102,7 +107,14 @@ def is_infinite(x: Value) -> Value:
     """Whether a float is infinite; NaN is not."""
     if static(x):
         return bool(np.isinf(x))
-    return both(negated(ops.isfinite(x)), x == x)
+    return both(negated(ops.isfinite(x)), negated(is_nan(x)))
+
+
+def is_nan(x: Value) -> Value:
+    """Whether a float is NaN: every comparison with NaN is false."""
+    if static(x):
+        return bool(np.isnan(x))
+    return negated(either(x <= 0.0, x > 0.0))
 
 
 # --------------------------------------------------------------------------- integers
@@ -147,6 +159,22 @@ def _bitwise(plain: Callable[..., int], on_bits: Callable[..., Value]) -> Callab
     return lambda a, b: on_bits(a, b) if isinstance(a, Bits) or isinstance(b, Bits) else integers(a, b)
 
 
+def _reversed(a: int) -> int:
+    return int(f"{a & 0xFFFFFFFF:032b}"[::-1], 2)
+
+
+def _field(base: int, offset: int, count: int, signed: bool) -> int:
+    """`count` bits of an integer from bit `offset` on."""
+    bits = (base >> offset) & ((1 << count) - 1)
+    return bits - (1 << count) if signed and count and bits >> (count - 1) else bits
+
+
+def _with_field(base: int, insert: int, offset: int, count: int) -> int:
+    """An integer whose `count` bits from bit `offset` on are the low bits of `insert`."""
+    mask = ((1 << count) - 1) << offset
+    return (base & ~mask) | ((insert << offset) & mask)
+
+
 _shift_left = _integer(lambda a, b: _shift(a, b, True), None)
 _shift_right = _integer(lambda a, b: _shift(a, b, False), None)
 INTEGERS: dict[str, Callable[..., Value]] = {
@@ -168,6 +196,11 @@ INTEGERS: dict[str, Callable[..., Value]] = {
     "BitwiseXor": _bitwise(operator.xor, flipped),
     "BitwiseAnd": _bitwise(operator.and_, masked),
     "Not": _integer(operator.invert, None),
+    "BitReverse": _integer(_reversed, None),
+    "BitCount": _integer(lambda a: (a & 0xFFFFFFFF).bit_count(), None),
+    "BitFieldInsert": _integer(_with_field, None),
+    "BitFieldSExtract": _integer(lambda a, offset, count: _field(a, offset, count, True), None),
+    "BitFieldUExtract": _integer(lambda a, offset, count: _field(a & 0xFFFFFFFF, offset, count, False), None),
     "ConvertFToI": to_integer,
 }
 COMPARED: dict[str, Callable[..., Value]] = {

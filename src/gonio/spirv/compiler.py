@@ -11,6 +11,7 @@ import importlib.util
 import os
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,7 @@ from .guards import Context, context, guarded, is_guarded
 from .literals import shader_in
 from .messages import ended, explained
 from .module import SOURCE
+from .opcodes import NAMES
 
 SECONDS = 10  # of CPU time, for the compiler
 PATIENCE = 20  # seconds of wall-clock time
@@ -103,10 +105,49 @@ def compile_text(
         entry = "\n#undef main\nvoid main() {}\n"
         head = f"#version 450\n#extension GL_GOOGLE_cpp_style_line_directive : enable\n{head}{old}"
     else:
-        if re.search(r"\bselect\s*\(", expanded) and not re.search(r"\w\s+select\s*\([^;]*?\)\s*\{", expanded):
-            head += "#define select(mask, a, b) ((mask) ? (a) : (b))\n"  # from HLSL 2021; glslang lacks it
+        head += _hlsl_head(expanded, sources)
         entry = f"\nfloat4 gonio_entry() : SV_Target {{ {_calls(expanded)} return 0; }}\n"
-    return _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
+    code = _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
+    if language == "hlsl" and _has(code, "MatrixTimesMatrix") and not re.search(r"\bmul\s*\(", expanded):
+        hint = "write mul(a, b) for the product of matrices, or multiply their rows: a[0] * b[0]"
+        raise InputError("a * b of two matrices, of which glslang makes mul(a, b)", name, hint)
+    return code
+
+
+# functions that glslang lacks (`select`, of HLSL 2021) or compiles to others: fmod to GLSL's mod, lit to h m
+_HLSL = {
+    "select": "(mask, a, b) ((mask) ? (a) : (b))",
+    "fmod": "(x, y) ((x) - (y) * trunc((x) / (y)))",
+    "lit": "(l, h, m) float4(1.0, max(l, 0.0), (l) < 0.0 || (h) < 0.0 ? 0.0 : pow(h, m), 1.0)",
+}
+_ENTRIES = re.compile(r"\.(?:(?:_m[0-3]{2}){2,4}|(?:_[1-4]{2}){2,4})\b")
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_LINE = re.compile(r'^#line (\d+) "?([^"\n]*)"?$', re.MULTILINE)
+
+
+def _hlsl_head(text: str, sources: _Sources) -> str:
+    """Definitions before an HLSL text. Raises InputError for an expression of which glslang makes another one."""
+    plain = _COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+    if match := _ENTRIES.search(plain):
+        number, first, start = "", 1, 0
+        for line in _LINE.finditer(plain, 0, match.start()):
+            number, first, start = line[2], int(line[1]), line.end() + 1
+        where = _place(sources, sources.names[0], number, str(first + plain.count("\n", start, match.start())))
+        what = f"several entries of a matrix at once ({match[0][1:]}), which glslang compiles to others"
+        raise InputError(what, where, "write one after the other: float3(m[0][0], m[1][1], m[2][2])")
+    used = (one for one in _HLSL if re.search(rf"\b{one}\s*\(", plain))
+    own = (one for one in used if not re.search(rf"\w\s+{one}\s*\([^;]*?\)\s*\{{", plain))
+    return "".join(f"#define {one}{_HLSL[one]}\n" for one in own)
+
+
+def _has(code: bytes, instruction: str) -> bool:
+    """Whether SPIR-V has an instruction of this name."""
+    words, place = struct.unpack(f"<{len(code) // 4}I", code), 5  # after the header
+    while place < len(words) and words[place] >> 16:
+        if NAMES.get(words[place] & 0xFFFF) == instruction:
+            return True
+        place += words[place] >> 16
+    return False
 
 
 _MODIFIERS = r"^[ \t]*(?:(?:static|inline|precise|public|internal|private|export|\[\w+\])\s+)*"
@@ -126,7 +167,7 @@ def _calls(text: str) -> str:
 def _uses(text: str) -> list[tuple[str, str, str]]:
     """(type of the result, declarations of arguments, call) of every function of an HLSL or Slang text."""
     calls = []
-    plain = _FUNC.sub(_c_style, re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL))
+    plain = _FUNC.sub(_c_style, _COMMENT.sub(" ", text))
     for kind, name, arguments in _DEFINITION.findall(_without_members(_GENERIC.sub(" ", plain))):
         declared = [re.split("[:=]", part)[0].split() for part in arguments.split(",") if part.strip()]
         types = [words[-2] for words in declared if len(words) > 1]
@@ -286,7 +327,8 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
         source.write_text(text, encoding="utf-8")
         target = "-G" if language == "glsl" else "-V"  # HLSL has no form for OpenGL
         options = [target, "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
-        options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
+        # Direct3D: of a number and NaN, min, max, clamp and saturate return the number
+        options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets", "--nan-clamp"] if language == "hlsl" else []
         command = slang.command(source, output) if language == "slang" else [compiler(), *options, str(source)]
         try:
             done = subprocess.run(

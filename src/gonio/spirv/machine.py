@@ -21,7 +21,7 @@ from .inputs import initial
 from .messages import ALONE
 from .module import BUFFERS, UNIFORM, Block, Function, Instruction, Module
 from .opcodes import REFUSED
-from .standard import ELEMENTWISE, GEOMETRIC, WHOLE_NUMBERS
+from .standard import ELEMENTWISE, GEOMETRIC, MODF, REFUSED_FUNCTIONS, WHOLE_NUMBERS, parts
 from .values import (
     UNDEFINED,
     Undefined,
@@ -169,7 +169,12 @@ class Machine:
                     if self._leave(frame, block, one, mask):
                         return
                 elif one.name == "Store":
-                    self._store(frame, block.label, one, mask)
+                    target, value = (self._get(frame, id) for id in one.operands[:2])
+                    self._store(frame, block.label, target, value, mask)
+                elif one.name == "ExtInst" and one.operands[1] == MODF:
+                    fraction, whole = parts(self._get(frame, one.operands[2]))
+                    self._store(frame, block.label, self._get(frame, one.operands[3]), whole, mask)
+                    self._keep(frame, one.result, fraction, mask)
                 elif one.name == "FunctionCall":
                     self._keep(frame, one.result, self._called(frame, one, mask), mask)
                 elif one.name not in ("Phi", "SelectionMerge"):
@@ -269,8 +274,7 @@ class Machine:
                 return known[id]
         raise KeyError(f"id {id} has no value")
 
-    def _store(self, frame: Frame, label: int, one: Instruction, mask: Value) -> None:
-        target, value = self._get(frame, one.operands[0]), self._get(frame, one.operands[1])
+    def _store(self, frame: Frame, label: int, target: Value, value: Value, mask: Value) -> None:
         if not isinstance(target, Pointer):
             raise TypeError("a store to no pointer")
         if id(target.cell) in self._read_only:
@@ -389,7 +393,8 @@ class Machine:
             return GEOMETRIC[number](*values)
         if number in ELEMENTWISE or number in WHOLE_NUMBERS:
             return elementwise(passing(ELEMENTWISE.get(number) or WHOLE_NUMBERS[number]), *values)
-        raise refuse(f"the function {number} of SPIR-V's GLSL.std.450 (packing or bits)", "compute with floats")
+        what = REFUSED_FUNCTIONS.get(number, f"the function {number} of SPIR-V's GLSL.std.450")
+        raise refuse(f"{what} is not supported", "compute with floats")
 
 
 _DAMAGE = (IndexError, KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError,

@@ -26,7 +26,8 @@ NAMES = {
     180: "FOrdEqual", 181: "FUnordEqual", 182: "FOrdNotEqual", 183: "FUnordNotEqual", 184: "FOrdLess",
     185: "FUnordLess", 186: "FOrdGreater", 187: "FUnordGreater", 188: "FOrdLessEqual", 189: "FUnordLessEqual",
     190: "FOrdGreaterEqual", 191: "FUnordGreaterEqual", 194: "ShiftRightLogical", 195: "ShiftRightArithmetic",
-    196: "ShiftLeft", 197: "BitwiseOr", 198: "BitwiseXor", 199: "BitwiseAnd", 200: "Not", 245: "Phi",
+    196: "ShiftLeft", 197: "BitwiseOr", 198: "BitwiseXor", 199: "BitwiseAnd", 200: "Not", 201: "BitFieldInsert",
+    202: "BitFieldSExtract", 203: "BitFieldUExtract", 204: "BitReverse", 205: "BitCount", 245: "Phi",
     246: "LoopMerge", 247: "SelectionMerge", 248: "Label", 249: "Branch", 250: "BranchConditional", 251: "Switch",
     252: "Kill", 253: "Return", 254: "ReturnValue", 255: "Unreachable", 400: "CopyObject",
 }  # fmt: skip

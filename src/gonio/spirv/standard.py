@@ -17,6 +17,7 @@ from .arithmetic import (
     dot,
     elementwise,
     floor,
+    is_nan,
     maximum,
     minimum,
     multiply,
@@ -26,6 +27,8 @@ from .arithmetic import (
     truncated,
 )
 from .values import Value, folded, numeric, select, static, where
+
+LOG2 = math.log(2.0)
 
 
 def _function(plain: Callable[..., object], on_values: Callable[..., Value]) -> Callable[..., Value]:
@@ -120,6 +123,15 @@ def clamp(x: Value, low: Value, high: Value) -> Value:
     return minimum(maximum(x, low), high)
 
 
+def _number(choose: Callable[..., Value], a: Value, b: Value) -> Value:
+    """The smaller or the larger of two values, and the other one if one is NaN, as Direct3D requires."""
+    value = choose(a, b)
+    for one, other in ((a, b), (b, a)):
+        if not static(one):
+            value = select(is_nan(numeric(one)), other, value)
+    return value
+
+
 def mix(a: Value, b: Value, t: Value) -> Value:
     """a (1 - t) + b t."""
     return add(multiply(a, subtract(1.0, t)), multiply(b, t))
@@ -134,6 +146,17 @@ def smoothstep(low: Value, high: Value, x: Value) -> Value:
     """3 t^2 - 2 t^3, with t from 0 at `low` to 1 at `high`."""
     t = clamp(divide(subtract(x, low), subtract(high, low)), 0.0, 1.0)
     return multiply(multiply(t, t), subtract(3.0, multiply(2.0, t)))
+
+
+def scaled(x: Value, exponent: Value) -> Value:
+    """x 2^exponent."""
+    return multiply(x, 2.0 ** int(exponent) if static(exponent) else exp(multiply(exponent, LOG2)))
+
+
+def parts(x: Value) -> tuple[Value, Value]:
+    """Fraction and whole part of x, both with its sign."""
+    whole = elementwise(truncated, x)
+    return elementwise(subtract, x, whole), whole
 
 
 def length(v: Value) -> Value:
@@ -199,7 +222,6 @@ def inverse(m: tuple[Value, ...]) -> Value:
     return transpose(tuple(tuple(cofactor(c, r) for r in places) for c in places))
 
 
-LOG2 = math.log(2.0)
 # functions of scalars, applied component by component, by number
 ELEMENTWISE: dict[int, Callable[..., Value]] = {
     1: round_even, 2: round_even, 3: truncated, 4: absolute, 6: sign, 8: floor, 9: lambda x: negate(floor(negate(x))),
@@ -212,7 +234,8 @@ ELEMENTWISE: dict[int, Callable[..., Value]] = {
     24: _function(np.arctanh, lambda x: 0.5 * ops.log((1.0 + x) / (1.0 - x))), 25: atan2, 26: power, 27: exp, 28: log,
     29: lambda x: exp(multiply(x, LOG2)), 30: lambda x: multiply(log(x), 1.0 / LOG2), 31: sqrt,
     32: lambda x: divide(1.0, sqrt(x)), 37: minimum, 40: maximum, 43: clamp, 46: mix, 48: step, 49: smoothstep,
-    50: lambda a, b, c: add(multiply(a, b), c), 79: minimum, 80: maximum, 81: clamp,
+    50: lambda a, b, c: add(multiply(a, b), c), 53: scaled, 79: lambda a, b: _number(minimum, a, b),
+    80: lambda a, b: _number(maximum, a, b), 81: lambda x, low, high: _number(minimum, _number(maximum, x, low), high),
 }  # fmt: skip
 # functions of integers
 WHOLE_NUMBERS: dict[int, Callable[..., Value]] = {
@@ -221,5 +244,12 @@ WHOLE_NUMBERS: dict[int, Callable[..., Value]] = {
 # functions of vectors and matrices
 GEOMETRIC: dict[int, Callable[..., Value]] = {
     33: determinant, 34: inverse, 66: length, 67: lambda a, b: length(elementwise(subtract, a, b)), 68: cross,
-    69: normalize, 70: face_forward, 71: reflect, 72: refract,
+    36: parts, 69: normalize, 70: face_forward, 71: reflect, 72: refract,
 }  # fmt: skip
+MODF = 35  # its second argument is a pointer, to which the machine writes the whole part
+REFUSED_FUNCTIONS = {
+    **dict.fromkeys((51, 52), "frexp"),
+    **dict.fromkeys(range(54, 66), "packing of numbers into bits, or unpacking"),
+    **dict.fromkeys(range(73, 76), "a search for the lowest or highest bit (findLSB, findMSB)"),
+    **dict.fromkeys(range(76, 79), "interpolation of a fragment's input"),
+}

@@ -102,8 +102,8 @@ class KullaConty(_Compensated):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "the albedo of a base without tables is estimated again for each value, by samples whose choice of a lobe may "
-            "change E by 1e-4",
+            "the albedo of a base without tables is estimated again for each value, by samples whose choice of a lobe "
+            "may change E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),

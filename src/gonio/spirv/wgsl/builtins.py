@@ -25,8 +25,8 @@ _GEOMETRIC = {
 _DERIVATIVES = {f"{kind}{end}" for kind in ("dpdx", "dpdy", "fwidth") for end in ("", "Coarse", "Fine")}
 _MIPS = {"textureSample": 3, "textureSampleLevel": 4, "textureSampleBias": 4, "textureSampleGrad": 5}
 _BITS = {
-    "countLeadingZeros", "countOneBits", "countTrailingZeros", "extractBits", "firstLeadingBit", "firstTrailingBit",
-    "frexp", "insertBits", "reverseBits", "dot4U8Packed", "dot4I8Packed", "quantizeToF16",
+    "countLeadingZeros", "countTrailingZeros", "firstLeadingBit", "firstTrailingBit", "frexp", "dot4U8Packed",
+    "dot4I8Packed", "quantizeToF16",
 }  # fmt: skip
 
 
@@ -153,8 +153,7 @@ def _determinant(emitter: Emitter, values: list[Value]) -> Value:
 
 def _ldexp(emitter: Emitter, values: list[Value]) -> Value:
     number = emitter.together(values[:1], "ldexp", floats=True)[0]
-    power = emitter.standard(29, number.type, emitter.cast(values[1], number.type.scalar).id)
-    return emitter.emit("FMul", number.type, number.id, power.id)
+    return emitter.standard(53, number.type, number.id, values[1].id)
 
 
 def _modf(emitter: Emitter, values: list[Value]) -> Value:
@@ -164,6 +163,20 @@ def _modf(emitter: Emitter, values: list[Value]) -> Value:
     type = Type("struct", name=f"modf of {number.type}")
     emitter.structs[type.name] = ("fract", "whole"), (number.type, number.type)
     return emitter.emit("CompositeConstruct", type, fraction.id, truncated.id)
+
+
+def _bits(name: str) -> Callable[[Emitter, list[Value]], Value]:
+    """An operation on the bits of the first value, whose type the result has; the others are offset and count, or the
+    inserted bits before them."""
+
+    def made(emitter: Emitter, values: list[Value]) -> Value:
+        value = emitter.with_concrete_type(values[0])
+        if value.type.scalar not in (INT, UINT):
+            raise emitter.error(f"bits of {value.type}", "use integers")
+        signed = {"BitFieldExtract": "BitFieldSExtract" if value.type.scalar == INT else "BitFieldUExtract"}
+        return emitter.emit(signed.get(name, name), value.type, value.id, *[one.id for one in values[1:]])
+
+    return made
 
 
 def bitcast(emitter: Emitter, type: Type, value: Value) -> Value:
@@ -196,5 +209,6 @@ def _texture(emitter: Emitter, name: str, values: list[Value]) -> Value:
 _OTHERS: dict[str, tuple[int, Callable[[Emitter, list[Value]], Value]]] = {
     "dot": (2, _dot), "select": (3, _select), "any": (1, _reduced("Any")), "all": (1, _reduced("All")),
     "saturate": (1, _saturate), "transpose": (1, _transpose), "determinant": (1, _determinant), "ldexp": (2, _ldexp),
-    "modf": (1, _modf),
+    "modf": (1, _modf), "reverseBits": (1, _bits("BitReverse")), "countOneBits": (1, _bits("BitCount")),
+    "extractBits": (3, _bits("BitFieldExtract")), "insertBits": (4, _bits("BitFieldInsert")),
 }  # fmt: skip

@@ -48,6 +48,11 @@ class Body(Expressions):
         self.scopes.append(scope)
         try:
             self.run(function.body)
+            if self.signature.result != VOID and _completes(function.body):
+                emitter.line = function.line
+                raise emitter.error(
+                    f"the function '{function.name}' may end without a value", "return one on each path"
+                )
             emitter.do("Return" if self.signature.result == VOID else "Unreachable")
             made.blocks[entry].instructions[:0] = emitter.variables
         finally:
@@ -222,3 +227,27 @@ class Body(Expressions):
             emitter.do("Branch", end)
         self.targets.pop()
         emitter.start(end)
+
+
+def _completes(node: Statement) -> bool:
+    """Whether the end of a statement can be reached, whatever its conditions are."""
+    if isinstance(node, Block):
+        return all(map(_completes, node.statements))
+    if isinstance(node, If):
+        return all(condition is not None for condition, _ in node.clauses) or any(
+            _completes(block) for _, block in node.clauses
+        )
+    if isinstance(node, Loop):
+        return node.condition is not None or node.until is not None or _breaks(node.body)
+    if isinstance(node, Switch):
+        return any(_completes(block) or _breaks(block) for _, block in node.cases)  # one of them is `default`
+    return not isinstance(node, Return | Jump)
+
+
+def _breaks(node: Statement) -> bool:
+    """Whether a statement contains a `break` out of the loop or switch around it."""
+    if isinstance(node, Block):
+        return any(map(_breaks, node.statements))
+    if isinstance(node, If):
+        return any(_breaks(block) for _, block in node.clauses)
+    return isinstance(node, Jump) and node.kind == "break"
