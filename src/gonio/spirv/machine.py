@@ -172,8 +172,8 @@ class Machine:
                     target, value = (self._get(frame, id) for id in one.operands[:2])
                     self._store(frame, block.label, target, value, mask)
                 elif one.name == "ExtInst" and one.operands[1] == MODF:
-                    fraction, whole = parts(self._get(frame, one.operands[2]))
-                    self._store(frame, block.label, self._get(frame, one.operands[3]), whole, mask)
+                    fraction, integral = parts(self._get(frame, one.operands[2]))
+                    self._store(frame, block.label, self._get(frame, one.operands[3]), integral, mask)
                     self._keep(frame, one.result, fraction, mask)
                 elif one.name == "FunctionCall":
                     self._keep(frame, one.result, self._called(frame, one, mask), mask)

@@ -154,9 +154,9 @@ def scaled(x: Value, exponent: Value) -> Value:
 
 
 def parts(x: Value) -> tuple[Value, Value]:
-    """Fraction and whole part of x, both with its sign."""
-    whole = elementwise(truncated, x)
-    return elementwise(subtract, x, whole), whole
+    """Fractional and integral part of x, both with its sign."""
+    integral = elementwise(truncated, x)
+    return elementwise(subtract, x, integral), integral
 
 
 def length(v: Value) -> Value:
@@ -246,7 +246,7 @@ GEOMETRIC: dict[int, Callable[..., Value]] = {
     33: determinant, 34: inverse, 66: length, 67: lambda a, b: length(elementwise(subtract, a, b)), 68: cross,
     36: parts, 69: normalize, 70: face_forward, 71: reflect, 72: refract,
 }  # fmt: skip
-MODF = 35  # its second argument is a pointer, to which the machine writes the whole part
+MODF = 35  # its second argument is a pointer, to which the machine writes the integral part
 REFUSED_FUNCTIONS = {
     **dict.fromkeys((51, 52), "frexp"),
     **dict.fromkeys(range(54, 66), "packing of numbers into bits, or unpacking"),
