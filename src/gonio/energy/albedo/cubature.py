@@ -22,6 +22,7 @@ ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees, a lobe of width 2e-4 is that narrow
+SETTLED = 2  # rounds after which the integrals are known well enough to be the scale of their errors
 SEEDED = 17  # halvings around samples
 SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more if the smaller number leaves light unseen
 CROWD = 1 / 32  # fraction of the samples in a cell above which it is divided before the integrand is evaluated
@@ -105,13 +106,14 @@ def integrate(
 
     sample     the `sample` method of the model, which shows where its lobes are
     integrand  function of float64 Dr.Jit vectors wo and wi that returns one value per channel; it runs inside a kernel
-    tolerance  absolute error per integral; if cells or samples run out, the reported error is larger
+    tolerance  absolute error of an integral up to 1, relative error of a larger one; if cells or samples run out, the
+               reported error is larger
     seed       seed of the samples
     """
     per, *more = SAMPLES
     value, error, unseen = _integrate(sample, integrand, wo, tolerance, seed, per)
     for per in more:
-        dark = unseen > tolerance
+        dark = unseen > tolerance * np.maximum(np.abs(value).max(1), 1.0)
         if not dark.any():
             break
         value[dark], error[dark], unseen[dark] = _integrate(sample, integrand, wo[dark], tolerance, seed, per)
@@ -136,8 +138,9 @@ def _integrate(
     channels = coarse.shape[1]
     unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # shown by a single sample
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
-    allowed = tolerance / 400.0  # some hundreds of cells contribute to an integral's error
+    scale = np.ones(len(wo))  # of the tolerance: a gain of a thousand need not be known to 1e-5
     for depth in range(DEPTH):
+        allowed = (tolerance / 400.0 * scale)[cells.row]  # some hundreds of cells contribute to an integral's error
         fine_cells = cells.quarters(way)
         (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = inner.integral.reshape(-1, 4, channels)
@@ -146,7 +149,7 @@ def _integrate(
         signed = np.stack([coarse, other.integral.reshape(-1, 4, channels).sum(1)]) - fine.sum(1)
         difference = np.abs(signed).max(0)
         difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps partly cancel
-        small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance
+        small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance * scale
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells.area, 4.0 * inner.most.reshape(-1, 4).max(1))
         single = points.single(len(missed))
@@ -156,6 +159,10 @@ def _integrate(
         shown = by_samples & single
         difference += missed[:, None]
         divide |= missed > allowed
+        if depth >= SETTLED:
+            left = np.zeros_like(value)
+            np.add.at(left, cells.row, fine.sum(1))
+            scale = np.maximum(np.abs(value + left).max(1), 1.0)
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide

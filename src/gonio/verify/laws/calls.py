@@ -212,8 +212,8 @@ def _unlike(
             keep &= lit
         largest = float(np.max(np.abs(a[keep]), initial=0.0))
         size = np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * largest)
-        difference = np.where(keep[:, None], np.abs(a - b), 0.0)
-        off = difference / np.maximum(size, DARK)
+        difference = np.where(keep[:, None], np.abs(a - b), 0.0)  # positivity reports what is not finite at first
+        off = difference / np.where(keep[:, None], np.maximum(size, DARK), 1.0)
         off = np.where(np.isnan(off), np.inf, off).max(1)
         # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in a few rows
         wrong = off > same

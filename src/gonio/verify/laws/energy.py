@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
+from ... import ops
 from ...energy.albedo import cubature
 from ...errors import InputError
 from ...material import BSDF, tree
-from ...ops import Mode, backend
+from ...ops import Direction, Mode, Scalar, backend
 from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
@@ -23,6 +25,7 @@ from ..verdict import Finding, Trial
 from .base import Law, pairs, where_found
 
 GAIN = 1e-3
+PROBES = 4096  # pairs of directions at which eval is tested before it is integrated
 FINER = 100.0  # how many times as accurate an integral is when it is repeated
 STATED = "the albedo that is stated"
 LOST = "white furnace loses"
@@ -52,7 +55,7 @@ class Energy(Law):
         finding = Finding(
             figure=0.0, tolerance=GAIN, reason="a quarter of an 8-bit step; the integrals are ten times more accurate"
         )
-        value, error = _quadrature(subject, wo, effort, seed)
+        value, error, defined = _light(subject, wo, effort, seed)
         guided = subject.drawn_by is not None  # its own guide is computed at the given values only
         mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed) if not guided else [value] * 3
         curves = AlbedoCurves(wo, value, error, mean, noise)
@@ -88,6 +91,10 @@ class Energy(Law):
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
             self._one_at_a_time(subject, wo, effort, seed, finding)
+        if not defined:
+            finding.notes.append("where eval is not finite, it counts as 0")
+            if finding.figure <= GAIN:
+                finding.figure, finding.shown = np.nan, "eval is not finite"
         finding.evidence = curves
         return finding
 
@@ -314,15 +321,44 @@ def _views(subject: Subject, effort: Effort) -> np.ndarray:
     return directions.single(np.concatenate(wo))
 
 
-def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """int eval dwi for power plus the light of the delta lobes, and the error of this sum, (N, channels) each."""
+class Light(NamedTuple):
+    """Reflected and transmitted light.
+
+    value    int eval dwi for power plus the light of the delta lobes, (N, channels); 0 where eval is not finite
+    error    the error of this sum, (N, channels)
+    defined  whether eval is finite everywhere
+    """
+
+    value: np.ndarray
+    error: np.ndarray
+    defined: bool
+
+
+def _light(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> Light:
     ideal = _deltas(subject, wo, seed, effort.full)
     if not subject.has_density:
-        return ideal, np.full_like(ideal, 1e-6)
+        return Light(ideal, np.full_like(ideal, 1e-6), True)
     if subject.stochastic:
-        return _randomly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(subject.sampler.sample, subject.power(), wo, effort.accuracy, seed)
-    return integral.value + ideal, integral.error + effort.accuracy
+        return Light(*_randomly(subject, wo, effort.furnace_samples, seed), True)
+    sample, power = subject.sampler.sample, subject.power()
+    if "defined" not in subject.memo:
+        subject.memo["defined"] = bool(np.isfinite(subject.eval(*pairs(subject, PROBES, seed))).all())
+    defined = subject.memo["defined"]
+    if defined:
+        integral = cubature.integrate(sample, power, wo, effort.accuracy, seed)
+        defined = bool(np.isfinite(integral.value).all())
+    if not defined:  # one value that is not finite would hide a gain elsewhere
+
+        def finite(wo: Direction, wi: Direction) -> list[Scalar]:
+            return [ops.where(ops.isfinite(channel), channel, 0.0) for channel in power(wo, wi)]
+
+        integral = cubature.integrate(sample, finite, wo, effort.accuracy, seed)
+    return Light(integral.value + ideal, integral.error + effort.accuracy, defined)
+
+
+def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Value and error of `Light`."""
+    return _light(subject, wo, effort, seed)[:2]
 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
@@ -372,7 +408,10 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
         many = single.vec3(*[dr.gather(single.float, backend.float_of(column, single), which) for column in part.T])
         u = histogram.random_numbers(single, index, seed + 8191 * start)
         s = guarded(subject.model, "sample", lambda many=many, u=u: model.sample(many, u, mode))
-        weight = exact.vec3(dr.select(s[2] > 0.0, single.vec3(s[1]), 0.0)) + dr.zeros(exact.float, len(part) * count)
+        weight = single.vec3(s[1])
+        weight = exact.vec3(dr.select((s[2] > 0.0) & ~dr.isnan(weight), weight, 0.0)) + dr.zeros(
+            exact.float, len(part) * count
+        )
         dr.eval(weight)  # all channels together: each reduction would draw the samples again
         sums = [dr.block_sum(channel, count) for channel in weight]
         squares = [dr.block_sum(dr.square(channel), count) for channel in weight]
