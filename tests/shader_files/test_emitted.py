@@ -158,3 +158,30 @@ def test_command_line_judges_an_emitted_folder(tmp_path: Path, capsys: pytest.Ca
     assert run(["emit", "kulla-conty", "-p", "base=conductor", "--lang", "wgsl", "--prefix", "g_", "-o", folder]) == 0
     assert run(["check", f"{folder}kulla-conty.wgsl", "kulla-conty(base=conductor)"]) == 0
     assert "right" in capsys.readouterr().out
+
+
+RESULTS = """uniform vec3 color;
+struct Pixel { vec3 diffuse; float k; };
+Pixel prepare(vec3 c) { Pixel p; p.diffuse = c * 0.3; p.k = 0.5; return p; }
+mat2 both(vec3 a) { return mat2(a.x, a.y, a.z, 1.0 - a.x); }
+vec3 BRDF(vec3 L, vec3 V, vec3 N) {
+    Pixel p = prepare(color);
+    return p.diffuse * p.k * (both(L)[1].y + both(V)[0].x + 2.0);
+}
+"""
+
+
+@pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl", "numpy"])
+def test_functions_may_return_vectors_inside_structs_and_matrices(language: str, tmp_path: Path) -> None:
+    needs_compiler("glsl")
+    (tmp_path / "results.glsl").write_text(RESULTS)
+    material = go.Shader(str(tmp_path / "results.glsl"), adapter={"cosine": True})
+    wo, wi = directions(1), directions(2)
+    expected = material.eval(wo, wi, precision="float64")
+    if language == "numpy":
+        compile(go.emit(material, "numpy", "eval"), "emitted.py", "exec")
+        return
+    made = bundle(material, language, ("eval",))
+    made.write(tmp_path / "out")
+    found = go.Shader(str(tmp_path / "out" / made.manifest["shader"])).eval(wo, wi, precision="float64")
+    np.testing.assert_allclose(found, expected, rtol=3e-6)

@@ -423,3 +423,21 @@ vec3 brdf(vec3 L, vec3 V) { return L.z * (texture(t, vec2(0.75, 0.25)).rgb + tex
     written(tmp_path, "a.glsl.toml", '[textures.t]\nfile = "table.npy"\nfilter = "nearest"\n')
     made = go.Shader(written(tmp_path, "a.glsl", text))
     np.testing.assert_allclose(made.eval(WO, WI, precision="float64")[:, 0], 0.1 * WI[:, 2] ** 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("one", "other"), [("pdf", "sample"), ("sample", "pdf")])
+def test_a_density_and_its_samples_are_named_together(tmp_path: Path, one: str, other: str) -> None:
+    text = "vec3 BRDF(vec3 L, vec3 V) { return vec3(0.3); } float density(vec3 L, vec3 V) { return 5.0; }"
+    (tmp_path / "one.glsl").write_text(text)
+    with pytest.raises(go.InputError, match=f"{one} = 'density' without {other}"):
+        go.Shader(str(tmp_path / "one.glsl"), adapter={one: "density"}).pdf([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning"),
+    [("VoL", "l.v"), ("LdotV", "l.v"), ("HoL", "l.h"), ("HoV", "l.h"), ("LdotN", "n.l")],
+)
+def test_names_of_cosines_are_known(tmp_path: Path, name: str, meaning: str) -> None:
+    (tmp_path / "one.glsl").write_text(f"vec3 BRDF(float NoL, float NoV, float {name}) {{ return vec3({name}); }}")
+    model = go.Shader(str(tmp_path / "one.glsl"))
+    assert type(model).program.adapter.arguments[2] == meaning  # type: ignore[attr-defined]

@@ -23,8 +23,10 @@ class ExpressionWriter(ParameterWriter):
     def _name_for(self, value: Value) -> str:
         if value.op == "call" and isinstance(value.type, Routine):
             for other in self.routine.values():
-                if other.op == "element" and other.args[0] is value and "." in other.name:
-                    return other.name.rpartition(".")[0].rpartition(".")[2]
+                if other.op == "element" and other.args[0] is value:
+                    holders = [part for part in other.name.split(".")[:-1] if not part.isdigit()]
+                    if holders:
+                        return holders[-1]
             tail = stem_of(value.static).rpartition("_")[2]
             return {"sample": "sampled"}.get(tail, tail)
         squared = value.args[0] if _squares(value) else None

@@ -288,7 +288,7 @@ def derived_list(value: object) -> list[tuple[str, str]]:
 def _result_name(path: str, value: Value) -> str:
     if path and not path[0].isdigit():
         return flat(path)
-    return value.name.rpartition(".")[2] or f"value_{path}"
+    return flat(value.name.rpartition(".")[2] or f"value_{path}")
 
 
 def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:

@@ -60,10 +60,11 @@ _GUESSES = {
     "tangent": ("x", "t", "tangent"),
     "bitangent": ("y", "b", "bitangent", "binormal"),
     "half": ("h", "half", "halfvector", "halfdir", "m"),
-    "n.l": ("ndotl", "nol", "nl", "dotnl"),
-    "n.v": ("ndotv", "nov", "nv", "dotnv"),
-    "n.h": ("ndoth", "noh", "nh", "dotnh"),
-    "l.h": ("ldoth", "loh", "vdoth", "voh", "lh", "dotlh", "dotvh", "hdotv", "hdotl"),
+    "n.l": ("ndotl", "nol", "nl", "dotnl", "ldotn"),
+    "n.v": ("ndotv", "nov", "nv", "dotnv", "vdotn"),
+    "n.h": ("ndoth", "noh", "nh", "dotnh", "hdotn"),
+    "l.h": ("ldoth", "loh", "vdoth", "voh", "lh", "dotlh", "dotvh", "hdotv", "hdotl", "hol", "hov"),
+    "l.v": ("ldotv", "lov", "vdotl", "vol", "lv", "vl", "dotlv", "dotvl"),
     "u": ("u", "xi", "rand", "random", "rnd"),
 }
 _BY_NAME = {name: meaning for meaning, names in _GUESSES.items() for name in names}

@@ -21,9 +21,10 @@ def one_of(module: Module, adapter: Adapter, key: str, where: str) -> Function:
     functions = module.function(name)
     where = f"{adapter.where}: {key}" if adapter.where and name else where
     if not functions:
-        known = sorted({title(module, one) for one in module.functions.values()} - {"main", "gonio_entry"})
+        titles = {title(module, one) for one in module.functions.values()}
+        known = sorted(titles - {"main", "gonio_main", "gonio_entry", "@gonio_entry"})
         what = f"no function '{name}'" if name else "no function that looks like a BRDF"
-        hint = f"function = 'NAME' in the adapter; it has {', '.join(known[:12]) or 'none'}"
+        hint = f"{key} = 'NAME' in the adapter; it has {', '.join(known[:12]) or 'none'}"
         raise InputError(what, where, hint)
     if len(functions) > 1 and adapter.struct:
         functions = of_struct(module, name, adapter.struct)
@@ -125,6 +126,13 @@ def completed(module: Module, adapter: Adapter, where: str) -> Adapter:
         if module.function(f"{stem}_derive"):
             derive = derive or f"{stem}_derive"
 
+    if bool(pdf) != bool(sample):
+        one, other = ("pdf", "sample") if pdf else ("sample", "pdf")
+        what, place = (
+            f"{one} = '{pdf or sample}' without {other}",
+            f"{adapter.where}: {one}" if adapter.where else where,
+        )
+        raise InputError(what, place, "name both functions, or neither: a guide then draws the directions")
     adapter = replace(adapter, pdf=pdf, sample=sample, derive=derive)
 
     def meanings(key: str) -> tuple[str, ...]:
