@@ -441,3 +441,25 @@ def test_names_of_cosines_are_known(tmp_path: Path, name: str, meaning: str) -> 
     (tmp_path / "one.glsl").write_text(f"vec3 BRDF(float NoL, float NoV, float {name}) {{ return vec3({name}); }}")
     model = go.Shader(str(tmp_path / "one.glsl"))
     assert type(model).program.adapter.arguments[2] == meaning  # type: ignore[attr-defined]
+
+
+TYPED = """vec3 f(vec3 V, vec3 L) {{ return vec3(0.3); }} float d(vec3 V, vec3 L) {{ return 0.3; }}
+{} s(vec3 V, {} u) {{ return {}; }}"""
+
+
+@pytest.mark.parametrize(
+    ("code", "arguments", "what", "place"),
+    [
+        (TYPED.format("float", "vec3", "0.5"), ["view", "u"], "'s' returns float, a direction expected", "sample"),
+        (TYPED.format("vec3", "float", "V"), ["view", "u"], "'u' given for an argument of type float", "arguments"),
+        (TYPED.format("vec3", "vec3", "V"), ["view", "n.l"], "'n.l' given for an argument of type vec3", "arguments"),
+    ],
+)
+def test_meanings_fit_the_types_of_arguments(
+    tmp_path: Path, code: str, arguments: list[str], what: str, place: str
+) -> None:
+    (tmp_path / "one.glsl").write_text(code)
+    adapter = {"function": "f", "arguments": ["view", "light"], "pdf": "d", "pdf_arguments": ["view", "light"]}
+    with pytest.raises(go.InputError, match=what) as error:
+        go.Shader(str(tmp_path / "one.glsl"), adapter={**adapter, "sample": "s", "sample_arguments": arguments})
+    assert error.value.where.endswith(place)

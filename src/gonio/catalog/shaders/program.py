@@ -23,6 +23,11 @@ from .adapter import Adapter, Uniform, check_range
 from .declared import PLAIN, Declared, Piece, assembled, pieces
 from .guesses import completed, one_of, title
 
+# meanings whose arguments are vectors, or single numbers; types that are no directions
+VECTORS = ("light", "view", "incident", "normal", "tangent", "bitangent", "half", "u")
+COSINES = ("n.l", "n.v", "n.h", "l.h", "l.v")
+NUMBERS = ("float", "int", "uint", "bool")
+
 
 class Program:
     """A module with the meanings of its functions. Raises InputError if the meanings do not fit the functions."""
@@ -53,6 +58,7 @@ class Program:
                 raise InputError(f"{what}'{title(module, function)}'", f"{stated}: {key}", "give one per argument")
             if "derived" in arguments and (not self.adapter.derive or name == "derive"):
                 raise InputError("'derived' given without a function", f"{stated}: {key}", "add derive = 'NAME'")
+            self._check_types(name, function, arguments, f"{stated}: {key}")
             places = [type for (_, type), one in zip(function.parameters, arguments, strict=True) if one == "result"]
             if len(places) > 1 or any(module.type(one).kind != "pointer" for one in places):
                 raise InputError(
@@ -60,6 +66,18 @@ class Program:
                 )
         declared = {one.name: one for one in self._declared()}
         self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
+
+    def _check_types(self, formula: str, function: Function, meanings: Sequence[str], where: str) -> None:
+        """Raise InputError if a direction is given for a number, or a number for a direction."""
+        for (_, type), meaning in zip(function.parameters, meanings, strict=True):
+            shape = self.module.shape(type)
+            expected = "a vector" if meaning in VECTORS else "float" if meaning in COSINES else ""
+            if (expected == "a vector" and shape in NUMBERS) or (expected == "float" and shape != "float"):
+                what = f"'{meaning}' given for an argument of type {shape or 'struct'}, {expected} expected"
+                raise InputError(what, where, f"see the arguments of {title(self.module, function)}")
+        if formula == "sample" and (shape := self.module.shape(function.type)) in (*NUMBERS, "vec2"):
+            what = f"'{title(self.module, function)}' returns {shape}, a direction expected"
+            raise InputError(what, where.replace("sample_arguments", "sample"), "return a vec3, or a struct with wi")
 
     # ------------------------------------------------------------------ parameters
 
