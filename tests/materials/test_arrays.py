@@ -115,3 +115,9 @@ def test_a_preset_given_as_a_parameter_is_hinted_at() -> None:
         with pytest.raises(InputError) as caught:
             go.Conductor(**given)  # type: ignore[arg-type]
         assert "Conductor.preset('Au'" in caught.value.hint
+
+
+def test_the_width_of_a_coat_has_a_derivative() -> None:
+    coat = go.Coat(go.Lambert(0.5), alpha=0.3)
+    value, slope = coat.eval([0.0, 0.6, 0.8], [0.3, -0.2, (1.0 - 0.13) ** 0.5], derivatives=["alpha"])
+    assert np.isfinite(slope).all() and (slope != 0.0).any() and (value > 0.0).all()

@@ -338,3 +338,30 @@ def test_all_parameters_that_are_tied_stand_in_one_note() -> None:
     coupling = np.array([[1, 0.99, 0.5, 0], [0.99, 1, -0.995, 0], [0.5, -0.995, 1, 0], [0, 0, 0, 1]])
     notes = notes_on(free, np.full(4, 0.5), np.zeros(4, bool), coupling, tuple("abcd"))
     assert notes == ["a, b and c are tied (largest correlation -0.995): fix one of them"]
+
+
+@pytest.mark.parametrize(
+    ("text", "free"),
+    [
+        ("conductor(preset=Au)", {"eta", "k", "alpha"}),
+        ("conductor(preset=Au,alpha=0.3)", {"eta", "k"}),
+        ("lambert+conductor(preset=Au)", {"a.albedo", "b.eta", "b.k", "b.alpha"}),
+        ("kulla-conty(base=conductor)", {"base.eta", "base.k", "base.alpha"}),
+        ("kulla-conty(base=conductor,base.alpha=0.2)", {"base.eta", "base.k"}),
+    ],
+)
+def test_a_model_may_have_a_preset_or_inner_materials(text: str, free: set[str]) -> None:
+    from gonio.fitting.models import moving_of
+
+    assert {one.path for one in moving_of(text)[1]} == free
+
+
+def test_a_folder_of_which_nothing_can_be_fitted_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from gonio.cli.app import run
+
+    for name in ("a.astm", "b.astm"):
+        (tmp_path / name).write_text("hello")
+    assert run(["fit", str(tmp_path), "-m", "lambert"]) == 2
+    assert "no VARS line" in capsys.readouterr().out

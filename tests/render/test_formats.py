@@ -122,3 +122,15 @@ def test_a_mitsuba_scene_opens_no_picture_that_would_corrupt_it(tmp_path: Path) 
     for allowed in (False, True):
         with pytest.raises(InputError, match="longer than its scanline"):
             prepare(Request(scene, allow_outside=allowed))
+
+
+def test_radiance_files_are_rounded_not_truncated(tmp_path: Path) -> None:
+    picture = np.random.default_rng(1).uniform(0.0, 3.0, (40, 50, 3)).astype(np.float32) ** 4
+    picture[:3], picture[3:6, :, 1] = 0.0, 1e-7
+    images.write(tmp_path / "a.hdr", picture)
+    back = images.read(tmp_path / "a.hdr").pixels
+    largest = picture.max(2, keepdims=True)
+    assert (np.abs(back - picture) <= largest * 2.0**-8 * 1.001).all() and (back[:3] == 0.0).all()
+    assert abs(back.mean() / picture.mean() - 1.0) < 3e-4
+    images.write(tmp_path / "b.hdr", back)  # what was read is written unchanged
+    np.testing.assert_array_equal(images.read(tmp_path / "b.hdr").pixels, back)

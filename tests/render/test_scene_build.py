@@ -473,3 +473,17 @@ def test_a_fault_of_the_machine_within_a_material_keeps_its_kind(scene: Path, mo
     with pytest.raises(go.MachineError, match="no LLVM 17") as raised:
         go.render(scene)
     assert (raised.value.where, raised.value.hint) == ("LLVM", "pip install karellen-llvm-core")
+
+
+def test_a_sky_with_negative_radiance_is_refused(tmp_path: Path) -> None:
+    from gonio.pictures import images
+
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[2, 5, 1] = -1.0
+    images.write(tmp_path / "sky.exr", pixels)
+    scene = json.loads((Path(__file__).parents[2] / "examples" / "white-furnace" / "scene.json").read_text())
+    scene["scene"]["lights"] = [{"type": "environmentLight", "texture": {"type": "imageTex", "file": "sky.exr"}}]
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    with pytest.raises(go.InputError, match="row 2, column 5 is below 0") as error:
+        go.render(tmp_path / "scene.json", spp=1, size=(8, 8))
+    assert error.value.where.endswith("lights/0/texture")

@@ -50,9 +50,10 @@ def modelled(text: str, lobes: int = 1) -> Model:
     parts += parts[-1:] * (lobes - 1)
     made: list[Model] = []
     for part in parts:
-        head, _, rest = part.partition("(")
-        material = notation.named(texts.expanded(part))[0]
-        given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
+        head = part.partition("(")[0]
+        material, stated = notation.named(texts.expanded(part))[0], texts.assignments(notation.split(part)[1])
+        paths = {leaf.path for leaf in tree.leaves(material)}
+        given = [path for path in stated if path in paths]  # not a preset, whose values are where the fit starts
         made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
     combined = made[0]
     for other in made[1:]:

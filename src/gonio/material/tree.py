@@ -145,7 +145,10 @@ def plain_values(material: M) -> M:
     """The material with NumPy arrays in place of Dr.Jit arrays."""
     values: dict[str, Value] = {}
     for leaf in leaves(material):
-        parts = pair_of(leaf.value) if leaf.parameter.kind == "alpha" else (leaf.value,)
+        vector = backend.is_drjit(leaf.value) and backend.drjit().is_vector_v(leaf.value)
+        parts = (
+            (leaf.value,) if leaf.parameter.kind != "alpha" else tuple(leaf.value) if vector else pair_of(leaf.value)
+        )
         if leaf.parameter.numeric and any(map(backend.is_drjit, parts)):
             columns = [np.asarray(backend.to_numpy(backend.drjit().detach(p), 1)) for p in parts]
             one = [float(c[0]) if c.shape == (1,) else c[0] if c.shape == (1, 3) else c for c in columns]

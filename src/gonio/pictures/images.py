@@ -100,7 +100,7 @@ def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> 
     if suffix == ".npz":
         return _npz_bytes(picture, settings)
     if suffix == ".hdr":
-        return _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
+        return _with_comments(_bitmap_bytes(_half_a_step_up(picture), {}, "RGBE"), settings)
     return _bitmap_bytes(picture, settings, "OpenEXR")
 
 
@@ -186,6 +186,14 @@ def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
     with file_threads():
         bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
     return stream.raw_buffer()
+
+
+def _half_a_step_up(picture: RGB) -> RGB:
+    """The picture plus half a step of RGBE, whose values Mitsuba truncates: they are then rounded. 0 stays 0."""
+    largest = picture.max(axis=2, keepdims=True)
+    exponent = np.frexp(largest)[1]
+    exponent = np.frexp(largest + np.ldexp(np.float32(0.5), exponent - 8))[1]  # rounding may reach the next power of 2
+    return np.where((picture > 0.0) & (largest > 1e-32), picture + np.ldexp(np.float32(0.5), exponent - 8), picture)
 
 
 def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:

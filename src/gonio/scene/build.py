@@ -172,7 +172,12 @@ class _Builder:
         source = light.texture if light.texture is not None else light.radiance
         assert source is not None, "exactly one of the two is given"
         if isinstance(source, ImageTexture):
-            return textures.environment(self.mi, self.values(source, f"{where}/texture"))
+            values = self.values(source, f"{where}/texture")
+            if (values < 0.0).any():
+                row, column = np.argwhere(values < 0.0)[0][:2]
+                what = f"the radiance at row {row}, column {column} is below 0"
+                raise InputError(what, f"{where}/texture", "correct the image: light is not negative")
+            return textures.environment(self.mi, values)
         return {"type": "constant", "radiance": spectra.emitted(source)}
 
     # ------------------------------------------------------------------ shapes

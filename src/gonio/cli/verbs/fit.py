@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Option
+from typer import Argument, Exit, Option
 
 from ...errors import InputError
 from ..options import Fitting, Json, Options, Spp, output_option
@@ -90,11 +90,13 @@ def fit(
     written = [] if target is None else _write(target, files, rows)
     if as_json:
         print(json.dumps([row.as_dict() for row in rows] if len(rows) > 1 else rows[0].as_dict()))
-        return
-    for row in rows:
-        _print(row.as_dict())
-    if written:
-        print(*written)
+    else:
+        for row in rows:
+            _print(row.as_dict())
+        if written:
+            print(*written)
+    if not any(row.fits for row in rows):
+        raise Exit(2)  # nothing was fitted
 
 
 def _write(target: Path, files: Sequence[str], rows: Sequence[Row]) -> list[Path]:
