@@ -113,7 +113,7 @@ def test_a_disk_that_fills_up_while_writing_leaves_nothing(tmp_path: Path) -> No
         resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 
     done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path / "a.png")],
+        [sys.executable, "-B", "-c", program, str(tmp_path / "a.png")],
         capture_output=True,
         text=True,
         preexec_fn=small_files_only,
