@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gonio import ops
 from gonio.energy.albedo import cubature
+from gonio.ops import backend
 from gonio.verify import directions, subject
 
 WO = directions.at(np.array([0.0, 40.0, 80.0, 89.5]), 10.0)
@@ -104,3 +105,21 @@ def test_the_stated_error_holds_what_no_sample_has_shown_of_a_streak(ndf: str, t
         s = model.sample(row, u)
         weight = np.where(s.pdf > 0.0, s.weight[:, 0], 0.0)
         assert abs(value - weight.mean()) < error + 4.0 * weight.std() / np.sqrt(len(u))
+
+
+def test_an_integral_far_above_1_takes_no_more_directions() -> None:
+    one = subject.of(go.Conductor(alpha=0.05, fresnel="one"))
+    power, counts, values = one.power(), [], []
+    for factor in (1.0, 1e4):
+        count = 0
+
+        def scaled(wo: ops.Direction, wi: ops.Direction, factor: float = factor) -> list[ops.Scalar]:
+            nonlocal count
+            count += backend.drjit().width(wi)
+            return [factor * channel for channel in power(wo, wi)]
+
+        found = cubature.integrate(one.sample, scaled, WO, 1e-5)
+        counts.append(count)
+        values.append(found.value / factor)
+    np.testing.assert_allclose(values[1], values[0], atol=3e-5)
+    assert counts[1] < 1.5 * counts[0]

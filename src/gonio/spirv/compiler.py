@@ -327,8 +327,7 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
         source.write_text(text, encoding="utf-8")
         target = "-G" if language == "glsl" else "-V"  # HLSL has no form for OpenGL
         options = [target, "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
-        # Direct3D: of a number and NaN, min, max, clamp and saturate return the number
-        options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets", "--nan-clamp"] if language == "hlsl" else []
+        options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
         command = slang.command(source, output) if language == "slang" else [compiler(), *options, str(source)]
         try:
             done = subprocess.run(

@@ -17,7 +17,6 @@ from .arithmetic import (
     dot,
     elementwise,
     floor,
-    is_nan,
     maximum,
     minimum,
     multiply,
@@ -123,15 +122,6 @@ def clamp(x: Value, low: Value, high: Value) -> Value:
     return minimum(maximum(x, low), high)
 
 
-def _number(choose: Callable[..., Value], a: Value, b: Value) -> Value:
-    """The smaller or the larger of two values, and the other one if one is NaN, as Direct3D requires."""
-    value = choose(a, b)
-    for one, other in ((a, b), (b, a)):
-        if not static(one):
-            value = select(is_nan(numeric(one)), other, value)
-    return value
-
-
 def mix(a: Value, b: Value, t: Value) -> Value:
     """a (1 - t) + b t."""
     return add(multiply(a, subtract(1.0, t)), multiply(b, t))
@@ -234,8 +224,8 @@ ELEMENTWISE: dict[int, Callable[..., Value]] = {
     24: _function(np.arctanh, lambda x: 0.5 * ops.log((1.0 + x) / (1.0 - x))), 25: atan2, 26: power, 27: exp, 28: log,
     29: lambda x: exp(multiply(x, LOG2)), 30: lambda x: multiply(log(x), 1.0 / LOG2), 31: sqrt,
     32: lambda x: divide(1.0, sqrt(x)), 37: minimum, 40: maximum, 43: clamp, 46: mix, 48: step, 49: smoothstep,
-    50: lambda a, b, c: add(multiply(a, b), c), 53: scaled, 79: lambda a, b: _number(minimum, a, b),
-    80: lambda a, b: _number(maximum, a, b), 81: lambda x, low, high: _number(minimum, _number(maximum, x, low), high),
+    50: lambda a, b, c: add(multiply(a, b), c), 53: scaled, 79: minimum,
+    80: maximum, 81: clamp,
 }  # fmt: skip
 # functions of integers
 WHOLE_NUMBERS: dict[int, Callable[..., Value]] = {

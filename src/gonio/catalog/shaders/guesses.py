@@ -128,11 +128,9 @@ def completed(module: Module, adapter: Adapter, where: str) -> Adapter:
 
     if bool(pdf) != bool(sample):
         one, other = ("pdf", "sample") if pdf else ("sample", "pdf")
-        what, place = (
-            f"{one} = '{pdf or sample}' without {other}",
-            f"{adapter.where}: {one}" if adapter.where else where,
-        )
-        raise InputError(what, place, "name both functions, or neither: a guide then draws the directions")
+        place = f"{adapter.where}: {one}" if adapter.where else where
+        hint = "name both functions, or neither: a guide then draws the directions"
+        raise InputError(f"{one} = '{pdf or sample}' without {other}", place, hint)
     adapter = replace(adapter, pdf=pdf, sample=sample, derive=derive)
 
     def meanings(key: str) -> tuple[str, ...]:

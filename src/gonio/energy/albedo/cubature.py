@@ -22,7 +22,6 @@ ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees, a lobe of width 2e-4 is that narrow
-SETTLED = 2  # rounds after which the integrals are known well enough to be the scale of their errors
 SEEDED = 17  # halvings around samples
 SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more if the smaller number leaves light unseen
 CROWD = 1 / 32  # fraction of the samples in a cell above which it is divided before the integrand is evaluated
@@ -138,12 +137,16 @@ def _integrate(
     channels = coarse.shape[1]
     unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # shown by a single sample
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
-    scale = np.ones(len(wo))  # of the tolerance: a gain of a thousand need not be known to 1e-5
     for depth in range(DEPTH):
-        allowed = (tolerance / 400.0 * scale)[cells.row]  # some hundreds of cells contribute to an integral's error
         fine_cells = cells.quarters(way)
         (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = inner.integral.reshape(-1, 4, channels)
+        so_far = np.stack([value, value])
+        for total, part in zip(so_far, (coarse, fine.sum(1)), strict=True):
+            np.add.at(total, cells.row, part)
+        # a gain of a thousand need not be known to 1e-5; a light that one of the two rules hits by chance is no gain
+        scale = np.maximum(np.abs(so_far).max(2).min(0), 1.0)
+        allowed = (tolerance / 400.0 * scale)[cells.row]  # some hundreds of cells contribute to an integral's error
         # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
         # and all of Gauss's rules if it is near their rim
         signed = np.stack([coarse, other.integral.reshape(-1, 4, channels).sum(1)]) - fine.sum(1)
@@ -159,10 +162,6 @@ def _integrate(
         shown = by_samples & single
         difference += missed[:, None]
         divide |= missed > allowed
-        if depth >= SETTLED:
-            left = np.zeros_like(value)
-            np.add.at(left, cells.row, fine.sum(1))
-            scale = np.maximum(np.abs(value + left).max(1), 1.0)
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide

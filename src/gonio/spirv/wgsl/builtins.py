@@ -158,11 +158,9 @@ def _ldexp(emitter: Emitter, values: list[Value]) -> Value:
 
 def _modf(emitter: Emitter, values: list[Value]) -> Value:
     number = emitter.with_concrete_type(emitter.together(values, "modf", floats=True)[0])
-    truncated = emitter.standard(3, number.type, number.id)
-    fraction = emitter.emit("FSub", number.type, number.id, truncated.id)
     type = Type("struct", name=f"modf of {number.type}")
     emitter.structs[type.name] = ("fract", "whole"), (number.type, number.type)
-    return emitter.emit("CompositeConstruct", type, fraction.id, truncated.id)
+    return emitter.standard(36, type, number.id)
 
 
 def _bits(name: str) -> Callable[[Emitter, list[Value]], Value]:
@@ -173,8 +171,8 @@ def _bits(name: str) -> Callable[[Emitter, list[Value]], Value]:
         value = emitter.with_concrete_type(values[0])
         if value.type.scalar not in (INT, UINT):
             raise emitter.error(f"bits of {value.type}", "use integers")
-        signed = {"BitFieldExtract": "BitFieldSExtract" if value.type.scalar == INT else "BitFieldUExtract"}
-        return emitter.emit(signed.get(name, name), value.type, value.id, *[one.id for one in values[1:]])
+        kind = name.replace("Extract", "SExtract" if value.type.scalar == INT else "UExtract")
+        return emitter.emit(kind, value.type, value.id, *[one.id for one in values[1:]])
 
     return made
 
