@@ -1,9 +1,10 @@
 """Coverage of the 95 % intervals of fits: nine models at random parameters, with 1, 2 and 5 % noise.
 
-    python benchmarks/intervals.py [--seed-range 1:16] [--jobs 4] [--only conductor,ward] [-o fits.json]
+    python benchmarks/intervals.py [--seed-range 1:16] [--jobs 4] [--only conductor,ward] [--kind list] [-o fits.json]
 
-Each fit has its own table: 24 x 24 x 36 cells, random true values, independent noise proportional to each value. The
-file holds, per model, noise level and parameter: the number of intervals, the number of those that contain the true
+Each fit has its own data with random true values and independent noise proportional to each value: a half-difference
+table of 24 x 24 x 36 cells, a list of 1,500 random pairs of directions, or a table over 5 x 16 x 19 angles. The file
+holds, per model, noise level and parameter: the number of intervals, the number of those that contain the true
 value, the number of parameters without a finite interval, and the mean and root mean square of the error divided by its
 standard error, which are 0 and 1 for unbiased values with correct intervals. Rows of several files are combined by
 adding the counts.
@@ -26,6 +27,9 @@ import gonio as go
 import numpy as np
 from gonio.fitting.fit import fit
 from gonio.materials.combined.sum import Sum
+from gonio.measure.tables import angles, samples
+from gonio.measure.tables.angles import Angles
+from gonio.measure.tables.samples import Samples
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from measure.test_fitting import table, truth
@@ -83,12 +87,37 @@ MODELS: dict[str, Callable[[Random], go.BSDF]] = {
 }
 
 
-def one(job: tuple[str, float, int]) -> list[Outcome]:
-    """The fit of one model to one table."""
-    model, noise, seed = job
+def listed(material: go.BSDF, noise: float, seed: int) -> Samples:
+    """Values at 1,500 pairs of directions that are distributed by the cosine."""
+    rng = np.random.default_rng(seed)
+    theta, phi = np.arccos(np.sqrt(rng.random((2, 1500)))), rng.uniform(-np.pi, np.pi, (2, 1500))
+    directions = np.stack([theta[0], phi[0], theta[1], phi[1]], -1)
+    exact = samples.sampled(lambda wo, wi: np.asarray(material.eval(wo, wi)), directions)
+    return Samples(directions, exact.values * (1.0 + noise * rng.standard_normal(exact.values.shape)))
+
+
+def over_angles(material: go.BSDF, noise: float, seed: int) -> Angles:
+    """A table over angles as coarse as those that goniometers write, with the mirror direction of each light."""
+    nodes = (
+        np.radians(np.arange(10.0, 71.0, 15.0)),
+        np.radians(np.arange(0.0, 76.0, 5.0)),
+        np.radians(np.arange(0.0, 181.0, 10.0)),
+    )
+    wo, wi = angles.pairs(*nodes)
+    f = np.asarray(material.eval(wo, wi)) / wi[:, 2:]
+    f *= 1.0 + noise * np.random.default_rng(seed).standard_normal(f.shape)
+    return Angles(nodes, f.reshape(*map(len, nodes), 3))
+
+
+KINDS = {"table": table, "list": listed, "angles": over_angles}
+
+
+def one(job: tuple[str, float, int, str]) -> list[Outcome]:
+    """The fit of one model to one set of data."""
+    model, noise, seed, kind = job
     rng = np.random.default_rng([seed, sorted(MODELS).index(model), int(1e3 * noise)])
     material = MODELS[model](rng)
-    found = fit(table(material, noise=noise, seed=int(rng.integers(1 << 62))), model)
+    found = fit(KINDS[kind](material, noise=noise, seed=int(rng.integers(1 << 62))), model)
     known = truth(material, found.names)
     with np.errstate(invalid="ignore"):
         z = np.where(np.isfinite(found.errors), (found.values - known) / found.errors, np.nan)
@@ -180,10 +209,16 @@ def seeds_of(text: str) -> range:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="", help="models, by name")
+    parser.add_argument("--kind", choices=KINDS, default="table", help="kind of data")
     add_options(parser, "1:16")
     options = parser.parse_args()
     models = [model for model in MODELS if not options.only or model in options.only.split(",")]
-    jobs = [(model, noise, seed) for seed in seeds_of(options.seed_range) for model in models for noise in NOISES]
+    jobs = [
+        (model, noise, seed, options.kind)
+        for seed in seeds_of(options.seed_range)
+        for model in models
+        for noise in NOISES
+    ]
     start = time.perf_counter()
     outcomes = run(one, jobs, options.jobs)
     report(outcomes, time.perf_counter() - start, options.output)

@@ -125,7 +125,7 @@ def package(tmp_path: Path) -> Path:
 def _in_another_process(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
     return subprocess.run(
-        [sys.executable, "-m", "gonio.cli", *arguments],
+        [sys.executable, "-m", "gonio", *arguments],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": path, **environment},

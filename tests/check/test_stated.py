@@ -121,6 +121,14 @@ def test_wrong_values_without_parameters_name_the_defaults(tmp_path: Path) -> No
     assert not lambert.passed and "sigma=0.3" in lambert.remark, lambert.lines()
 
 
+def test_a_constant_that_is_another_parameter_is_no_mistake(tmp_path: Path) -> None:
+    for text in ("oren-nayar(sigma=0.3,albedo=0.6)", "lambert(albedo=0.6)"):  # sigma is the default
+        path = tmp_path / "f.csv"
+        path.write_text(_written(text, ""))
+        finding = go.check(path, text.partition("(")[0])
+        assert finding.passed and "albedo=0.6, found from the values" in finding.remark, finding.lines()
+
+
 @pytest.mark.slow
 def test_a_known_mistake_at_the_defaults_prevails_over_other_parameters(tmp_path: Path) -> None:
     f = Phong(change="kd over pi")(of.WO, of.WI)

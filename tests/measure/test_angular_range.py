@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import gonio as go
 import numpy as np
 import pytest
-from gonio.errors import InputError
+from gonio.errors import GonioWarning, InputError
 from gonio.fitting.data import data_of
 from gonio.material.angular_range import EVERYWHERE, AngularRange
-from gonio.measure import report
+from gonio.measure import format_of, read, report
+from gonio.measure.tables import angles, samples
+from gonio.measure.tables.angles import Angles
 from gonio.viewer import curves, image_slices, plots
 
 GOLD = go.Conductor.preset("Au", alpha=0.2)
@@ -20,8 +23,8 @@ GOLD = go.Conductor.preset("Au", alpha=0.2)
 def narrow(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Gold that was measured up to 60 degrees."""
     path = tmp_path_factory.mktemp("narrow") / "au.gonio"
-    angles = [0, 10, 20, 30, 40, 50, 60]
-    go.measure(GOLD, path, theta_i=angles, theta_r=angles)
+    degrees = [0, 10, 20, 30, 40, 50, 60]
+    go.measure(GOLD, path, theta_i=degrees, theta_r=degrees)
     return str(path)
 
 
@@ -78,3 +81,32 @@ def test_info_lists_what_was_measured(narrow: str) -> None:
     assert rows["measured"] == "θo from 0° to 60° and θi from 0° to 60°"
     assert "albedo at 60" in rows and "albedo at 70" not in rows
     assert dict(report.lines(report.describe("sample")))["measured"] == "everywhere"
+
+
+def test_a_conversion_names_the_directions_at_which_its_source_was_measured(tmp_path: Path) -> None:
+    short, listed = tmp_path / "short.gonio", tmp_path / "listed.gonio"
+    theta, phi = np.radians([0.0, 20.0, 40.0, 60.0]), np.radians([0.0, 90.0, 180.0])
+    wo, wi = angles.pairs(theta, theta, phi)
+    rough = go.Conductor.preset("Au", alpha=0.5)
+    f = np.asarray(rough.eval(wo, wi)).reshape(4, 4, 3, 3) / np.cos(theta)[:, None, None, None]
+    short.write_bytes(format_of(short).write(Angles((theta, theta, phi), f)))
+    listed.write_bytes(format_of(listed).write(samples.sampled(rough.eval, samples.plan()[::40])))
+    for source, words in ((short, "measured at θo from 0° to 60°"), (listed, "measured at 126 pairs of directions")):
+        with pytest.warns(GonioWarning, match=words):
+            result = go.convert(source, tmp_path / "whole.bsdf")
+        assert result.facts["measured"]
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert go.convert(source, tmp_path / "same.gonio").facts["measured"] == ""
+
+
+def test_a_missing_file_has_a_hint(tmp_path: Path) -> None:
+    (tmp_path / "gold.binary").write_bytes(b"")
+    for name, hint in (
+        ("gold.bsdf", "did you mean 'gold.binary'?"),
+        ("wax.bsdf", "check the path"),
+        ("a/b.bsdf", "no folder"),
+    ):
+        with pytest.raises(InputError) as error:
+            read(tmp_path / name)
+        assert hint in error.value.hint

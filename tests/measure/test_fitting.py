@@ -19,7 +19,10 @@ from gonio.fitting.starts import starts_of
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
+from gonio.measure.tables import angles, samples
+from gonio.measure.tables.angles import Angles
 from gonio.measure.tables.half_difference import HalfDifference, sampled
+from gonio.measure.tables.samples import Samples
 from gonio.ops import backend
 
 SHAPE = (24, 24, 36)
@@ -134,6 +137,75 @@ def test_negative_values_in_a_channel_are_counted_and_do_not_carry_the_others_aw
     found = fit(data.Data(cells.wo, cells.wi, value, cells.row), "lambert+ggx")
     np.testing.assert_allclose(found.values[[0, 1, 3, 4]], [0.3, 0.2, 1.5, 1.5], rtol=0.1)
     assert found.as_dict()["negative"] == [0, 0, int(highlight.sum())]
+
+
+def _listed(material: go.BSDF, noise: float, seed: int) -> Samples:
+    """The material at 1,500 random pairs of directions, each value off by some noise of its own."""
+    rng = np.random.default_rng(seed)
+    theta, phi = np.arccos(np.sqrt(rng.random((2, 1500)))), rng.uniform(-np.pi, np.pi, (2, 1500))
+    directions = np.stack([theta[0], phi[0], theta[1], phi[1]], -1)
+    exact = samples.sampled(material.eval, directions).values
+    return Samples(directions, exact * (1.0 + noise * rng.standard_normal(exact.shape)))
+
+
+def _pairs(kind: str) -> Samples | Angles:
+    """PLASTIC with 2 % noise at random directions, or at angles as coarse as a goniometer's."""
+    if kind == "samples":
+        return _listed(PLASTIC, 0.02, 5)
+    rng = np.random.default_rng(5)
+    nodes = np.radians([10.0, 30.0, 50.0, 70.0]), np.radians(np.arange(0.0, 76.0, 5.0)), np.linspace(0.0, np.pi, 19)
+    wo, wi = angles.pairs(*nodes)
+    f = PLASTIC.eval(wo, wi) / wi[:, 2:]
+    return Angles(nodes, (f * (1.0 + 0.02 * rng.standard_normal(f.shape))).reshape(4, 16, 19, 3))
+
+
+@pytest.mark.parametrize("kind", ["samples", "angles"])
+def test_values_are_fitted_at_their_own_directions(kind: str) -> None:
+    stored = _pairs(kind)
+    cells = data.data_of(stored)
+    wo, wi = stored.pairs()
+    inside = np.minimum(wo[:, 2], wi[:, 2]) > np.cos(np.radians(80.0))
+    np.testing.assert_array_equal(cells.wi, wi[inside])
+    np.testing.assert_allclose(cells.value, stored.values.reshape(-1, 3)[inside] * wi[inside, 2:], rtol=1e-12)
+    assert len(cells) + cells.out.get("grazing", 0) == len(wo)
+    found = fit(stored, "lambert+ggx")
+    right = truth(PLASTIC, found.names)
+    np.testing.assert_allclose(found.values, right, rtol=0.02)  # interpolated values made alpha wrong by 10 to 40 %
+    assert np.count_nonzero((found.interval[:, 0] <= right) & (right <= found.interval[:, 1])) >= len(right) - 1
+    assert (found.errors < 0.01 * right).all()
+
+
+def test_a_value_and_its_swapped_one_are_of_one_run() -> None:
+    theta, phi = np.radians([10.0, 33.0, 61.0]), np.radians([0.0, 40.0, 170.0])
+    wo, wi = angles.pairs(theta, theta, phi)
+    f = np.asarray(PLASTIC.eval(wo, wi)) / wi[:, 2:]
+    cells = data.data_of(Angles((theta, theta, phi), f.reshape(3, 3, 3, 3)))
+    row = cells.row.reshape(3, 3, 3)
+    np.testing.assert_array_equal(row, row.swapaxes(0, 1))
+    assert len(np.unique(row)) > 9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_index_leaves_the_end_of_its_range_where_its_slope_is_0(seed: int) -> None:
+    eta = (1.47, 1.32, 1.83)
+    dull = Sum(go.Lambert((0.63, 0.16, 0.69)), go.Conductor(eta=eta, k=0.0, alpha=0.49, fresnel="schlick"))
+    found = fit(_listed(dull, 0.05, seed), "lambert+ggx")
+    index = [value for name, value in zip(found.names, found.values, strict=True) if ".eta." in name]
+    np.testing.assert_allclose(index, eta, atol=0.15)
+
+
+@pytest.mark.slow
+def test_a_dead_channel_does_not_carry_the_others_away() -> None:
+    dead = table(PLASTIC)
+    values = dead.values.copy()
+    values[..., 2] = np.minimum(values[..., 2], 0.0)
+    found = fit(HalfDifference(values, dead.turn), "lambert+ggx")
+    value = dict(zip(found.names, found.values, strict=True))
+    right = dict(zip(found.names, truth(PLASTIC, found.names), strict=True))
+    for name in ("a.albedo.r", "a.albedo.g", "b.eta.r", "b.eta.g", "b.alpha"):
+        assert value[name] == pytest.approx(right[name], rel=0.02)
+    assert value["a.albedo.b"] < 0.01
+    assert any("no value of b is positive" in note for note in found.notes)
 
 
 @pytest.mark.slow

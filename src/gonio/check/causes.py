@@ -59,6 +59,12 @@ def named(both: Ratio) -> Mistake | None:
     return Mistake(cause.words, REGION) if cause is not None else None
 
 
+def is_known(mistake: Mistake) -> bool:
+    """Whether a mistake has a formula of its own: neither a region nor a constant that nothing explains, which may as
+    well be that of another parameter."""
+    return mistake.topic != REGION and not mistake.words.endswith(f"{fits.ANY}?")
+
+
 def _either(mistakes: list[Mistake]) -> Mistake:
     """The first three of several mistakes with equal values, such as a factor of 4 and of 1 / alpha = 4, as one."""
     texts = list(dict.fromkeys(mistake.words for mistake in mistakes))[:3]

@@ -78,7 +78,8 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
             "this picture does not resemble the scene: it shows something else", path.name, "check --scene"
         )
     facts = [f"{best.distance:.1%} mean relative difference from Gonio's picture, by blocks of {block} pixels"]
-    facts += [best.reading.words] if best.reading.words else []
+    if best.reading.words:
+        facts.append(best.reading.words if best.distance <= FITS else f"nearest reading: {best.reading.words}")
     if abs(best.scale - 1.0) > CLEAN:
         facts.append(f"{written(best.scale, CLEAN)} times as bright, taken as exposure")
     figures = {"difference": best.distance, "scale": best.scale}
@@ -105,18 +106,17 @@ def _read(scene: Path, outside: dict[str, bool]) -> SceneDescription:
 def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
     """The picture as it is, and with each of the usual mistakes undone."""
     given = np.asarray(picture.pixels, float)
-    encodings = [("", None, given)]
+    encodings = [("", given)]
     if not picture.hdr:
         raw = np.asarray(images.read(path, "linear").pixels, float)
-        encodings += [("the file holds linear values: read without gamma", None, raw), ("gamma 2.2", None, raw**2.2)]
-        encodings[2] = ("read with gamma 2.2", None, raw**2.2)
+        encodings += [("the file holds linear values: read without gamma", raw), ("read with gamma 2.2", raw**2.2)]
     turns = {
         "the picture is upside down": lambda p: p[::-1],
         "the picture is mirrored: left and right exchanged": lambda p: p[:, ::-1],
         "the picture is turned by 180 degrees": lambda p: p[::-1, ::-1],
         "red and blue are exchanged": lambda p: p[..., ::-1],
     }
-    for words, _, pixels in encodings:
+    for words, pixels in encodings:
         for along_y, along_x in sorted(itertools.product(SHIFTS, SHIFTS), key=lambda s: abs(s[0]) + abs(s[1])):
             moved = f"moved by {along_x} columns and {along_y} rows" if along_x or along_y else ""
             both = "; ".join(filter(None, (words, moved)))

@@ -30,6 +30,7 @@ ACCURACY = 2e-3  # relative; allows for float32, six printed digits and angles f
 GRAZING = 1e-3  # cosine below which a division by it is inaccurate
 UNIT = 1e-3  # largest deviation of a direction's length from 1
 _COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
+_NEARER = "compared with f cos theta_i, which is nearer to the values than f"
 COVER = 0.99  # fraction of the rows that must agree; the others must agree within ten times the accuracy
 _UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z, as rotations
 
@@ -62,7 +63,7 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
     if other is None:
         return replace(finding, remark=asked.remark)
     numbers = search.described(other)
-    if finding.mistake is not None and finding.mistake.topic != causes.REGION:
+    if finding.mistake is not None and causes.is_known(finding.mistake):
         return replace(finding, remark=f"{numbers} explains the values as well: name it in a line '# model:', or by -p")
     remark = f"{numbers}, found from the values: the file does not name its parameters"
     return replace(judge(path.name, rows, other, accuracy), remark=remark)
@@ -109,9 +110,11 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
         mistake = _mistake(rows, expected, material, fine, accuracy)
         if with_cosine(material) and _has_cosine(rows, expected, fine, accuracy):
             divided = rows._replace(f=_over(rows.f, rows.wi[:, 2:]))
-            mistake = _mistake(divided, expected, material, fine, accuracy) or mistake
+            other = _mistake(divided, expected, material, fine, accuracy)
             expected = expected * np.abs(rows.wi[:, 2:])
-            facts.append(_COSINE)
+            known = other is not None and causes.is_known(other)
+            mistake = other or mistake
+            facts.append(_COSINE if known or np.any(causes.close(rows.f, expected, accuracy)[fine]) else _NEARER)
         error, worst = _error(rows.f, expected, fine, accuracy)
         good = causes.close(rows.f, expected, accuracy)[fine]
         figures |= {"agree": float(good.mean()), "largest": float(error[worst]), "line": float(rows.line[worst])}

@@ -27,16 +27,17 @@ from .data import GRAZING, Data, data_of
 from .models import modelled as modelled
 from .models import moving_of as moving_of
 from .models import moving_with_notes
-from .parameters import NAMES, Free, with_values
+from .parameters import NAMES, Free, ranges, with_values
 from .profiles import profiles
 from .solver import METRICS, Problem, Solution, solve
-from .starts import starts_of
+from .starts import between, starts_of
 
 FEW = 6000  # values on which starting points are compared
 SOME = 60_000  # values on which the best solutions are refined
 SOLVED = 8  # starting points that are refined with the metric itself on few values
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs above which two solutions count as distinct
+INSIDE = (0.1, 0.5)  # fractions of a range to which numbers at its ends are moved
 NORMAL_95 = 1.96
 MANY = 1e6  # degrees of freedom above which the distribution counts as normal
 COLUMNS = ("value", "error", "low", "high")  # columns of a fit as a table
@@ -239,7 +240,29 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
         if all(abs(one.cost / max(other.cost, 1e-300) - 1.0) > SAME for other in different):
             different.append(one)
     ends = [solve(problem, one.numbers, steps=40) for one in different[:ENDS]]
-    return min(ends, key=lambda one: one.cost)
+    return _off_bounds(problem, few, min(ends, key=lambda one: one.cost))
+
+
+def _off_bounds(problem: Problem, few: Problem, best: Solution) -> Solution:
+    """A better solution whose numbers leave the ends of their ranges, if there is one.
+
+    An index of refraction of 1 has a slope of 0, so a number that a step puts there never leaves. The numbers at an end
+    are moved inside, one at a time and all together, first on few values.
+    """
+    low, high, _ = ranges(problem.free)
+    stuck = np.flatnonzero((best.numbers <= low) | (best.numbers >= high))
+    if not len(stuck):
+        return best
+    begun = best.numbers
+    cost = solve(few, begun, steps=12, tolerance=1e-3).cost * (1.0 - SAME)
+    for group, share in itertools.product([*([k] for k in stuck), stuck], INSIDE):
+        moved = begun.copy()
+        moved[group] = between(problem.free, share)[group]
+        rough = solve(few, moved, steps=12, tolerance=1e-3)
+        if rough.cost < cost:
+            cost = rough.cost * (1.0 - SAME)
+            best = min(best, solve(problem, rough.numbers, steps=40), key=lambda one: one.cost)
+    return best
 
 
 def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
@@ -330,6 +353,11 @@ def _notes_on_data(data: Data) -> list[str]:
     if data.negative.any():
         share = ", ".join(f"{name} {100.0 * n / len(data):.2g} %" for name, n in zip(NAMES, data.negative, strict=True))
         notes.append(f"{int(data.negative.sum())} of {3 * len(data)} values are negative ({share})")
+    dark = [name for name, largest in zip(NAMES, data.value.max(axis=0), strict=True) if largest <= 0.0]
+    if dark and len(dark) < len(NAMES):
+        notes.append(
+            f"no value of {' and '.join(dark)} is positive: shared parameters are determined by the other channels"
+        )
     for why in ("saturated", "not finite"):
         if why in data.out:
             notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and excluded")

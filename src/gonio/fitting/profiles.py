@@ -72,7 +72,7 @@ def profiles(
         rise = quantiles[k] ** 2 * own[k]
         half = quantiles[k] * sure.errors[k]
         large = values * len(numbers) > LARGE
-        if not rise > 0.0 or (known[k] and (large or _is_even(problem, numbers, k, half, sure.inverse, cost))):
+        if not 0.0 < rise < np.inf or (known[k] and (large or _is_even(problem, numbers, k, half, sure.inverse, cost))):
             continue
         step = half if known[k] else FIRST * (numbers[k] if ratio[k] else _span(numbers[k], low[k], high[k]))
         for side, bound in ((0, low[k]), (1, high[k])):

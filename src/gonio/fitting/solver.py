@@ -24,6 +24,7 @@ from .parameters import CHANNELS, Free, inner_of, ranges, start_of, with_drjit
 Array = backend.Array
 BLOCK = 1 << 13  # rows that BLAS sums at a time; it splits more among its threads, whose number changes the last bits
 SMALL = 1e-3  # fraction of the largest value: "log" and "relative" are absolute below it, relative above
+DARK = 1e3  # times the largest value of the other channels: divides differences in a channel that is 0 everywhere
 NEAR = 0.1  # relative difference below which a series is more accurate than the logarithm in float32
 
 
@@ -235,9 +236,14 @@ class Problem:
 def floors_of(value: Floats) -> Floats:
     """Values per channel below which a "relative" difference becomes an absolute one, (3,): a thousandth of the
     brightest values in the data. Negative values are ignored: in measured files, they are in highlights whose color is
-    out of gamut."""
+    out of gamut.
+
+    In a channel without a positive value, that of a dead detector or of a black material, no difference is relative.
+    Its floor is so large that the channel determines its own parameters, but not those that it shares with others.
+    """
     brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
-    return np.maximum(SMALL * brightest, 1e-6)
+    dark = value.max(axis=0) <= 0.0
+    return np.maximum(np.where(dark, DARK * brightest.max(), SMALL * brightest), 1e-6)
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:

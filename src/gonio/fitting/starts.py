@@ -41,16 +41,24 @@ def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: in
     first  values of the free parameters in the material, (K,)
     seed   seed of the random numbers
     """
+    rng = np.random.default_rng(seed)
+    return [_inside(free, first, rng.random(len(first))) for _ in range(count)]
+
+
+def between(free: list[Free], share: float) -> Floats:
+    """Numbers at a fraction of their ranges, (K,), on a logarithmic scale for lobe widths; unbounded ranges are cut at
+    `OPEN`."""
+    count = sum(one.count for one in free)
+    return _inside(free, np.zeros(count), np.full(count, share))
+
+
+def _inside(free: list[Free], first: Floats, share: Floats) -> Floats:
+    """Numbers at a fraction of their ranges, (K,); unbounded ranges are cut at `OPEN`, or at twice `first`."""
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)
-    rng = np.random.default_rng(seed)
-    starts = []
-    for _ in range(count):
-        share = rng.random(len(first))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            starts.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
-    return starts
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
 
 
 def _is_width(one: Free) -> bool:

@@ -7,6 +7,7 @@ compare.convert("gold.binary", "gold.bsdf").error    converted to another format
 from __future__ import annotations
 
 import os
+from difflib import get_close_matches
 from pathlib import Path
 
 from ..errors import InputError, did_you_mean
@@ -54,6 +55,16 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
     return next((one for one in formats if data is not None and one.fits(data)), formats[0])
 
 
+def _hint(path: Path, error: OSError | ValueError) -> str:
+    """How to mend the path of a file that cannot be read."""
+    if not isinstance(error, FileNotFoundError):
+        return str(getattr(error, "strerror", "") or "")
+    if not path.parent.is_dir():
+        return f"there is no folder '{path.parent}'"
+    near = get_close_matches(path.name, [one.name for one in path.parent.iterdir() if names_table(one.name)], 1)
+    return f"did you mean '{near[0]}'?" if near else "check the path"
+
+
 def read(file: str | os.PathLike[str]) -> Measurement:
     """The table in a file, which is read again only if the file has changed.
 
@@ -66,7 +77,7 @@ def read(file: str | os.PathLike[str]) -> Measurement:
     try:
         about = path.stat()
     except (OSError, ValueError) as error:
-        raise InputError(f"no file '{path}'", str(path), str(getattr(error, "strerror", "") or "")) from None
+        raise InputError(f"no file '{path}'", str(path), _hint(path, error)) from None
     key, stamp = (str(path.absolute()), item), (about.st_mtime_ns, about.st_size)
     known = _read.pop(key, None)
     if known is None or known[0] != stamp:

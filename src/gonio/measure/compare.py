@@ -17,6 +17,7 @@ from ..ops import backend
 from . import format_of, read
 from .formats.merl import Merl
 from .tables.base import Floats, Measurement
+from .tables.samples import Samples
 
 PAIRS = 1 << 16
 ROUNDS = 16
@@ -96,6 +97,7 @@ class Converted:
                  reciprocal part
     reciprocity  the part due to a format that stores one value for a pair and its swapped pair: the difference of the
                  reciprocal part from the source. The two parts overlap
+    measured     the directions at which the source is measured, if the file states values at others too; else ""
     """
 
     path: Path
@@ -105,6 +107,7 @@ class Converted:
     size: int
     resolution: float = 0.0
     reciprocity: float = 0.0
+    measured: str = ""
 
     def as_dict(self) -> dict[str, object]:
         return {**vars(self), "path": str(self.path), "output": str(self.path)}
@@ -146,7 +149,17 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi:
         even = ReciprocalPart(table)
         resolution, reciprocity = difference(even, made), difference(table, even)
     files.write_whole(target, data)
-    return Converted(path, resampled.name, resampled is not table, error, len(data), resolution, reciprocity)
+    known = _measured(table, made)
+    return Converted(path, resampled.name, resampled is not table, error, len(data), resolution, reciprocity, known)
+
+
+def _measured(table: Measurement, made: Measurement) -> str:
+    """The directions at which a table is measured, if another one made from it states values at others too."""
+    if isinstance(table, Samples) and not isinstance(made, Samples):
+        return f"at {len(table.values)} pairs of directions"
+    if made.angular_range.within(table.angular_range) != made.angular_range:
+        return f"at {table.angular_range}"
+    return ""
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

@@ -21,9 +21,10 @@ class Conversion:
 
     output   the file
     summary  a one-line description
-    notices  properties that the format cannot hold, and values that were clipped
-    facts    for pictures `exposure` (stops, or None); for tables `kind`, `resampled`, `error`, `size` (bytes), and the
-             components of the error, `resolution` and `reciprocity`
+    notices  properties that the format cannot hold, values that were clipped, and values that were not measured
+    facts    for pictures `exposure` (stops, or None); for tables `kind`, `resampled`, `error`, `size` (bytes), the
+             components of the error, `resolution` and `reciprocity`, and `measured`, the measured angles, if the file
+             states values at others too
     """
 
     output: Path
@@ -54,8 +55,8 @@ def convert(
     exposure  for a .png: stops, or "auto"
     phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
               nonreciprocal values; by default that of the table if it has such cells, otherwise 180
-    Warns (GonioWarning) about properties that the format cannot hold. Raises InputError for formats that cannot be read
-    or written.
+    Warns (GonioWarning) about properties that the format cannot hold, and about values that were not measured. Raises
+    InputError for formats that cannot be read or written.
     """
     result = converted(str(source), Path(output), exposure, phi)
     for notice in result.notices:
@@ -82,11 +83,19 @@ def converted(
         return Conversion(output, str(output))
     if kind is Kind.TABLE:
         table = compare.convert(source, output, phi)
-        return Conversion(output, _table_summary(table), (), table.as_dict())
+        return Conversion(output, _table_summary(table), _repeated(table), table.as_dict())
     shown = images.convert(Path(source), output, exposure)
     summary = str(output) if shown.exposure is None else f"{output}  exposure {shown.exposure:+g} EV"
     facts: dict[str, object] = {"exposure": shown.exposure, "notice": shown.notice}
     return Conversion(output, summary, (shown.notice,) if shown.notice else (), facts)
+
+
+def _repeated(table: compare.Converted) -> tuple[str, ...]:
+    """A notice if the file states values where the source has none."""
+    if not table.measured:
+        return ()
+    made = f"the other values of {table.path.name} are interpolated or repeated, which the file does not state"
+    return (f"measured {table.measured}; {made}",)
 
 
 def _table_summary(table: compare.Converted) -> str:

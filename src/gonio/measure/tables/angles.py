@@ -108,6 +108,10 @@ class Angles(Guided, Measurement):
 
     # ------------------------------------------------------------------ as numbers
 
+    def pairs(self) -> tuple[Floats, Floats]:
+        """wo and wi of every value, (N, 3) each, in the order of `values`."""
+        return pairs(self.theta_i, self.theta_r, self.phi)
+
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The values; only those with theta_i <= theta_r, as (pair, phi, channel), if reciprocity gives the others."""
         values = self.values

@@ -18,6 +18,7 @@ from . import factors
 from .ratio import COVER, NUMBERS, SPREAD, Fit, Ratio, holds, scalar, tolerance, written
 
 FEWEST = 64  # pairs of directions that a fit needs
+ANY = "a constant factor"  # the guess for a number without a meaning
 
 
 def fitted(ratio: Ratio) -> Fit | None:
@@ -64,7 +65,7 @@ def _constant(ratio: Ratio) -> Fit | None:
             return Fit(f"{name} = {middle:.5g}", "the chain rule, omitted or applied twice", *quality)
     text = written(middle) if middle > 0.0 else f"-{written(-middle)}"
     known = text.lstrip("-") in NUMBERS
-    guess = "a constant that one of the two lacks" if known else "a constant factor"
+    guess = "a constant that one of the two lacks" if known else ANY
     return Fit(text, guess, *quality, middle)
 
 
