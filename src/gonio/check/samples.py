@@ -57,7 +57,7 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
     rows = read(path, up)
     accuracy = ACCURACY if accuracy is None else accuracy
     finding = judge(path.name, rows, asked.material, accuracy)
-    if finding.passed and asked.defaults:
+    if (finding.passed and asked.defaults) or not np.isfinite(rows.f).all():
         return finding
     other = _explaining(path.name, rows, asked.material, accuracy) if asked.defaults else None
     if other is None:
@@ -100,6 +100,11 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
     if not fine.any() or not (np.any(expected[fine]) or np.any(rows.f)):
         raise InputError("every row is at or below the horizon", name, "give directions above the surface, or --up y")
     figures = {"rows": float(len(rows.f)), "accuracy": accuracy}
+    undefined = np.flatnonzero(~np.isfinite(rows.f).all(axis=1))
+    if len(undefined):
+        first = f"line {rows.line[undefined[0]]}, f {_numbers(rows.f[undefined[0]])}"
+        fact = f"{len(undefined)} of {len(rows.f)} rows are not finite: {first}"
+        return Finding(name, kind, WRONG, (fact,), Mistake("a division by 0, or a root of a negative number", "NaN"))
     facts: list[str] = []
     if _agree(rows.f, expected, fine, accuracy):
         pass
@@ -193,7 +198,7 @@ def read(path: Path, up: str = "z") -> Rows:
             "7 columns are wo, wi and f; 9 have f in three channels; 5 are theta_o, phi_o, theta_i, phi_i, f in degrees"
         )
         raise InputError(f"{width} columns given", where, hint)
-    values = text.table(table, width, where)
+    values = text.table(table, width, where, finite=4 if width == 5 else 6)
     lines = [line for line, _ in table]
     if width == 5:
         wo, wi = directions.at(values[:, 0], values[:, 1]), directions.at(values[:, 2], values[:, 3])

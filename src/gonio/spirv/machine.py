@@ -374,12 +374,10 @@ class Machine:
         raise refuse(f"operations on the bits of a number ({name}) are not supported", "compute with floats")
 
     def _check_width(self, id: int) -> None:
-        kind = self.module.type(id)
-        kind = self.module.type(kind.parts[0]) if kind.kind in ("vector", "matrix") else kind
-        if "-bit" in kind.kind:
-            raise refuse(
-                f"{kind.kind}s are not supported", "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
-            )
+        kind = self._scalar(id)
+        if "-bit" in kind:
+            hint = "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
+            raise refuse(f"{kind}s are not supported", hint)
 
     def _standard(self, frame: Frame, one: Instruction) -> Value:
         if self.module.sets.get(one.operands[0]) != "GLSL.std.450":
@@ -387,10 +385,8 @@ class Machine:
         self._check_width(one.type)
         number, values = one.operands[1], [self._get(frame, id) for id in one.operands[2:]]
         undefined = lost(leaf for value in values for leaf in leaves(value))
-        if number in GEOMETRIC and undefined is not None:
-            return self.module.undefined(one.type, undefined)
         if number in GEOMETRIC:
-            return GEOMETRIC[number](*values)
+            return GEOMETRIC[number](*values) if undefined is None else self.module.undefined(one.type, undefined)
         if number in ELEMENTWISE or number in WHOLE_NUMBERS:
             return elementwise(passing(ELEMENTWISE.get(number) or WHOLE_NUMBERS[number]), *values)
         what = REFUSED_FUNCTIONS.get(number, f"the function {number} of SPIR-V's GLSL.std.450")

@@ -22,6 +22,8 @@ class Effort:
     cells            rows and columns of the chi-square test, per side of the surface
     full             whether the given parameter values are tested; directions then reach 89.9 degrees, and facts that
                      the material declares are checked
+    attempts         how often an integral is tried, with more samples each time, while it leaves light unseen, as in a
+                     streak a thousand times as long as wide
     """
 
     name: str
@@ -34,6 +36,7 @@ class Effort:
     places: int = 0
     cells: tuple[int, int] = CELLS
     full: bool = True
+    attempts: int = 3
 
 
 EFFORTS = {
@@ -44,7 +47,7 @@ EFFORTS = {
 # At the other parameter values, directions stop short of the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower
 # than the steps of float32 directions.
 ELSEWHERE = {
-    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), full=False),
+    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), full=False, attempts=1),
     "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), full=False),
     "deep": Effort("deep", 1 << 14, 18, 8, 1 << 16, 1e-4, cells=(50, 100), full=False),
 }

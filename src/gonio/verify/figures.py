@@ -156,7 +156,7 @@ class AlbedoCurves:
                 axes[1],
                 "angle of wo, degrees",
                 "share of light lost",
-                f"white furnace: loses {self.loss:.4f} on average",
+                f"white furnace: {'gains' if self.loss < 0.0 else 'loses'} {abs(self.loss):.4f} on average",
             )
         return (
             _svg(figure),

@@ -99,7 +99,12 @@ class _Cells(NamedTuple):
 
 
 def integrate(
-    sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float = 1e-5, seed: int = 0
+    sample: Sampler,
+    integrand: Integrand,
+    wo: np.ndarray,
+    tolerance: float = 1e-5,
+    seed: int = 0,
+    attempts: int = len(SAMPLES),
 ) -> Integral:
     """int integrand(wo, wi) dwi over the sphere, for each row of wo (N, 3).
 
@@ -108,8 +113,9 @@ def integrate(
     tolerance  absolute error of an integral up to 1, relative error of a larger one; if cells or samples run out, the
                reported error is larger
     seed       seed of the samples
+    attempts   numbers of `SAMPLES` that are tried; with fewer, the reported error contains the light that is unseen
     """
-    per, *more = SAMPLES
+    per, *more = SAMPLES[:attempts]
     value, error, unseen = _integrate(sample, integrand, wo, tolerance, seed, per)
     for per in more:
         dark = unseen > tolerance * np.maximum(np.abs(value).max(1), 1.0)

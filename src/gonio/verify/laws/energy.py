@@ -220,7 +220,11 @@ class Energy(Law):
             float(np.trapezoid(2.0 * mu * loss, mu) / max(np.trapezoid(2.0 * mu, mu), 1e-9)) if len(mu) > 1 else 0.0
         )
         where = int(np.argmax(lost))
-        text = f"white furnace loses {average + 0.0:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
+        if average < 0.0:
+            most = int(np.argmin(lost))
+            text = f"white furnace gains {-average:.4f} on average, {-lost[most]:.4f} at {theta[most]:.4g} degrees"
+        else:
+            text = f"{LOST} {average + 0.0:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
         known = float(error.max())
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
@@ -345,14 +349,14 @@ def _light(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> Light
         subject.memo["defined"] = bool(np.isfinite(subject.eval(*pairs(subject, PROBES, seed))).all())
     defined = subject.memo["defined"]
     if defined:
-        integral = cubature.integrate(sample, power, wo, effort.accuracy, seed)
+        integral = cubature.integrate(sample, power, wo, effort.accuracy, seed, effort.attempts)
         defined = bool(np.isfinite(integral.value).all())
     if not defined:  # one value that is not finite would hide a gain elsewhere
 
         def finite(wo: Direction, wi: Direction) -> list[Scalar]:
             return [ops.where(ops.isfinite(channel), channel, 0.0) for channel in power(wo, wi)]
 
-        integral = cubature.integrate(sample, finite, wo, effort.accuracy, seed)
+        integral = cubature.integrate(sample, finite, wo, effort.accuracy, seed, effort.attempts)
     return Light(integral.value + ideal, integral.error + effort.accuracy, defined)
 
 
