@@ -61,3 +61,15 @@ def test_the_rim_of_a_narrow_lobe_is_not_missed():
     found = go.albedo(narrow, mu=[0.2, 0.25], phi=0.3)
     assert found.method == "quadrature"
     assert found.value == pytest.approx(1.0, abs=2e-4)
+
+
+def test_missing_numbers_are_one_clear_error() -> None:
+    rough = go.Conductor.preset("Au", alpha=0.3)
+    with pytest.raises(go.InputError, match="no numbers given"):
+        go.albedo(rough, [])
+    with pytest.raises(go.InputError, match="masked numbers given"):
+        go.albedo(rough, np.ma.masked_array([0.5, 0.6], mask=[False, True]))
+    up = np.array([[0.0, 0.0, 1.0]] * 2)
+    with pytest.raises(go.InputError, match="masked values given"):
+        rough.eval(np.ma.masked_array(up, mask=[[False] * 3, [True] * 3]), up)
+    np.testing.assert_array_equal(rough.eval(np.ma.masked_array(up), up), rough.eval(up, up))

@@ -194,6 +194,12 @@ def test_an_index_leaves_the_end_of_its_range_where_its_slope_is_0(seed: int) ->
     np.testing.assert_allclose(index, eta, atol=0.15)
 
 
+def test_a_measured_material_can_be_fitted() -> None:
+    assert fit(go.Measured(), "lambert").names == ("albedo.r", "albedo.g", "albedo.b")
+    with pytest.raises(InputError, match="list given, a file of measured values or a table expected"):
+        fit([0.1, 0.2], "lambert")
+
+
 @pytest.mark.slow
 def test_a_dead_channel_does_not_carry_the_others_away() -> None:
     dead = table(PLASTIC)

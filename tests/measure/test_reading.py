@@ -274,3 +274,21 @@ def test_an_axis_without_entries_is_refused_in_every_kind_of_table(files: dict[s
                 content = written({**file, name: np.take(file[name], [], axis=axis)})
                 with pytest.raises(InputError, match=f"the array {name} of shape .* is empty"):
                     Own().read(content, kind)
+
+
+@pytest.mark.parametrize("title", ["", "Garnet Red"])
+@pytest.mark.parametrize("name", ["cornell", "astm"])
+def test_a_title_stays_as_it_is(name: str, title: str) -> None:
+    one = formats()[name]
+    table = samples.sampled(go.Lambert(0.5).eval, samples.plan()[::40], title=title)
+    for _ in range(2):
+        table = one.read(one.write(table), "x")
+        assert table.title == title
+
+
+def test_gray_values_are_reported_as_gray(tmp_path: Path) -> None:
+    path = tmp_path / "gray.astm"
+    directions = samples.plan()[::40]
+    path.write_bytes(formats()["astm"].write(samples.Samples(directions, np.full((len(directions), 1), 0.2))))
+    rows = dict(report.lines(report.describe(path)))
+    assert rows["channels"] == "one, gray" and "title" not in rows

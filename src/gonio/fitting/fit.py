@@ -19,6 +19,7 @@ from ..catalog.material import MaterialLike
 from ..errors import InputError, MachineError
 from ..files import write_whole
 from ..material import BSDF
+from ..materials.measured.measured import Measured
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
@@ -176,7 +177,7 @@ def quantiles(degrees: Floats | None) -> Floats:
 @renamed(metric="loss", fixed="param")
 @public
 def fit(
-    data: str | os.PathLike[str] | Measurement | Data,
+    data: str | os.PathLike[str] | Measurement | Measured | Data,
     model: MaterialLike = "conductor",
     *,
     lobes: int = 1,
@@ -191,7 +192,7 @@ def fit(
         result = go.fit("gold.binary", "lambert+ggx")
         result.material, result.values, result.errors
 
-    data      a measurement file, a table, or `Data`
+    data      a measurement file, a table, a `go.Measured`, or `Data`
     model     anything that `go.material` takes, such as the sum "lambert+ggx"; the fit starts from its parameter values
     lobes     number of copies of the last term of the sum
     loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
@@ -207,9 +208,7 @@ def fit(
     if loss not in METRICS:
         raise InputError(f"unknown metric '{loss}'", "loss", " | ".join(METRICS))
     material, moving, notes = moving_with_notes(model, lobes, param, free)
-    cells = (
-        data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
-    )
+    cells = data if isinstance(data, Data) else data_of(_table_of(data), grazing)
     middle = Problem(material, moving, cells.some(SOME), loss)
     best = _best(middle, starts_of(material, moving), progress)
     full = middle
@@ -218,6 +217,18 @@ def fit(
         best = solve(full, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
     return _result(full, best, loss, time.perf_counter() - started, notes)
+
+
+def _table_of(data: object) -> Measurement:
+    """The table in a file, or of a material. Raises InputError for anything else."""
+    if isinstance(data, Measurement):
+        return data
+    if isinstance(data, Measured):
+        return data.table
+    if isinstance(data, (str, os.PathLike)):
+        return read(data)
+    what = f"{type(data).__name__} given, a file of measured values or a table expected"
+    raise InputError(what, "fit: data", 'such as go.fit("gold.binary") or go.fit(go.Measured("gold.binary"))')
 
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:

@@ -310,6 +310,8 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, t
         where = f"{name}: {label}"
         try:
             array = np.asarray(value)
+            if np.ma.is_masked(value):
+                raise InputError("masked values given", where, "give only the unmasked rows")
             if np.iscomplexobj(array):
                 raise InputError("complex numbers given, real ones expected", where)
             array = array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)

@@ -34,7 +34,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
     low, high = table.range
     return {
         "path": os.fspath(file),
-        "format": table.source.get("format", ""),
+        "format": table.source.get("format") or (SAMPLE if text == SAMPLE else format_of(path).name),
         "kind": table.name,
         "title": table.title,
         "dimensions": table.shape,
@@ -67,7 +67,9 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
     if "items" in about:
         return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
     nm = about["wavelengths"]
-    channels = "red, green, blue" if nm is None else f"{len(nm)} wavelengths, {nm[0]:g} to {nm[-1]:g} nm"
+    channels = "one, gray" if about["dimensions"].get("channel") == 1 else "red, green, blue"
+    if nm is not None:
+        channels = f"{len(nm)} wavelengths, {nm[0]:g} to {nm[-1]:g} nm" if len(nm) > 1 else f"one, {nm[0]:g} nm"
     low, high = about["range"]
     rows = [
         ("format", f"{about['format']}, a table of kind {about['kind']}"),

@@ -78,7 +78,11 @@ def albedo(
         raise InputError(f"{type(model).__name__} given, a material expected", "albedo")
     if method not in METHODS:
         raise InputError(f"unknown method '{method}'", "albedo: method", did_you_mean(str(method), list(METHODS)))
+    if np.ma.is_masked(mu):
+        raise InputError("masked numbers given", "albedo: mu", "give mu.compressed()")
     mu, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(mu, float)), np.asarray(phi, float))
+    if mu.size == 0:
+        raise InputError("no numbers given", "albedo: mu", "give at least one cosine")
     if mu.ndim != 1 or not np.all(np.abs(mu) <= 1.0):
         raise InputError("mu is a cosine: numbers in [-1, 1] expected", "albedo: mu")
     check_uniform(model)

@@ -60,8 +60,10 @@ class Astm(Format):
             raise InputError(what, where, "name the columns 550nm and so on")
         source = {"format": self.name, **head}
         values[:, [0, 2]] = np.abs(values[:, [0, 2]])
-        grid = _grid(values, where, head.get("TITLE", ""), source, nm)
-        return grid or Samples(values[:, :4], values[:, 4:], where, head.get("TITLE", ""), source, nm)
+        title = head.get("TITLE", "")
+        title = "" if title == "-" else title  # written for tables without a title
+        grid = _grid(values, where, title, source, nm)
+        return grid or Samples(values[:, :4], values[:, 4:], where, title, source, nm)
 
     def write(self, table: Measurement) -> bytes:
         if isinstance(table, Angles):

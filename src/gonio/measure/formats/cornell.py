@@ -13,6 +13,7 @@ from ..tables.samples import Samples, sampled
 from .base import Format
 from .text import lines, numbers, written
 
+HEADINGS = ("written by Gonio", "num wls", "wls", "theta i")  # comments that do not describe the material
 WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; used to write colors
 
 
@@ -57,7 +58,7 @@ class Cornell(Format):
             raise InputError("the wavelengths do not increase", where)
         rows = values[channels:].reshape(-1, width)
         about = {"format": self.name, "comments": "\n".join(filter(None, comments))[:2000]}
-        title = " ".join(filter(None, comments[1:3])) or (comments[0] if comments else "")
+        title = " ".join([one for one in comments[:3] if one and not one.startswith(HEADINGS)][-2:])
         return Samples(rows[:, :4], rows[:, 4:], where, title, about, nm)
 
     def write(self, table: Measurement) -> bytes:
