@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 # An error raised by Gonio in a material's plugin; it ends the traceback that Mitsuba reports: kind, where, what, hint.
 _RAISED = re.compile(r"\n(InputError|MachineError): ([^\n]*?): ([^\n]+)\n  hint: ([^\n]+)\Z")
 
+FAR = 4.0  # distance from the origin, in longest sides of a scene, from which it is moved there
 MERGE_FROM = 64  # smallest number of materials of equal structure that are merged into one BSDF
 
 # Maps local +z, +x, +y of Mitsuba's sphere, where u runs about z from x toward y and v from +z, to +y, +z, +x of the
@@ -62,11 +63,26 @@ def built(description: schema.SceneDescription, mi: ModuleType, merge_materials:
                      listed in `bsdfs`
     """
     builder = _Builder(description, mi, merge_materials)
-    return Built(builder.scene(), builder.bsdfs)
+    scene = builder.scene()
+    low, high = (np.array(end, float) for end in (scene.bbox().min, scene.bbox().max))
+    if np.isfinite([low, high]).all() and np.abs(low + high).max() / 2.0 > FAR * (high - low).max():
+        # what the camera looks at is where details matter
+        builder = _Builder(description, mi, merge_materials, np.clip(description.camera.transform.look_at, low, high))
+        scene = builder.scene()
+    return Built(scene, builder.bsdfs)
 
 
 class _Builder:
-    def __init__(self, description: schema.SceneDescription, mi: ModuleType, merge_materials: bool) -> None:
+    """Builds a scene whose coordinates are measured from `origin`: rays keep a distance from surfaces that grows with
+    the coordinates, so a scene far from the origin would lose light where objects touch."""
+
+    def __init__(
+        self,
+        description: schema.SceneDescription,
+        mi: ModuleType,
+        merge_materials: bool,
+        origin: np.ndarray | None = None,
+    ) -> None:
         from ..bridge import adapter
         from ..transport.lights import lights  # imported here, since they start Dr.Jit
 
@@ -74,6 +90,7 @@ class _Builder:
         self.adapter = adapter
         lights.register(mi)
         self.description, self.mi = description, mi
+        self.origin = np.zeros(3) if origin is None else origin
         self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
         # spectral variants upsample each color separately
@@ -128,6 +145,10 @@ class _Builder:
                 "simplify this part, and report it if it should work",
             ) from error
 
+    def moved(self, point: Sequence[float]) -> list[float]:
+        """A point's coordinates relative to `origin`."""
+        return [float(x) for x in np.subtract(point, self.origin)]
+
     def sensor(self) -> PluginDict:
         camera = self.description.camera
         placed = camera.transform
@@ -143,7 +164,7 @@ class _Builder:
             "near_clip": camera.t_near,
             "far_clip": camera.t_far,
             "to_world": self.mi.ScalarTransform4f().look_at(
-                list(placed.position), list(placed.look_at), list(placed.up)
+                self.moved(placed.position), self.moved(placed.look_at), list(placed.up)
             ),
             "film": {
                 "type": "hdrfilm",
@@ -165,7 +186,7 @@ class _Builder:
             return self.shape(light.shape, f"{where}/shape", name, emitter)
         if isinstance(light, schema.SpotLight):
             intensity = spectra.emitted(light.energy)
-            return {"type": "point", "position": list(light.position), "intensity": intensity}
+            return {"type": "point", "position": self.moved(light.position), "intensity": intensity}
         if isinstance(light, schema.DirectionalLight):
             irradiance = spectra.emitted(light.energy)
             return {"type": "directional", "direction": light.unit().tolist(), "irradiance": irradiance}
@@ -186,6 +207,7 @@ class _Builder:
         self, shape: schema.Shape, where: str, name: str, emitter: PluginDict | None = None
     ) -> Plugin | PluginDict:
         matrix = shape.transform.matrix()
+        matrix[:3, 3] -= self.origin
         material = shape.material or BY_TYPE["matte"](type="matte")
         # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
         source = None if emitter is None else self.load(emitter, where)
