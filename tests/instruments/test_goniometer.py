@@ -218,6 +218,7 @@ def test_what_a_table_of_one_value_for_both_orders_loses_is_said(tmp_path: Path)
 
     assert "exchanging both directions changes f by" in notes("phong", "a.binary")
     assert "exchanging" not in notes("phong", "a.gonio") + notes("oren-nayar", "b.binary")
+    assert "also transmits" in notes("dielectric", "d.gonio") and "transmits" not in notes("phong", "a.gonio")
 
 
 def test_noise_is_as_large_as_asked_and_its_error_is_known() -> None:

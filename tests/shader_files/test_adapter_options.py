@@ -144,6 +144,7 @@ ERRORS = {
     'function = "f"': r"matte\.glsl\.toml: function: no function 'f'",
     "[parameters.nope]\nlow = 1": r"matte\.glsl\.toml: parameters\.nope: no uniform 'nope'",
     "includes = [1]": r"matte\.glsl\.toml: includes = \[1\]",
+    "includes = ['none']": r"matte\.glsl\.toml: includes: there is no folder '.*none'",
     "[defines]\nA = [1]": r"matte\.glsl\.toml: defines\.A",
     'arguments = ["light", "derived"]': r"matte\.glsl\.toml: arguments: 'derived' given without a function",
     f"[parameters.gloss]\ndefault = 1{'0' * 400}": r"matte\.glsl\.toml: parameters\.gloss: default = 1000",

@@ -156,7 +156,7 @@ def read(
         module = parse(data, where)
     else:
         language = adapter.language or _LANGUAGES.get(path.suffix.lower(), "glsl")
-        folders = [_confined(path.parent / folder, inside) for folder in adapter.includes]
+        folders = [_folder(path.parent / folder, inside, adapter.where) for folder in adapter.includes]
         module = _compiled(text, where, language, adapter.defines, [path.parent, *folders], files)
     textures = {
         name: tables.texture(name, about, _confined(path.parent / about["file"], inside), adapter.where)
@@ -191,6 +191,14 @@ def _compiled(
     own, *named = folders
     binary = compile_text(text, where, language=language, defines=defines, folders=named, own_folder=own, read=files)
     return parse(binary, where)
+
+
+def _folder(path: Path, inside: Path | None, where: str) -> Path:
+    """The resolved path of a folder of `includes`. Raises InputError, which names the adapter `where`, if there is
+    none."""
+    if not _confined(path, inside).is_dir():
+        raise InputError(f"includes: there is no folder '{path}'", where, "give folders relative to the shader")
+    return path.resolve()
 
 
 def _confined(path: Path, inside: Path | None) -> Path:

@@ -217,6 +217,8 @@ def measure(
     rough = None if surface is None else _rough(surface, facet, detector, tracing, plan)
     specimen = rough or _model(material, detector)
     measured, hidden, notes = _filled(plan, specimen, detector, tracing.seed)
+    if isinstance(specimen, Model) and specimen.material.transmits:
+        notes.append("the material also transmits light, which is not measured: tables contain reflected light only")
     notes += _lost(measured, specimen) + ([] if target is None else _written(measured, plan, target))
     return _readout(measured, specimen, path, "" if path is None else plan.file.name, hidden, notes, begun)
 
