@@ -91,8 +91,8 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
         "saturated": int(np.count_nonzero(clipped)),
     }
     data = replace(data, out={why: count for why, count in out.items() if count})
-    kept = fine & ~clipped
-    return data if kept.all() else data.at(kept)
+    used = fine & ~clipped
+    return data if used.all() else data.at(used)
 
 
 def _of_cells(table: HalfDifference, grazing: float) -> Data:

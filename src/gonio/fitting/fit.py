@@ -261,8 +261,8 @@ def _off_bounds(problem: Problem, few: Problem, best: Solution) -> Solution:
     are moved inside, one at a time and all together, first on few values.
     """
     low, high, _ = ranges(problem.free)
-    stuck = np.flatnonzero((best.numbers <= low) | (best.numbers >= high))
-    if not len(stuck):
+    stuck: list[int] = np.flatnonzero((best.numbers <= low) | (best.numbers >= high)).tolist()
+    if not stuck:
         return best
     begun = best.numbers
     cost = solve(few, begun, steps=12, tolerance=1e-3).cost * (1.0 - SAME)
